@@ -1,0 +1,26 @@
+"""Errors a user can act on."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class UserError(Exception):
+    """Bad input: one line that says what is wrong, where, and what would be right. The command line exits 2."""
+
+
+class CellError(Exception):
+    """A single cell cannot give a valid score (saturated capture, failed registration): a visible hole."""
+
+
+class BudgetError(CellError):
+    """A method asked the display for more captures than it may use."""
+
+
+def suggest(word: str, allowed: Iterable[str]) -> str:
+    """``"did you mean 'x'? "`` for a near miss, then the allowed words; for the end of an error line."""
+    words = sorted(allowed)
+    near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return f"{hint}allowed: {', '.join(words)}"

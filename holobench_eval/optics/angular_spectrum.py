@@ -1,0 +1,95 @@
+"""Band-limited angular spectrum propagation, the project's default model."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+from .convolution import Convolution, frequencies, iris
+from .padding import Padding, padded_shape
+
+
+def angular_spectrum_phase(f_squared: Tensor, wavelength: float, distance: float) -> Tensor:
+    """Phase [rad] of free space at squared spatial frequency [1/m^2], carrier 2 pi z / lambda removed.
+
+    2 pi z (sqrt(1/lambda^2 - f^2) - 1/lambda), written without the cancellation. float64 in, float64 out;
+    evanescent frequencies give the phase of the band's edge and are to be masked by the caller.
+    """
+    axial = torch.sqrt((1 / wavelength**2 - f_squared).clamp_min(0.0))
+    return -2 * math.pi * distance * f_squared / (axial + 1 / wavelength)
+
+
+def band_limit(size: int, padded: int, pitch: float, wavelength: float, distance: float) -> float:
+    """Highest frequency [1/m] whose light does not wrap around into the picture.
+
+    Matsushima & Shimobaba (Opt. Express 17, 19662, 2009, Eq. 13) stop light at half the padded window; with more
+    padding than the picture is wide it may go on until the wrap-around would reach the picture.
+    """
+    reach = max(padded / 2, padded - size) * pitch
+    return 1 / (wavelength * math.sqrt((distance / reach) ** 2 + 1))
+
+
+class AngularSpectrum(Convolution):
+    """Exact scalar propagation between parallel planes (Goodman, Introduction to Fourier Optics, section 3.10).
+
+    shape: (H, W) pixels; pitch, wavelength, distance: metres (a negative distance propagates back);
+    pupil: diameter of a circular iris in the Fourier plane as a fraction of the band 1/pitch, None for no iris;
+    padding: None for the stated default accuracy, a number of samples added per axis, or "reference";
+    dtype: complex64 unless given; the reference setting is complex128.
+
+    Frequencies whose light would wrap around into the picture are removed, evanescent ones as well. Errors at
+    the default: at most 1e-2 rms on a white complex field, 1e-4 on a smooth one. The transfer function is cached.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        pitch: float,
+        wavelength: float,
+        distance: float,
+        pupil: float | None = None,
+        padding: Padding = None,
+        dtype: torch.dtype | None = None,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        check_geometry(shape, pitch, wavelength, pupil)
+        if dtype is None:
+            dtype = torch.complex128 if padding == "reference" else torch.complex64
+        padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
+        transfer = _transfer(tuple(shape), padded, pitch, wavelength, distance, pupil, dtype, torch.device(device))
+        super().__init__((shape[0], shape[1]), transfer)
+        self.pitch, self.wavelength, self.distance, self.pupil = pitch, wavelength, distance, pupil
+
+
+def check_geometry(shape: tuple[int, int], pitch: float, wavelength: float, pupil: float | None) -> None:
+    """Raise ValueError for a geometry that has no meaning."""
+    if len(shape) != 2 or min(shape) < 1:
+        raise ValueError(f"shape must be (rows, columns) of at least one pixel, got {shape}")
+    if not (pitch > 0 and wavelength > 0):
+        raise ValueError(f"pitch and wavelength must be positive metres, got {pitch} and {wavelength}")
+    if pupil is not None and not 0 < pupil <= 2:
+        raise ValueError(f"pupil is a fraction of the panel's band, 0 to 2, got {pupil}")
+
+
+@lru_cache(maxsize=24)
+def _transfer(
+    shape: tuple[int, int],
+    padded: tuple[int, int],
+    pitch: float,
+    wavelength: float,
+    distance: float,
+    pupil: float | None,
+    dtype: torch.dtype,
+    device: torch.device,
+) -> Tensor:
+    fy, fx = frequencies(padded, pitch, device)
+    f_squared = fy**2 + fx**2
+    phase = angular_spectrum_phase(f_squared, wavelength, distance)
+    passed = f_squared < 1 / wavelength**2
+    if distance != 0:
+        passed &= fy.abs() <= band_limit(shape[0], padded[0], pitch, wavelength, distance)
+        passed &= fx.abs() <= band_limit(shape[1], padded[1], pitch, wavelength, distance)
+    return torch.polar(iris(fy, fx, pitch, pupil) * passed, phase).to(dtype)

@@ -1,0 +1,55 @@
+"""Fresnel propagation: the paraxial expansion of the angular spectrum."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+from .angular_spectrum import check_geometry
+from .convolution import Convolution, frequencies, iris
+from .padding import Padding, padded_shape
+
+
+class Fresnel(Convolution):
+    """Fresnel transfer-function propagation (Goodman, section 4.2), ``exp(-i pi lambda z f^2)``, carrier removed.
+
+    Parameters as ``AngularSpectrum``. The difference between the two is the model-approximation error of
+    paper Eq. 8.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        pitch: float,
+        wavelength: float,
+        distance: float,
+        pupil: float | None = None,
+        padding: Padding = None,
+        dtype: torch.dtype | None = None,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        check_geometry(shape, pitch, wavelength, pupil)
+        if dtype is None:
+            dtype = torch.complex128 if padding == "reference" else torch.complex64
+        padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
+        super().__init__(
+            (shape[0], shape[1]), _transfer(padded, pitch, wavelength, distance, pupil, dtype, torch.device(device))
+        )
+
+
+@lru_cache(maxsize=24)
+def _transfer(
+    padded: tuple[int, int],
+    pitch: float,
+    wavelength: float,
+    distance: float,
+    pupil: float | None,
+    dtype: torch.dtype,
+    device: torch.device,
+) -> Tensor:
+    fy, fx = frequencies(padded, pitch, device)
+    phase = -math.pi * wavelength * distance * (fy**2 + fx**2)
+    return torch.polar(iris(fy, fx, pitch, pupil), phase).to(dtype)

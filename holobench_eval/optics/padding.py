@@ -1,0 +1,69 @@
+"""How many samples a propagation needs: a stated accuracy, with its price."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+Padding = int | Literal["reference"] | None
+
+DEFAULT_ERROR = 0.9e-2
+"""Relative rms error on a white complex field that the default padding is chosen for (it states 1e-2)."""
+
+IRIS_EDGE = 0.05
+"""Half width of the iris's raised-cosine edge, relative to its radius."""
+
+
+def spread(pitch: float, wavelength: float, distance: float, pupil: float | None = None) -> float:
+    """Pixels that light travels to each side: ``K = z tan(asin(lambda / 2p)) / p``; an iris scales the band."""
+    band = 1.0 if pupil is None else min(pupil * (1 + IRIS_EDGE), 1.0)
+    sine = min(band * wavelength / (2 * pitch), 0.99)
+    return abs(distance) * math.tan(math.asin(sine)) / pitch
+
+
+def tail_error(size: int, spread_pixels: float, padded: int) -> float:
+    """Relative rms error, on a white field, of the light that wraps around one axis of a ``padded`` transform.
+
+    The band of a sampled field ends in a kink at its Nyquist frequency, so beyond the spread K the impulse
+    response falls only as ``(2.2 K / pi) / (d^2 - K^2)`` (stationary phase; the factor is measured, and the
+    estimate is never below the error measured against an eight times padded transform for sizes 128 to 512
+    and K from 0.2 to 5 times the size).
+    """
+    offset = np.arange(size, dtype=np.float64)
+    distance = padded - offset
+    response = (2.2 * spread_pixels / np.pi) / np.maximum(distance**2 - spread_pixels**2, 1.0)
+    kept = 1 - spread_pixels / (2 * size) if spread_pixels < size else size / (2 * spread_pixels)
+    return math.sqrt(2 * float(np.sum((1 - offset / size) * response**2)) / kept)
+
+
+@lru_cache(maxsize=256)
+def padded_size(size: int, spread_pixels: float, sharp_band: bool, padding: Padding) -> int:
+    """Samples per axis of the transform that propagates ``size`` pixels, rounded up to a fast FFT size.
+
+    None: the smallest size whose tail error is below the stated one (both axes together). With an iris inside
+    the band (``sharp_band`` False) the soft edge leaves no tails and ``N + K + 32`` errs below 5e-3.
+    ``"reference"``: four times the size, more when the light spreads further. An integer: samples added.
+    """
+    if padding == "reference":
+        return max(4 * size, int(next_fast_len(size + math.ceil(4 * spread_pixels))))
+    if padding is not None:
+        if isinstance(padding, bool) or not isinstance(padding, int) or padding < 0:
+            raise ValueError(f"padding must be None, 'reference' or a whole number of samples >= 0, got {padding!r}")
+        return int(next_fast_len(size + padding))
+    padded = int(next_fast_len(size + math.ceil(spread_pixels) + (16 if sharp_band else 32)))
+    while sharp_band and tail_error(size, spread_pixels, padded) > DEFAULT_ERROR / math.sqrt(2):
+        padded = int(next_fast_len(padded + 1))
+    return padded
+
+
+def padded_shape(
+    shape: tuple[int, int], pitch: float, wavelength: float, distance: float, pupil: float | None, padding: Padding
+) -> tuple[int, int]:
+    """(rows, columns) of the transform that propagates a field of ``shape``; lengths in metres."""
+    reach = spread(pitch, wavelength, distance, pupil)
+    sharp = pupil is None or pupil * (1 + IRIS_EDGE) > 1
+    return padded_size(shape[0], reach, sharp, padding), padded_size(shape[1], reach, sharp, padding)

@@ -1,0 +1,85 @@
+"""Find methods and datasets by name: entry points for installed packages, ``path/to/file.py:Class`` for the rest."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import is_dataclass
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import TypeAdapter, ValidationError
+
+from .errors import UserError, suggest
+
+Kind = Literal["methods", "datasets"]
+
+
+def _entries(kind: Kind) -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=f"holobench_eval.{kind}")}
+
+
+def names(kind: Kind) -> list[str]:
+    """The registered names, sorted."""
+    return sorted(_entries(kind))
+
+
+def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
+    """The class registered as ``name``, or the class in a file when ``name`` is ``path/to/file.py:Class``.
+
+    A relative path is taken from ``folder`` (the folder of the config that names it) first, then from the
+    working directory.
+    """
+    if ".py:" in name:
+        return _from_file(kind, name, folder)
+    entries = _entries(kind)
+    if name not in entries:
+        raise UserError(f"unknown {kind[:-1]} '{name}'; {suggest(name, entries)}, or path/to/file.py:Class")
+    try:
+        return _checked(kind, name, entries[name].load())
+    except (ImportError, AttributeError) as error:
+        raise UserError(f"{kind[:-1]} '{name}' cannot be imported: {error}") from error
+
+
+def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
+    file, _, attribute = name.rpartition(":")
+    candidates = [Path(file)] if folder is None else [folder / file, Path(file)]
+    path = next((path for path in candidates if path.is_file()), None)
+    if path is None:
+        raise UserError(f"{kind[:-1]} '{name}': no such file: {candidates[0]}")
+    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {type(error).__name__}: {error}") from error
+    found = getattr(module, attribute, None)
+    if found is None:
+        classes = [key for key, value in vars(module).items() if isinstance(value, type) and is_dataclass(value)]
+        raise UserError(f"{kind[:-1]} '{name}': {path} has no class '{attribute}'; {suggest(attribute, classes)}")
+    return _checked(kind, name, found)
+
+
+def _checked(kind: Kind, name: str, found: Any) -> type[Any]:
+    needed = "solve" if kind == "methods" else "items"
+    if not (isinstance(found, type) and is_dataclass(found) and hasattr(found, needed)):
+        raise UserError(f"{kind[:-1]} '{name}' is not a dataclass with a method '{needed}'; see CONTRIBUTING.md")
+    return found
+
+
+def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = None) -> Any:
+    """An instance with validated parameters; a wrong key, type or range is one line naming the parameter."""
+    cls = find(kind, name, folder)
+    fields = set(cls.__dataclass_fields__)
+    for key in params:
+        if key not in fields:
+            raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, fields)}")
+    try:
+        return TypeAdapter(cls).validate_python(params)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        message = first["msg"][:1].lower() + first["msg"][1:]
+        raise UserError(f"{kind[:-1]} '{name}': parameter '{where}': {message}, got {first['input']!r}") from error

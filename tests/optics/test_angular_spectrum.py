@@ -1,0 +1,157 @@
+import math
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holobench_eval.optics import AngularSpectrum
+from holobench_eval.optics.angular_spectrum import angular_spectrum_phase
+from holobench_eval.optics.conformance import direct_sum, gaussian_beam
+from holobench_eval.optics.convolution import frequencies
+from holobench_eval.optics.padding import padded_size, tail_error
+
+PITCH, WAVELENGTH = 6.4e-6, 517e-9
+
+
+def four_times_padded(field, distance):
+    """An angular spectrum of four times the size in complex128, written out on its own."""
+    height, width = field.shape
+    rows, columns = 4 * height, 4 * width
+    fy = torch.fft.fftfreq(rows, PITCH, dtype=torch.float64)[:, None]
+    fx = torch.fft.fftfreq(columns, PITCH, dtype=torch.float64)[None, :]
+    axial = torch.sqrt(torch.complex(1 / WAVELENGTH**2 - fy**2 - fx**2, torch.zeros(rows, columns).double()))
+    transfer = torch.exp(2j * math.pi * distance * (axial - 1 / WAVELENGTH))
+    padded = torch.zeros(rows, columns, dtype=torch.complex128)
+    padded[:height, :width] = field
+    return torch.fft.ifft2(torch.fft.fft2(padded) * transfer)[:height, :width]
+
+
+def white(shape, seed=0):
+    return torch.randn(shape, generator=torch.Generator().manual_seed(seed), dtype=torch.complex128)
+
+
+def smooth(shape):
+    return gaussian_beam(shape, 0.3 * min(shape) * PITCH)
+
+
+def relative(found, right):
+    return float((found - right).norm() / right.norm())
+
+
+@pytest.mark.parametrize(("size", "distance"), [(256, 0.01), (256, 0.02), (512, 0.02), (512, 0.05), (640, 0.02)])
+def test_default_padding_keeps_its_stated_accuracy(size, distance):
+    model = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance)
+    for field, bound in ((white((size, size)), 1e-2), (smooth((size, size)), 1e-4)):
+        found = model.forward(field.to(torch.complex64))
+        assert relative(found, four_times_padded(field, distance)) < bound
+
+
+@pytest.mark.parametrize(("size", "distance"), [(256, 0.02), (512, 0.05)])
+def test_reference_padding_keeps_its_stated_accuracy(size, distance):
+    model = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, padding="reference")
+    assert model.transfer.dtype == torch.complex128
+    for field, bound in ((white((size, size)), 2e-3), (smooth((size, size)), 1e-6)):
+        assert relative(model.forward(field), four_times_padded(field, distance)) < bound
+
+
+def test_wide_spread_keeps_the_stated_accuracy_against_a_much_larger_transform():
+    size, distance = 96, 0.05
+    model = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance)
+    reference = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, padding=2400, dtype=torch.complex128)
+    assert (
+        relative(model.forward(white((size, size)).to(torch.complex64)), reference.forward(white((size, size)))) < 1e-2
+    )
+
+
+def test_soft_iris_needs_little_padding():
+    size, distance = 256, 0.0237
+    model = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, pupil=0.8)
+    reference = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, pupil=0.8, padding=1500)
+    assert max(model.padded_shape) < 1.75 * size
+    assert (
+        relative(model.forward(white((size, size)).to(torch.complex64)), reference.forward(white((size, size)))) < 5e-3
+    )
+
+
+def test_gaussian_beam_agrees_with_the_direct_rayleigh_sommerfeld_sum():
+    shape = (64, 96)
+    field = gaussian_beam(shape, 70e-6, tilt=(0.02, -0.03))
+    rows, columns = torch.randint(10, 54, (40,)), torch.randint(10, 86, (40,))
+    found = AngularSpectrum(shape, PITCH, WAVELENGTH, 6e-3).forward(field.to(torch.complex64))[rows, columns]
+    assert relative(found, direct_sum(field, rows, columns, 6e-3)) < 1e-3
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    height=st.integers(8, 70),
+    width=st.integers(8, 70),
+    distance=st.floats(-0.02, 0.02),
+    pupil=st.one_of(st.none(), st.floats(0.2, 1.0)),
+)
+def test_adjoint_is_the_adjoint(height, width, distance, pupil):
+    model = AngularSpectrum((height, width), PITCH, WAVELENGTH, distance, pupil=pupil, dtype=torch.complex128)
+    u, v = white((height, width), 1), white((height, width), 2)
+    left = torch.vdot(model.forward(u).flatten(), v.flatten())
+    right = torch.vdot(u.flatten(), model.adjoint(v).flatten())
+    assert abs(left - right) < 1e-5 * u.norm() * v.norm()
+
+
+def test_batches_and_channels_propagate_like_single_fields():
+    model = AngularSpectrum((40, 30), PITCH, WAVELENGTH, 0.01)
+    batch = torch.randn(2, 3, 40, 30, dtype=torch.complex64)
+    each = torch.stack([torch.stack([model.forward(field) for field in image]) for image in batch])
+    assert torch.allclose(model.forward(batch), each, atol=1e-5)
+
+
+def test_zero_distance_is_the_identity():
+    field = white((32, 48)).to(torch.complex64)
+    assert relative(AngularSpectrum((32, 48), PITCH, WAVELENGTH, 0.0).forward(field), field) < 1e-6
+
+
+def test_autograd_agrees_with_the_adjoint():
+    model = AngularSpectrum((24, 24), PITCH, WAVELENGTH, 5e-3, dtype=torch.complex128)
+    u, v = white((24, 24), 3).requires_grad_(), white((24, 24), 4)
+    (model.forward(u) * v.conj()).sum().real.backward()
+    assert torch.allclose(u.grad, model.adjoint(v), atol=1e-10)
+
+
+def test_phase_keeps_its_precision_at_long_distances():
+    fy, fx = frequencies((64, 64), PITCH)
+    exact = 2 * math.pi * 0.2 * (torch.sqrt(1 / WAVELENGTH**2 - fy**2 - fx**2) - 1 / WAVELENGTH)
+    assert torch.allclose(angular_spectrum_phase(fy**2 + fx**2, WAVELENGTH, 0.2), exact, atol=1e-6)
+
+
+def test_transfer_functions_are_cached():
+    first = AngularSpectrum((50, 50), PITCH, WAVELENGTH, 0.01)
+    assert AngularSpectrum((50, 50), PITCH, WAVELENGTH, 0.01).transfer is first.transfer
+
+
+def test_padding_price_falls_with_what_is_asked():
+    assert padded_size(256, 100.0, True, None) > padded_size(256, 100.0, False, None) >= 256 + 100
+    assert padded_size(256, 100.0, True, "reference") == 1024
+    assert padded_size(256, 100.0, True, 0) == 256
+    assert tail_error(256, 100.0, 1000) < tail_error(256, 100.0, 400)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{"pitch": 0.0}, {"wavelength": -1.0}, {"pupil": 0.0}, {"padding": -1}, {"padding": "large"}, {"shape": (0, 4)}],
+)
+def test_geometry_without_meaning_is_refused(bad):
+    good = {"shape": (16, 16), "pitch": PITCH, "wavelength": WAVELENGTH, "distance": 0.01}
+    with pytest.raises(ValueError, match=r"must|fraction"):
+        AngularSpectrum(**(good | bad))
+
+
+def test_field_of_another_shape_is_refused():
+    with pytest.raises(ValueError, match="made for"):
+        AngularSpectrum((16, 16), PITCH, WAVELENGTH, 0.01).forward(torch.zeros(8, 8, dtype=torch.complex64))
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
+def test_cuda_agrees_with_the_cpu():
+    field = white((128, 96)).to(torch.complex64)
+    on_cpu = AngularSpectrum((128, 96), PITCH, WAVELENGTH, 0.01).forward(field)
+    on_gpu = AngularSpectrum((128, 96), PITCH, WAVELENGTH, 0.01, device="cuda").forward(field.cuda())
+    assert relative(on_gpu.cpu(), on_cpu) < 1e-5
