@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
+import sys
 from dataclasses import is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -47,10 +49,13 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     path = next((path for path in candidates if path.is_file()), None)
     if path is None:
         raise UserError(f"{kind[:-1]} '{name}': no such file: {candidates[0]}")
-    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}", path)
-    assert spec is not None
-    assert spec.loader is not None
+    # the name differs from path to path, and the module is registered since dataclasses look their module up
+    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
+    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}_{unique}", path)
+    if spec is None or spec.loader is None:
+        raise UserError(f"{kind[:-1]} '{name}': {path} is no Python file")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
     except Exception as error:

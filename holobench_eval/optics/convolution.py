@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Protocol
 
 import torch
@@ -45,14 +46,26 @@ class Convolution:
 
     def adjoint(self, field: Tensor) -> Tensor:
         """The adjoint of ``forward``; for a pure phase transfer function this propagates back."""
-        return self._convolve(field, self.transfer.conj())
+        return self._convolve(field, self._conjugate)
+
+    @cached_property
+    def _conjugate(self) -> Tensor:
+        """The transfer function of the adjoint, formed once: a lazy conjugate is formed in every product."""
+        return self.transfer.conj().resolve_conj()
 
     def _convolve(self, field: Tensor, transfer: Tensor) -> Tensor:
         height, width = self.shape
         if tuple(field.shape[-2:]) != (height, width):
             raise ValueError(f"field is {tuple(field.shape[-2:])}, the propagator was made for {self.shape}")
         spectrum = torch.fft.fft2(field, s=self.padded_shape)
-        return torch.fft.ifft2(spectrum * transfer)[..., :height, :width]
+        # in place where no gradient needs the factors: a new array of this size costs as much as the product
+        product = spectrum * transfer if spectrum.requires_grad else _multiplied(spectrum, transfer)
+        return torch.fft.ifft2(product)[..., :height, :width]
+
+
+def _multiplied(spectrum: Tensor, transfer: Tensor) -> Tensor:
+    wide = torch.promote_types(spectrum.dtype, transfer.dtype)
+    return spectrum.to(wide).mul_(transfer)
 
 
 def frequencies(shape: tuple[int, int], pitch: float, device: torch.device | str = "cpu") -> tuple[Tensor, Tensor]:

@@ -20,7 +20,7 @@ def wrap(phase: Tensor) -> Tensor:
 def gray_level(phase: Tensor, bits: int) -> Tensor:
     """The nearest of ``2^bits`` gray levels of a phase [rad]; 2^bits levels span 2 pi, so 0 and 2^bits - 1 differ."""
     levels = 2**bits
-    return torch.remainder(torch.round(wrap(phase) * (levels / TAU)), levels)
+    return (phase * (levels / TAU)).round_().remainder_(levels)
 
 
 def quantise(phase: Tensor, bits: int) -> Tensor:

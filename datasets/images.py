@@ -1,0 +1,183 @@
+"""Read an image file as linear light, or refuse it with one line: what was found and what would be right.
+
+A harness that converts whatever it meets scores images nobody looked at: a 16-bit file read as 8 bits, a palette read
+as gray levels, an alpha channel dropped. So only 8-bit sRGB is taken as it is, and the rest by explicit choice.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
+from torch import Tensor
+
+from ..errors import UserError
+from .base import from_srgb, planes
+
+SixteenBit = Literal["refuse", "srgb", "linear"]
+"""What 16-bit levels mean: nothing certain, sRGB levels, or linear light."""
+
+FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
+"""Formats that are opened at all; Pillow would hand others to outside programs."""
+
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".gif"})
+"""File names (lower case) that are taken for images."""
+
+LARGEST_PIXELS = 64_000_000
+"""More than any panel shows; a small file can claim far more and fill the memory."""
+
+LARGEST_BYTES = 512_000_000
+"""Enough for the largest image in 16 bits without compression."""
+
+RIGHT = "expected an 8-bit RGB image in sRGB"
+
+_MODES = {
+    "1": "a 1-bit image",
+    "P": "a palette image",
+    "PA": "a palette image with alpha",
+    "LA": "an image with alpha",
+    "La": "an image with alpha",
+    "RGBA": "an image with alpha",
+    "RGBa": "an image with alpha",
+    "CMYK": "a CMYK image",
+    "YCbCr": "a YCbCr image",
+    "LAB": "a CIELAB image",
+    "F": "a floating-point image",
+    "I": "a 32-bit gray image",
+}
+_BITS_PER_SAMPLE = 258  # TIFF 6.0, section 8
+_ORIENTATION = 274  # Exif 2.32, section 4.6.4
+
+
+def read(path: Path) -> bytes:
+    """The contents of an image file; UserError when it is missing, no regular file, unreadable or too large."""
+    if not path.is_file():
+        raise UserError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}; {RIGHT}")
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(content) > LARGEST_BYTES:
+        raise UserError(f"{path}: larger than {LARGEST_BYTES // 10**6} MB; {RIGHT}")
+    return content
+
+
+def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBit = "refuse") -> Tensor:
+    """An image file as ``(3, H, W)`` linear light in [0, 1], float32, upright as its EXIF orientation says.
+
+    content: the file; name: used in errors. gray: take one-channel images too, replicated to three channels.
+    sixteen_bit: take 16-bit PNG and TIFF too, as sRGB levels or as linear light. UserError, one line, for an image
+    that is damaged, of another kind, larger than 64 million pixels, or of another colour space by its ICC profile.
+    """
+    image = _open(content, name)
+    found = _fault(image, gray)
+    bits = _bits(image, content)
+    if found is None and bits == 16 and sixteen_bit == "refuse":
+        found = "a 16-bit image (sixteen_bit: srgb or linear would say what its levels mean)"
+    if found is None and bits not in (8, 16):
+        found = f"a {bits}-bit image"
+    if found is not None:
+        raise UserError(f"{name}: {found}; {RIGHT}")
+    _refuse_other_colours(image, name)
+    upright, orientation = _load(image, name)
+    if bits == 8:
+        return from_srgb(np.asarray(upright))
+    deep = _turned(_deep(content, name), orientation)
+    return planes((deep / np.float32(65535)).astype(np.float32)) if sixteen_bit == "linear" else from_srgb(deep)
+
+
+def _open(content: bytes, name: str) -> Image.Image:
+    """The header, with the number of pixels and of frames checked."""
+    try:
+        with warnings.catch_warnings():
+            # Pillow's own limit, which an importing program may have lifted, is only the first line.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(io.BytesIO(content), formats=FORMATS)
+        too_large = image.width * image.height > LARGEST_PIXELS
+        frames = 1 if too_large else getattr(image, "n_frames", 1)
+    except UnidentifiedImageError as error:
+        raise UserError(f"{name}: not an image in {', '.join(FORMATS)}, or its header is damaged; {RIGHT}") from error
+    except Image.DecompressionBombError as error:
+        raise UserError(f"{name}: claims more than {LARGEST_PIXELS // 10**6} million pixels; {RIGHT}") from error
+    except Exception as error:  # whatever a decoder trips over in a damaged file
+        raise UserError(f"{name}: damaged: {_line(error)}; {RIGHT}") from error
+    if too_large:
+        size = f"{image.width} x {image.height} pixels"
+        raise UserError(f"{name}: {size}; expected at most {LARGEST_PIXELS // 10**6} million")
+    if frames != 1:
+        raise UserError(f"{name}: {frames} frames or pages; expected a file with one image")
+    return image
+
+
+def _fault(image: Image.Image, gray: bool) -> str | None:
+    """What is wrong with the kind of an image, in words, or None."""
+    if image.mode not in _MODES and "transparency" in image.info:
+        return "an image with a transparent colour"
+    if image.mode == "L" or image.mode.startswith("I;16"):
+        return None if gray else "a one-channel image (gray: true would replicate it to three)"
+    return None if image.mode == "RGB" else _MODES.get(image.mode, f"an image of mode {image.mode}")
+
+
+def _bits(image: Image.Image, content: bytes) -> int:
+    """Bits a sample in the file; Pillow itself shows 16-bit RGB as 8-bit."""
+    if image.format == "PNG":
+        return content[24]  # PNG specification, section 11.2.1 (IHDR)
+    if image.format == "TIFF":
+        # A Pillow image of format TIFF has its tags; the base class does not know them.
+        tags = image.tag_v2  # type: ignore[attr-defined]
+        return int(max(tags.get(_BITS_PER_SAMPLE, (1,))))
+    return 8
+
+
+def _refuse_other_colours(image: Image.Image, name: str) -> None:
+    """UserError for an embedded ICC profile that is not sRGB by its description."""
+    profile = image.info.get("icc_profile")
+    if not profile:
+        return
+    try:
+        opened = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        description = " ".join(ImageCms.getProfileDescription(opened).split())
+    except (OSError, ImageCms.PyCMSError) as error:
+        raise UserError(f"{name}: its ICC colour profile cannot be read; {RIGHT}, or without a profile") from error
+    if "srgb" not in description.lower():
+        raise UserError(f"{name}: its ICC colour profile is '{description[:60]}'; convert it: {RIGHT}")
+
+
+def _load(image: Image.Image, name: str) -> tuple[Image.Image, int]:
+    """The decoded image, upright, and the EXIF orientation it had; UserError for a truncated or damaged file."""
+    try:
+        orientation = image.getexif().get(_ORIENTATION)
+        image.load()
+        return ImageOps.exif_transpose(image), orientation if orientation in range(1, 9) else 1
+    except Exception as error:  # whatever a decoder trips over in a damaged file
+        raise UserError(f"{name}: truncated or damaged: {_line(error)}; {RIGHT}") from error
+
+
+def _deep(content: bytes, name: str) -> NDArray[np.uint16]:
+    """``(H, W)`` or ``(H, W, 3)`` 16-bit levels, by OpenCV, which keeps them in RGB where Pillow does not."""
+    pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or pixels.dtype != np.uint16:
+        raise UserError(f"{name}: a 16-bit image that OpenCV cannot read; {RIGHT}, or a 16-bit PNG")
+    return (pixels if pixels.ndim == 2 else pixels[..., ::-1]).astype(np.uint16)
+
+
+def _turned(pixels: NDArray[np.uint16], orientation: int) -> NDArray[np.uint16]:
+    """Upright pixels from those stored with an EXIF orientation of 1 to 8."""
+    if orientation >= 5:
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    return pixels
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,131 @@
+"""Bounded rigid refinement of one capture against its target (protocol v1, point 3)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from .warp import Array, Frame
+
+FURTHEST_SHIFT = 2.0  # region pixels
+FURTHEST_TURN = 0.1  # degrees
+BLURS = (3.0, 1.0)  # region pixels: a wide basin first, then the finest detail that speckle leaves
+BORDER = 4  # region pixels that take no part: the furthest shift and the reach of the interpolation
+ITERATIONS = 50
+STEP = 1e-3  # region pixels, at the corners: a smaller step ends the search
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A capture ``(C, h, w)`` moved onto its target, and the move.
+
+    dx, dy: where the centre of the target was found in the capture, right and down [px]; theta: rotation about the
+    centre from x towards y [degrees]. All zero, and the capture unchanged, when no move within the bounds was found.
+    """
+
+    image: Tensor
+    dx: float
+    dy: float
+    theta: float
+
+
+def refine(capture: Tensor, target: Tensor) -> Refined:
+    """Align a rectified capture ``(C, h, w)`` with its target ``(C, h, w)``, both in linear light.
+
+    One shift and rotation for all channels, at most 2 px and 0.1 degree, that maximises the correlation of the square
+    root of the light summed over the channels (the enhanced correlation coefficient of Evangelidis & Psarakis 2008
+    for a rigid move). No score takes part. Without convergence, outside the bounds or without a gain in
+    correlation, the capture comes back as it is. Raises `ValueError` for shapes that differ or are too small.
+    """
+    if capture.shape != target.shape or capture.ndim != 3 or min(capture.shape[1:]) <= 4 * BORDER:
+        raise ValueError(f"capture {tuple(capture.shape)} and target {tuple(target.shape)} must both be (C, h, w)")
+    move = _search(capture, target)
+    if move is None:
+        return Refined(capture, 0.0, 0.0, 0.0)
+    where = _coordinates((capture.shape[1], capture.shape[2]), move)
+    frames = capture.detach().to("cpu", torch.float32).numpy()
+    image = torch.from_numpy(np.stack([_moved(frame, where) for frame in frames])).to(capture.device)
+    return Refined(image, float(move[0]), float(move[1]), math.degrees(move[2]))
+
+
+def _search(capture: Tensor, target: Tensor) -> Array | None:
+    """The move (dx, dy, theta) [px, px, rad] within the bounds, or None."""
+    move: Array = np.zeros(3)
+    for blur in BLURS:
+        seen, wanted = _amplitude(capture, blur), _amplitude(target, blur)
+        found = _climb(seen, wanted, move)
+        if found is None:
+            return None
+        move = found
+    if not _within(move, 1.0):
+        return None
+    before, after = (_moved(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
+    return move if _correlation(after, wanted) > _correlation(before, wanted) else None
+
+
+def _amplitude(image: Tensor, blur: float) -> Frame:
+    """Square root of the blurred light: blurred first, as the root of speckled edges would spread into the dark."""
+    light = image.detach().to("cpu", torch.float32).sum(0).clamp_min(0.0).numpy()
+    return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), blur)))
+
+
+def _climb(seen: Frame, wanted: Frame, start: Array) -> Array | None:
+    """Gauss-Newton from ``start`` with gain and offset free; None far beyond the bounds or without convergence."""
+    height, width = wanted.shape
+    slope_y, slope_x = np.gradient(wanted.astype(np.float64))
+    x, y = np.arange(width) - (width - 1) / 2, np.arange(height)[:, None] - (height - 1) / 2
+    turning = slope_x * y - slope_y * x
+    columns = (wanted, np.ones_like(wanted), -slope_x, -slope_y, turning)
+    model = np.stack([_inner(column).ravel() for column in columns], axis=1).astype(np.float64)
+    normal = model.T @ model
+    if np.linalg.matrix_rank(normal) < len(normal):
+        return None
+    move = start
+    for _ in range(ITERATIONS):
+        now = _inner(_moved(seen, _coordinates((height, width), move))).ravel()
+        solved = np.linalg.solve(normal, model.T @ now.astype(np.float64))
+        if solved[0] <= 0:
+            return None
+        step = solved[2:] / solved[0]
+        move = move + step
+        if not _within(move, 3.0):
+            return None
+        if np.abs(step * (1, 1, max(height, width) / 2)).max() < STEP:
+            return move
+    return None
+
+
+def _within(move: Array, slack: float) -> bool:
+    """Is the move inside ``slack`` times the bounds?"""
+    return math.hypot(*move[:2]) <= slack * FURTHEST_SHIFT and abs(math.degrees(move[2])) <= slack * FURTHEST_TURN
+
+
+def _coordinates(shape: tuple[int, ...], move: Array) -> tuple[Frame, Frame]:
+    """Where every pixel of the target lies in the capture: x and y, each ``(h, w)``."""
+    dx, dy, theta = move
+    centre_y, centre_x = (shape[0] - 1) / 2, (shape[1] - 1) / 2
+    x = np.arange(shape[1]) - centre_x
+    y = np.arange(shape[0])[:, None] - centre_y
+    cosine, sine = math.cos(theta), math.sin(theta)
+    moved_x = cosine * x - sine * y + centre_x + dx
+    moved_y = sine * x + cosine * y + centre_y + dy
+    return moved_x.astype(np.float32), moved_y.astype(np.float32)
+
+
+def _moved(frame: Frame, where: tuple[Frame, Frame]) -> Frame:
+    """``frame`` at coordinates x, y by cubic interpolation; beyond its border the last pixel repeats."""
+    return np.asarray(cv2.remap(frame, *where, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
+
+
+def _inner(image: NDArray[np.floating]) -> NDArray[np.floating]:
+    return image[BORDER:-BORDER, BORDER:-BORDER]
+
+
+def _correlation(a: Frame, b: Frame) -> float:
+    return float(np.corrcoef(_inner(a).ravel(), _inner(b).ravel())[0, 1])

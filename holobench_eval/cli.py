@@ -1,0 +1,233 @@
+"""The command line: ``holoeval COMMAND``. Heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .errors import UserError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from .config import Study
+    from .report import Results
+
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="holoeval",
+    help="Compare phase-retrieval methods for holographic displays on simulated, imperfect benches.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as configs/table3.yaml.")]
+Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]
+Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
+Workers = Annotated[int | None, typer.Option(help="Worker processes of the local executor.")]
+Where = Annotated[str, typer.Option(help="Where to compute: serial or local.")]
+
+
+def main() -> None:
+    """Entry point: bad input, and files that cannot be read or written, are one line on stderr and exit code 2."""
+    try:
+        app()
+    except (UserError, OSError) as error:
+        print(f"holoeval: {' '.join(str(error).split())}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    console = Console()
+    return console if console.is_terminal else Console(width=160)
+
+
+def _output(study: Study, output: Path | None) -> Path:
+    return output or Path("reports") / study.name
+
+
+def _threads(threads: int | None, workers: int) -> int:
+    import torch
+
+    return threads or (1 if workers > 1 else torch.get_num_threads())
+
+
+@app.command()
+def run(
+    config: Config,
+    output: Output = None,
+    executor: Where = "serial",
+    workers: Workers = None,
+    threads: Threads = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
+    retime: Annotated[bool, typer.Option("--retime", help="Measure solving times again.")] = False,
+) -> None:
+    """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
+    try:
+        failed = _run(config, output, executor, workers, threads, retry_failed, retime)
+    except KeyboardInterrupt:
+        print("holoeval: stopped; what was computed is kept, resume with the same command", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+    raise typer.Exit(1 if failed else 0)
+
+
+def _run(
+    config: Path,
+    output: Path | None,
+    executor: str,
+    workers: int | None,
+    threads: int | None,
+    retry_failed: bool,
+    retime: bool,
+) -> int:
+    """Run, report, and give the number of failed cells."""
+    from .config import load_study
+    from .study import executors, plan, progress
+    from .study.run import run as compute
+
+    console, study, chosen = _console(), load_study(config), executors.executor(executor, workers)
+    folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers)
+    with progress.watching(console) as watch:
+        outcome = compute(study, grid, folder, chosen, watch, many, retry_failed, retime)
+    _report(console, study, outcome.records, folder, outcome.provenance)
+    if outcome.failed:
+        console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
+        console.print(f"reasons: {folder}/report.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
+    return outcome.failed
+
+
+def _report(
+    console: Console, study: Study, records: list[dict[str, object]], output: Path, known: dict[str, object]
+) -> None:
+    from .report import build_report, results_of
+
+    written = build_report(study, records, output, known)
+    _print_headline(console, results_of(study, records))
+    console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
+
+
+def _print_headline(console: Console, results: Results) -> None:
+    from rich.markup import escape
+    from rich.table import Table
+
+    from .report import headline_rows
+
+    for condition in results.conditions:
+        headings, rows = headline_rows(results, condition)
+        table = Table(*map(escape, headings), title=escape(condition), title_justify="left")
+        for row in rows:
+            table.add_row(*map(escape, row))
+        console.print(table)
+
+
+@app.command()
+def plan(config: Config, output: Output = None, threads: Threads = None) -> None:
+    """Show what a study would compute, and what of it is done; compute nothing."""
+    from .config import load_study
+    from .study import plan as planning
+    from .study.preview import preview, table
+    from .study.store import Store
+
+    console, study = _console(), load_study(config)
+    folder = _output(study, output)
+    rows = preview(study, planning.plan(study), Store(folder), _threads(threads, 1), 1)
+    console.print(table(study, rows))
+    console.print(f"output folder: {folder}", highlight=False, soft_wrap=True)
+
+
+@app.command()
+def report(config: Config, output: Output = None) -> None:
+    """Write the report of a study again from its records."""
+    from .config import load_study
+    from .study import plan as planning
+    from .study import provenance
+    from .study.store import Store
+
+    study = load_study(config)
+    folder = _output(study, output)
+    store = Store(folder)
+    if not store.folder.is_dir():
+        raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
+    _report(_console(), study, store.load(planning.plan(study)), folder, provenance.read(folder))
+
+
+@app.command("list")
+def list_(
+    kind: Annotated[str | None, typer.Argument(help="methods, datasets, profiles or metrics; all without.")] = None,
+) -> None:
+    """List what a config may name."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from .errors import suggest
+    from .study.listing import KINDS
+
+    if kind is not None and kind not in KINDS:
+        raise UserError(f"unknown kind '{kind}'; {suggest(kind, KINDS)}")
+    console = _console()
+    for name in [kind] if kind else KINDS:
+        table = Table(title=name, title_justify="left", show_header=False)
+        for entry, text in KINDS[name]():
+            table.add_row(entry, escape(text))
+        console.print(table)
+
+
+@app.command("new-method")
+def new_method(
+    name: Annotated[str, typer.Argument(help="Lower-case words, such as my_method.")],
+    folder: Annotated[Path, typer.Option(help="Where to write NAME.py and test_NAME.py.")] = Path(),
+) -> None:
+    """Write a method that works, to be changed, and its test."""
+    from .study.scaffold import new_method as write
+
+    method, test, named = write(name, folder)
+    print(f"{method}\n{test}\nnext: pytest {test}; then name it in a config as '{named}'")
+
+
+@app.command()
+def check(folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports")) -> None:
+    """Check that committed reports still follow from their records, configs and profiles."""
+    from .study.check import check as problems_in
+
+    reports, problems = problems_in(folder)
+    for problem in problems:
+        print(problem)
+    print(f"{reports} report{'s' * (reports > 1)}, {len(problems)} problem{'s' * (len(problems) != 1)}")
+    if problems:
+        raise typer.Exit(1)
+
+
+@app.command()
+def show(
+    profile: Annotated[str, typer.Argument(help="A display profile: its name or its file.")],
+    panel: Annotated[tuple[int, int] | None, typer.Option(help="Rows and columns in pixels.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Picture to write.")] = None,
+) -> None:
+    """Draw what a display does to a hologram, stage by stage."""
+    from .report.sheet import draw_sheet
+
+    print(draw_sheet(profile, panel, output))
+
+
+@app.command()
+def conformance() -> None:
+    """Check the propagators against direct integration and analytic gradients."""
+    from .optics.conformance import main as check_optics
+
+    raise typer.Exit(check_optics())
+
+
+@app.command()
+def calibrate(profile: Annotated[str, typer.Argument(help="A display profile: its name or its file.")]) -> None:
+    """Fit the free parameters of a profile to published figures; a few minutes."""
+    from .study.calibrate import main as fit
+
+    fit(profile)

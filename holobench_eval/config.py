@@ -1,0 +1,254 @@
+"""A study as written in ``configs/*.yaml``, checked before anything runs: a grid of methods, displays,
+targets.
+
+Every mistake in a config is one line that starts with its place, ``configs/table3.yaml:12:5: ...``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from annotated_types import Interval, MinLen
+
+from . import registry
+from .errors import UserError, suggest
+from .study.bench import condition
+from .study.identity import params_of
+from .study.plan import FLOORS, REFERENCE, scored_dataset
+from .typed_yaml import check_keys, typed
+from .yaml_source import Document, Keys, load
+
+PanelSide = Annotated[int, Interval(ge=64, le=8192)]
+Text = Annotated[str, MinLen(1)]
+
+
+@dataclass(frozen=True)
+class DisplayGrid:
+    """The displays of a study.
+
+    profiles: names of profiles or paths of profile files; panel: rows and columns in pixels (None: the
+    profile's full panel); exposure: ``equal`` (the same light for every method) or ``matched`` (equal
+    brightness of the pictures).
+    """
+
+    profiles: Annotated[tuple[Text, ...], MinLen(1)]
+    panel: tuple[PanelSide, PanelSide] | None = None
+    exposure: Literal["equal", "matched"] = "equal"
+
+
+@dataclass(frozen=True)
+class Targets:
+    """The images that are scored: a registered dataset and its parameters."""
+
+    dataset: Text
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MethodEntry:
+    """A method of a study.
+
+    name: registered name or ``path/to/file.py:Class``; label: its name in tables; params: every parameter of
+    the method, defaults filled in; profiles: the displays it is shown on, a subset of the study's.
+    """
+
+    name: Text
+    label: str = ""
+    params: Mapping[str, Any] = field(default_factory=dict)
+    profiles: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Version of the metric protocol, and a file or folder of LPIPS trunk weights (None: torch's hub cache)."""
+
+    version: Literal["v1"] = "v1"
+    lpips_weights: Text | None = None
+
+
+@dataclass(frozen=True)
+class Save:
+    """What else is written beside the scores: rectified captures (16 bit) and phases (8 bit)."""
+
+    captures: bool = False
+    phases: bool = False
+
+
+@dataclass(frozen=True)
+class Reported:
+    """Published figures to print beside the measured ones, by method label, and where they were published."""
+
+    source: Text
+    rows: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A grid of cells and the tables drawn from it; see ``load_study``.
+
+    repeats: how often every cell is measured, with new noise; baseline: label that paired tests compare
+    against (the first method when the config names none); headline: the column the report leads with.
+    file, text: the config file as the user named it, and what is in it.
+    """
+
+    title: Text
+    display: DisplayGrid
+    targets: Targets
+    methods: Annotated[tuple[MethodEntry, ...], MinLen(1)]
+    seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
+    repeats: Annotated[int, Interval(ge=1, le=1000)] = 1
+    protocol: Protocol = Protocol()
+    baseline: str = ""
+    headline: Text = "psnr_linear"
+    save: Save = Save()
+    reported: Reported | None = None
+    file: Path = field(default=Path(), metadata={"key": False})
+    text: str = field(default="", metadata={"key": False})
+
+    @property
+    def folder(self) -> Path:
+        """The config's folder; relative paths in a config start here."""
+        return self.file.parent
+
+    @property
+    def name(self) -> str:
+        """The config's file name without its ending; the default name of the output folder."""
+        return self.file.stem
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the methods, in the order of the config."""
+        return tuple(entry.label for entry in self.methods)
+
+
+def load_study(path: Path | str) -> Study:
+    """Read and check a study completely; every fault is a UserError that starts with file:line:column."""
+    document = load(Path(path))
+    check_keys(document, Study, document.data)
+    study = replace(typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text)
+    study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
+    _check_profiles(study, document)
+    entries = tuple(_entry(study, document, index) for index in range(len(study.methods)))
+    study = replace(study, methods=entries)
+    _check_labels(study, document)
+    _check_twins(study, document)
+    _check_headline(study, document)
+    if study.baseline and study.baseline not in study.labels:
+        message = f"no method has the label '{study.baseline}'; {suggest(study.baseline, study.labels)}"
+        raise document.error(("baseline",), message)
+    return replace(study, baseline=study.baseline or study.labels[0])
+
+
+def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A config with every method as a mapping; one without parameters may be given by its name alone."""
+    methods = data.get("methods")
+    if not isinstance(methods, list):
+        return dict(data)
+    return {**data, "methods": [{"name": item} if isinstance(item, str) else item for item in methods]}
+
+
+@contextmanager
+def _placed(document: Document, name: Keys, params: Keys) -> Iterator[None]:
+    """Put a place before an error of the registry: the parameter it names if any, else the plug-in's name."""
+    try:
+        yield
+    except UserError as error:
+        named = re.search(r"parameter '([^'.]+)", str(error))
+        where = (*params, named[1]) if named and (*params, named[1]) in document.keys else name
+        raise document.error(where, str(error), at_key="has no parameter" in str(error)) from error
+
+
+def _targets(study: Study, document: Document) -> Targets:
+    with _placed(document, ("targets", "dataset"), ("targets", "params")):
+        dataset = scored_dataset(study)
+        if not dataset.items():
+            raise UserError(f"dataset '{study.targets.dataset}' has no images")
+    return replace(study.targets, params=params_of(dataset))
+
+
+def _protocol(study: Study, document: Document) -> Protocol:
+    from .metrics.lpips import find_weights
+
+    given = study.protocol.lpips_weights
+    if given is None:
+        return study.protocol
+    weights = (study.folder / Path(given).expanduser()).resolve()
+    where: Keys = ("protocol", "lpips_weights")
+    with _placed(document, where, where):
+        if not (find_weights("alex", weights) or find_weights("vgg", weights)):
+            raise UserError(f"no alexnet-*.pth or vgg16-*.pth in {weights}")
+    return replace(study.protocol, lpips_weights=str(weights))
+
+
+def _check_profiles(study: Study, document: Document) -> None:
+    from .capture.grid import SMALLEST_REGION
+
+    seen: dict[str, str] = {}
+    for index, profile in enumerate(study.display.profiles):
+        where: Keys = ("display", "profiles", index)
+        with _placed(document, where, where):
+            place = condition(profile, study.display.panel, study.folder)
+        name, region = place.name, place.spec.region.shape
+        if min(region) < SMALLEST_REGION:
+            message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
+            raise document.error(("display", "panel"), f"{message}; registration needs at least {SMALLEST_REGION}")
+        if name in seen:
+            raise document.error(
+                where, f"'{profile}' and '{seen[name]}' are both named '{name}'; list each display once"
+            )
+        if name == REFERENCE:
+            raise document.error(where, f"a profile may not be named '{REFERENCE}': the floor rows have that name")
+        seen[name] = profile
+
+
+def _entry(study: Study, document: Document, index: int) -> MethodEntry:
+    entry, where = study.methods[index], ("methods", index)
+    with _placed(document, (*where, "name"), (*where, "params")):
+        params = params_of(registry.build("methods", entry.name, dict(entry.params), study.folder))
+    for number, profile in enumerate(entry.profiles):
+        if profile not in study.display.profiles:
+            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.profiles)}"
+            raise document.error((*where, "profiles", number), message)
+    profiles = tuple(p for p in study.display.profiles if p in entry.profiles or not entry.profiles)
+    label = entry.label or entry.name.rpartition(":")[2]
+    return MethodEntry(entry.name, label, params, profiles)
+
+
+def _check_labels(study: Study, document: Document) -> None:
+    for index, label in enumerate(study.labels):
+        where: Keys = ("methods", index, "label")
+        if label in study.labels[:index]:
+            other = study.labels.index(label)
+            raise document.error(
+                where, f"methods[{index}] and methods[{other}] share the label '{label}'; give one a 'label'"
+            )
+        if not label.isprintable() or len(label) > 60 or label in FLOORS:
+            raise document.error(where, f"label {label!r} should be printable, at most 60 characters and not a floor's")
+    for label in study.reported.rows if study.reported else ():
+        if label not in study.labels:
+            message = f"no method has the label '{label}'; {suggest(label, study.labels)}"
+            raise document.error(("reported", "rows", label), message, at_key=True)
+
+
+def _check_twins(study: Study, document: Document) -> None:
+    """Two labels for one and the same cell would be one measurement printed as two."""
+    for index, entry in enumerate(study.methods):
+        for other in study.methods[:index]:
+            same = (entry.name, entry.params) == (other.name, other.params)
+            if same and set(entry.profiles) & set(other.profiles):
+                message = f"methods[{index}] has the method, parameters and display of '{other.label}'; remove one"
+                raise document.error(("methods", index), message)
+
+
+def _check_headline(study: Study, document: Document) -> None:
+    from .metrics.catalogue import catalogue
+
+    columns = [f"{metric.name}_{domain}" for metric in catalogue() for domain in metric.domains]
+    if study.headline not in columns:
+        message = f"unknown metric '{study.headline}'; {suggest(study.headline, columns)}"
+        raise document.error(("headline",), message)

@@ -1,0 +1,199 @@
+"""The simulated bench: every stage between a phase and a camera count, composed from a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..optics.padding import padded_shape
+from ..optics.phase import blaze
+from ..seeds import generator
+from .contract import Capture, DisplaySpec
+from .profile import Profile
+from .stages import Geometry, Relay
+from .stages.crosstalk import sample_positions
+from .stages.propagation import sample_weights
+from .stages.quantise import straight_through_level
+from .stages.relay import box_filter, sample, sampling_grid
+
+
+@dataclass(frozen=True)
+class ChannelMaps:
+    """What is fixed for one colour channel: every random pattern drawn, every transfer function built."""
+
+    geometry: Geometry
+    lut_gain: Tensor
+    incident: Tensor
+    transfer: Tensor
+    plane: Tensor | None
+    last_transfer: Tensor | None
+    laser_power: float
+
+
+class SimulatedBench:
+    """A display that behaves like hardware. Methods see it through ``session``; only the oracle sees inside.
+
+    profile: already scaled to its panel; seed: the study's, so that another seed is another bench of its kind.
+    """
+
+    def __init__(self, profile: Profile, seed: int = 0) -> None:
+        self.profile = profile
+        self.spec: DisplaySpec = profile.spec()
+        panel = profile.panel
+        self.samples = profile.sampling
+        self.image_samples = min(profile.sampling, 2)
+        names = ("bench", profile.name, profile.version, profile.seed, seed)
+        self.channels = tuple(
+            self._channel(Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names))
+            for index, wavelength in enumerate(panel.wavelengths)
+        )
+        geometry = self.channels[0].geometry
+        self.ramp = blaze(panel.shape, panel.blaze)
+        self.weights = sample_weights(
+            tuple(self.channels[0].transfer.shape), self.samples, profile.aperture is not None
+        )
+        self.crosstalk = profile.crosstalk.weights(self.samples)
+        self.active = profile.aperture.active_share(self.samples) if profile.aperture else None
+        self.drift_gain = profile.drift.phase_gain(geometry)
+        self.points = self._pose(geometry).panel_points(panel.shape, panel.pitch, profile.sensor.pitch)
+        self.grid = sampling_grid(self.points, panel.shape)
+        self.response = profile.sensor.response((self.points.shape[0], self.points.shape[1]), geometry)
+
+    def _channel(self, geometry: Geometry) -> ChannelMaps:
+        profile = self.profile
+        drift = profile.drift.added_tilt(geometry)
+        tilt = profile.illumination.tilt
+        light = replace(profile.illumination, tilt=(tilt[0] + drift[0], tilt[1] + drift[1]))
+        ramp = blaze(geometry.shape, profile.panel.blaze)
+        demodulation = torch.polar(torch.ones_like(ramp), -ramp)
+        incident = light.field(geometry) * profile.coherent_noise.panel(geometry) * demodulation
+        plane = profile.coherent_noise.plane(geometry)
+        turning = 1 - profile.coherent_noise.plane_distance if plane is not None else 1.0
+        padded, pupil, way = self._padded(), profile.panel.pupil, profile.propagation
+        return ChannelMaps(
+            geometry=geometry,
+            lut_gain=profile.lut.gain_map(geometry),
+            incident=incident,
+            transfer=way.transfer(geometry, padded, pupil, (0.0, turning)),
+            plane=plane,
+            last_transfer=None if plane is None else way.transfer(geometry, padded, pupil, (turning, 1.0)),
+            laser_power=profile.drift.laser_power(geometry),
+        )
+
+    def _padded(self) -> tuple[int, int]:
+        """One size for all channels: that of the longest wavelength, whose light spreads furthest."""
+        panel = self.profile.panel
+        return padded_shape(panel.shape, panel.pitch, max(panel.wavelengths), panel.distance, panel.pupil, None)
+
+    def _carriers(self) -> Tensor:
+        """Phase factors ``(samples^2, 1, 1)`` that take the blaze's carrier off each sub-sample."""
+        positions = torch.tensor(sample_positions(self.samples), dtype=torch.float64)
+        vertical, horizontal = self.profile.panel.blaze
+        turns = vertical * positions[:, None] + horizontal * positions[None, :]
+        return torch.polar(torch.ones_like(turns), -2 * torch.pi * turns).reshape(-1, 1, 1).to(torch.complex64)
+
+    def _pose(self, geometry: Geometry) -> Relay:
+        moved = self.profile.drift.added_shift(geometry)
+        shift = self.profile.relay.shift
+        return replace(self.profile.relay, shift=(shift[0] + moved[0], shift[1] + moved[1]))
+
+    def reflected(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
+        """Field of the sub-samples ``(samples^2, H, W)`` after the panel, carrier off; phase ``(H, W)`` [rad]."""
+        profile, maps = self.profile, self.channels[channel]
+        level = straight_through_level(phase + self.ramp, profile.panel.bits)
+        shown = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
+        fine = profile.crosstalk.apply(shown, self.crosstalk)
+        if profile.aperture is not None and self.active is not None:
+            field = profile.aperture.field(fine, self.active)
+        else:
+            field = torch.complex(torch.cos(fine), torch.sin(fine))
+        field = profile.zero_order.modulated * field + profile.zero_order.unmodulated
+        return field * maps.incident
+
+    def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
+        """Noise-free intensity at the image plane, ``image_samples`` a pixel; differentiable in ``phase`` ``(H, W)``.
+
+        Unit: the mean incident intensity on the panel.
+        """
+        maps = self.channels[channel]
+        height, width = self.spec.shape
+        spectrum = torch.zeros_like(maps.transfer)
+        for samples, weights in zip(self.reflected(phase, channel, flicker), self.weights, strict=True):
+            spectrum = torch.addcmul(spectrum, torch.fft.fft2(samples, s=maps.transfer.shape), weights)
+        spectrum = spectrum * maps.transfer
+        if maps.plane is not None and maps.last_transfer is not None:
+            field = torch.fft.ifft2(spectrum)
+            dirty = torch.cat([field[:height, :width] * maps.plane, field[:height, width:]], 1)
+            field = torch.cat([dirty, field[height:]], 0)
+            spectrum = torch.fft.fft2(field) * maps.last_transfer
+        fine = torch.fft.ifft2(zoom_spectrum(spectrum, self.image_samples))
+        fine = fine[: height * self.image_samples, : width * self.image_samples]
+        return (fine.real.square() + fine.imag.square()) * maps.laser_power
+
+    def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
+        """Intensity as in ``intensity``, averaged over the area of a sensor pixel."""
+        profile = self.profile
+        sensor_pixel = profile.sensor.pitch / (profile.relay.magnification * profile.panel.pitch)
+        return box_filter(self.intensity(phase, channel, flicker), self.image_samples * sensor_pixel)
+
+    def image(self, phase: Tensor) -> Tensor:
+        """``integrated`` of every channel at the panel's pixels, ``(C, H, W)``; differentiable."""
+        images = [self.integrated(phase[channel], channel) for channel in range(phase.shape[0])]
+        return torch.stack(images)[:, :: self.image_samples, :: self.image_samples]
+
+    def session(self, *names: object, exposure: Sequence[float]) -> BenchSession:
+        """A display whose noise depends on ``names`` and the frame number; exposure: electrons a unit of light."""
+        return BenchSession(self, names, tuple(exposure))
+
+    def photograph(self, phase: Tensor, exposure: Sequence[float], draw: torch.Generator) -> Capture:
+        """One colour-sequential capture of ``phase`` ``(C, H, W)`` [rad]."""
+        sensor, frames = self.profile.sensor, []
+        for channel in range(phase.shape[0]):
+            light = self.integrated(phase[channel], channel, self.profile.flicker.gain(draw))
+            light = sample(light, self.grid, self.image_samples)
+            frames.append(sensor.expose(light, exposure[channel], self.response, draw))
+        gain = tuple(electrons * sensor.counts_per_electron for electrons in exposure)
+        return Capture(torch.stack(frames), sensor.dark, sensor.white, gain[: len(frames)])
+
+
+def zoom_spectrum(spectrum: Tensor, factor: int) -> Tensor:
+    """The spectrum of the same field sampled ``factor`` times as finely (zeros around it, amplitude kept)."""
+    if factor == 1:
+        return spectrum
+    rows, columns = spectrum.shape[-2:]
+    upper, left = (rows + 1) // 2, (columns + 1) // 2
+    fine = spectrum.new_zeros((*spectrum.shape[:-2], rows * factor, columns * factor))
+    for target_rows, source_rows in (
+        (slice(0, upper), slice(0, upper)),
+        (slice(-(rows // 2), None), slice(upper, None)),
+    ):
+        fine[..., target_rows, :left] = spectrum[..., source_rows, :left]
+        fine[..., target_rows, -(columns // 2) :] = spectrum[..., source_rows, left:]
+    return fine * factor**2
+
+
+@dataclass
+class BenchSession:
+    """The bench under named noise: the same names give the same noise, whatever method is shown."""
+
+    bench: SimulatedBench
+    names: tuple[object, ...]
+    exposure: tuple[float, ...]
+    frames: int = 0
+
+    @property
+    def spec(self) -> DisplaySpec:
+        """Nominal optics, public."""
+        return self.bench.spec
+
+    @torch.no_grad()
+    def capture(self, phase: Tensor) -> Capture:
+        """Show ``phase`` ``(C, H, W)`` [rad] and photograph the image plane."""
+        profile: Any = self.bench.profile
+        draw = generator("bench noise", profile.name, profile.seed, *self.names, self.frames)
+        self.frames += 1
+        return self.bench.photograph(phase, self.exposure, draw)

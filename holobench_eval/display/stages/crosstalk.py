@@ -1,0 +1,60 @@
+"""Stage 3: fringing fields smooth the phase across pixels, so that a wrap edge becomes a ramp (paper 2.2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from annotated_types import Interval
+from torch import Tensor
+
+
+def sample_positions(samples: int) -> list[float]:
+    """Centres of the sub-samples of a pixel, in pixels from its centre."""
+    return [(j - (samples - 1) / 2) / samples for j in range(samples)]
+
+
+@dataclass(frozen=True)
+class Crosstalk:
+    """Convolution of the phase with a Gaussian of standard deviation ``width`` [pixels]."""
+
+    width: Annotated[float, Interval(ge=0, le=2)] = 0.0
+
+    def weights(self, samples: int) -> Tensor:
+        """``(samples, k)``: the share of each neighbour along one axis in each sub-sample, exact for square pixels."""
+        reach = max(1, math.ceil(4 * self.width))
+        rows = torch.zeros(samples, 2 * reach + 1, dtype=torch.float64)
+        for j, position in enumerate(sample_positions(samples)):
+            for n in range(-reach, reach + 1):
+                rows[j, n + reach] = self._share(n - position)
+        return (rows / rows.sum(1, keepdim=True)).float()
+
+    def _share(self, offset: float) -> float:
+        if self.width == 0:
+            return float(abs(offset) < 0.5)
+        scale = self.width * math.sqrt(2)
+        return 0.5 * (math.erf((offset + 0.5) / scale) - math.erf((offset - 0.5) / scale))
+
+    def apply(self, phase: Tensor, weights: Tensor) -> Tensor:
+        """Phase ``(H, W)`` at pixels to phase ``(samples^2, H, W)`` at sub-samples [rad]."""
+        reach = weights.shape[1] // 2
+        padded = F.pad(phase[None, None], (reach, reach, reach, reach), mode="replicate")[0, 0]
+        rows = [_weighted_shifts(padded, taps, dim=0) for taps in weights.tolist()]
+        return torch.stack([_weighted_shifts(row, taps, dim=1) for row in rows for taps in weights.tolist()])
+
+    def kernel(self, points: int = 101) -> tuple[Tensor, Tensor]:
+        """Offsets [pixels] and the share of a pixel at that offset, for a plot."""
+        offsets = torch.linspace(-2, 2, points)
+        return offsets, torch.tensor([self._share(float(offset)) for offset in offsets])
+
+
+def _weighted_shifts(image: Tensor, taps: list[float], dim: int) -> Tensor:
+    """Valid correlation along one axis; for so few taps on one channel faster than ``conv2d`` on a CPU."""
+    size = image.shape[dim] - len(taps) + 1
+    total = taps[0] * image.narrow(dim, 0, size)
+    for shift, weight in enumerate(taps[1:], 1):
+        total = total.add_(image.narrow(dim, shift, size), alpha=weight)
+    return total

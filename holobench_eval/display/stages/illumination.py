@@ -1,0 +1,59 @@
+"""Stage 6: the beam that meets the panel is not a plane wave of constant amplitude (paper Eq. 7)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from .geometry import Geometry
+
+
+@dataclass(frozen=True)
+class Illumination:
+    """Gaussian beam, cover-glass fringes, smooth wavefront error and tilt; lengths in panel heights.
+
+    beam_sigma: 1/e half width of the *amplitude* ``exp(-r^2 / (2 sigma^2))``, None for a uniform beam;
+    offset: largest offset of the beam's centre; fringes: amplitude modulation (0.06 is 6 %) of interference
+    fringes, ``fringe_cycles`` a panel height; phase_rms: smooth phase error [rad];
+    tilt: light falls in at this angle [cycles per panel height], a shift of the picture.
+    """
+
+    beam_sigma: Annotated[float, Interval(gt=0)] | None = None
+    offset: Annotated[float, Interval(ge=0, le=1)] = 0.0
+    fringes: Annotated[float, Interval(ge=0, le=0.5)] = 0.0
+    fringe_cycles: Annotated[float, Interval(ge=0, le=200)] = 8.0
+    phase_rms: Annotated[float, Interval(ge=0, le=6.3)] = 0.0
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+    def field(self, geometry: Geometry) -> Tensor:
+        """Complex incident field ``(H, W)`` of unit mean intensity."""
+        y, x = geometry.coordinates()
+        amplitude = torch.ones(geometry.shape, dtype=torch.float64)
+        if self.beam_sigma is not None:
+            draw = geometry.generator("beam centre")
+            centre = (2 * torch.rand(2, generator=draw, dtype=torch.float64) - 1) * self.offset
+            amplitude *= torch.exp(-((y - centre[0]) ** 2 + (x - centre[1]) ** 2) / (2 * self.beam_sigma**2))
+        amplitude *= 1 + self.fringes * self._fringes(geometry)
+        phase = self.phase_rms * geometry.smooth_map(2.5, "wavefront")
+        phase = phase + 2 * math.pi * (self.tilt[0] * y + self.tilt[1] * x)
+        amplitude /= amplitude.pow(2).mean().sqrt()
+        return torch.polar(amplitude, phase).to(torch.complex64)
+
+    def _fringes(self, geometry: Geometry) -> Tensor:
+        """Two fringe systems in [-1, 1]; the finer the shorter the wavelength, as between two plane surfaces."""
+        y, x = geometry.coordinates()
+        cycles = self.fringe_cycles * 532e-9 / geometry.wavelength
+        total = torch.zeros(geometry.shape, dtype=torch.float64)
+        for system, share in enumerate((0.6, 0.4)):
+            turn, phase, ratio = torch.rand(3, generator=geometry.generator("fringes", system), dtype=torch.float64)
+            angle = 2 * math.pi * turn
+            frequency = cycles * (0.6 + 0.8 * ratio)
+            total += share * torch.cos(
+                2 * math.pi * (frequency * (torch.cos(angle) * x + torch.sin(angle) * y) + phase)
+            )
+        return total

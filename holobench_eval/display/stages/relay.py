@@ -1,0 +1,82 @@
+"""Stage 11: the relay carries the image to the sensor, magnified, turned and a little distorted (paper 5.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from annotated_types import Interval
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Relay:
+    """Pose of the panel's image on the sensor.
+
+    magnification; rotation [degrees]; shift (rows, columns) and perspective: relative to the panel's height;
+    distortion: radial displacement at half a panel height, relative to it.
+    """
+
+    magnification: Annotated[float, Interval(gt=0, le=10)] = 1.0
+    rotation: Annotated[float, Interval(ge=-180, le=180)] = 0.0
+    shift: tuple[float, float] = (0.0, 0.0)
+    perspective: tuple[float, float] = (0.0, 0.0)
+    distortion: Annotated[float, Interval(ge=-0.2, le=0.2)] = 0.0
+
+    def frame_shape(self, shape: tuple[int, int], pitch: float, sensor_pitch: float) -> tuple[int, int]:
+        """Sensor window (rows, columns) that holds the panel's image with a margin of 5 %."""
+        ratio = self.magnification * pitch / sensor_pitch
+        return math.ceil(shape[0] * ratio * 1.05), math.ceil(shape[1] * ratio * 1.05)
+
+    def panel_points(self, shape: tuple[int, int], pitch: float, sensor_pitch: float) -> Tensor:
+        """Panel coordinates (row, column) [px] seen by every sensor pixel, ``(Hs, Ws, 2)`` float64."""
+        rows, columns = self.frame_shape(shape, pitch, sensor_pitch)
+        ratio = self.magnification * pitch / sensor_pitch * shape[0]
+        v = ((torch.arange(rows, dtype=torch.float64) - (rows - 1) / 2) / ratio - self.shift[0])[:, None]
+        u = ((torch.arange(columns, dtype=torch.float64) - (columns - 1) / 2) / ratio - self.shift[1])[None, :]
+        turn = math.radians(self.rotation)
+        y = math.cos(turn) * v - math.sin(turn) * u
+        x = math.sin(turn) * v + math.cos(turn) * u
+        depth = 1 + self.perspective[0] * y + self.perspective[1] * x
+        y, x = y / depth, x / depth
+        stretch = 1 + self.distortion * 4 * (y * y + x * x)
+        row = y * stretch * shape[0] + (shape[0] - 1) / 2
+        column = x * stretch * shape[0] + (shape[1] - 1) / 2
+        return torch.stack([row, column], dim=-1)
+
+
+def box_filter(image: Tensor, width: float) -> Tensor:
+    """Mean over a square of ``width`` samples around each sample of ``(..., H, W)``; the sensor's pixel area."""
+    if width <= 1:
+        return image
+    reach = math.ceil((width - 1) / 2)
+    taps = torch.ones(2 * reach + 1, dtype=image.dtype, device=image.device)
+    taps[0] = taps[-1] = (width - (2 * reach - 1)) / 2
+    taps /= taps.sum()
+    flat = F.pad(image.reshape(-1, 1, *image.shape[-2:]), (reach, reach, reach, reach), mode="replicate")
+    smooth = F.conv2d(F.conv2d(flat, taps.view(1, 1, -1, 1)), taps.view(1, 1, 1, -1))
+    return smooth.reshape(image.shape)
+
+
+def sampling_grid(points: Tensor, shape: tuple[int, int]) -> Tensor:
+    """Points ``(Hs, Ws, 2)`` (row, column) in pixels of a panel of ``shape``, as ``grid_sample`` wants them, float32.
+
+    -1 and 1 are the centres of the first and the last pixel.
+    """
+    size = torch.tensor(shape, dtype=torch.float64)
+    return (2 * points / (size - 1) - 1).flip(-1).float()
+
+
+def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
+    """Bilinear values of an image ``(H, W)``, sampled ``per_pixel`` times a pixel, at a ``sampling_grid``.
+
+    The finer samples start at the first pixel's centre and go on past the last one's; the grid is scaled for that.
+    """
+    rows, columns = image.shape
+    pixels = torch.tensor([columns / per_pixel - 1, rows / per_pixel - 1])
+    scale = pixels * per_pixel / torch.tensor([columns - 1.0, rows - 1.0])
+    fine = grid if per_pixel == 1 else (grid + 1) * scale - 1
+    return F.grid_sample(image[None, None], fine[None], mode="bilinear", padding_mode="zeros", align_corners=True)[0, 0]

@@ -1,0 +1,68 @@
+"""Stage 12: the camera integrates, adds its noise and counts (paper 5.1 and 7.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from .geometry import Geometry
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A camera sensor.
+
+    pitch [m]; bits of the converter; dark level [DN]; full_well and read_noise [electrons]; prnu: rms of the
+    pixels' relative gain; vignetting: loss at the corner of the frame; nonlinearity: relative loss of response at
+    full scale; headroom: how many times the light of a perfectly reconstructed white pixel fills the well;
+    noise: False for an ideal camera that counts in fractions.
+    """
+
+    pitch: Annotated[float, Interval(gt=0, lt=1e-3)] = 3.72e-6
+    bits: Annotated[int, Interval(ge=8, le=16)] = 14
+    dark: Annotated[float, Interval(ge=0)] = 512.0
+    full_well: Annotated[float, Interval(gt=0)] = 32000.0
+    read_noise: Annotated[float, Interval(ge=0)] = 7.0
+    prnu: Annotated[float, Interval(ge=0, le=0.2)] = 0.0
+    vignetting: Annotated[float, Interval(ge=0, lt=1)] = 0.0
+    nonlinearity: Annotated[float, Interval(ge=0, le=0.3)] = 0.0
+    headroom: Annotated[float, Interval(ge=1, le=1000)] = 8.0
+    noise: bool = True
+
+    @property
+    def white(self) -> float:
+        """Saturation level [DN]."""
+        return 2.0**self.bits - 1
+
+    @property
+    def counts_per_electron(self) -> float:
+        """Conversion gain [DN / electron]: the full well reaches the saturation level."""
+        return (self.white - self.dark) / self.full_well
+
+    def response(self, frame_shape: tuple[int, int], geometry: Geometry) -> Tensor:
+        """Relative response ``(Hs, Ws)`` of every pixel: vignetting times fixed-pattern gain."""
+        rows, columns = frame_shape
+        y = torch.linspace(-1, 1, rows)[:, None]
+        x = torch.linspace(-1, 1, columns)[None, :]
+        falloff = 1 - self.vignetting * (y * y + x * x) / 2
+        pattern = torch.randn(rows, columns, generator=geometry.generator("fixed pattern"))
+        return falloff * (1 + self.prnu * pattern)
+
+    def expose(self, light: Tensor, electrons: float, response: Tensor, draw: torch.Generator) -> Tensor:
+        """Counts [DN] ``(Hs, Ws)`` of ``light`` (mean incident light on the panel is 1) at ``electrons`` per unit.
+
+        Shot noise is drawn as a normal number of the same variance, which it is to below the read noise from about
+        twenty electrons on.
+        """
+        charge = light * response * electrons
+        if not self.noise:
+            return (charge * self.counts_per_electron + self.dark).clamp(max=self.white)
+        shot = charge.clamp_min(0).add(self.read_noise**2).sqrt_()
+        charge = torch.randn(charge.shape, generator=draw).mul_(shot).add_(charge)
+        charge = charge - self.nonlinearity / self.full_well * charge.clamp_min(0).square()
+        counts = charge.mul_(self.counts_per_electron).add_(self.dark).round_()
+        return counts.clamp_(0, self.white)

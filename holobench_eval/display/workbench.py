@@ -1,0 +1,240 @@
+"""A bench with its camera registered, and the metered handle that a method gets of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..capture.grid import fiducial
+from ..capture.registration import Registration, register
+from ..errors import BudgetError, CellError
+from ..methods.wirtinger import Wirtinger
+from ..optics.phase import TAU
+from ..seeds import generator
+from .bench import BenchSession, SimulatedBench
+from .contract import Capture, DisplaySpec
+from .profile import Profile
+from .stages.relay import sample, sampling_grid
+
+Exposure = Literal["equal", "matched"]
+FIDUCIAL_HOLOGRAMS, FIDUCIAL_STEPS = 4, 4
+DARKEST_MEAN = 0.01
+"""A target channel darker than this is exposed as if it had this mean, so that exposure stays finite."""
+
+
+def concentration(target: Tensor, spec: DisplaySpec) -> Tensor:
+    """Light at a white pixel, per channel, if all light of the panel went into the target; mean incident light is 1."""
+    share = target.mean((-2, -1)).clamp_min(DARKEST_MEAN) * (target.shape[-2] * target.shape[-1])
+    return spec.shape[0] * spec.shape[1] / share
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A capture brought into the target's frame.
+
+    image: ``(C, h, w)`` linear light; 1 is what a white pixel gets if all light of the panel went into the target;
+    efficiency: light in the region over light on the panel, mean over channels; saturated: fraction of samples;
+    residual: registration residual [region px, rms], worst channel; exposure: electrons per unit of light.
+    """
+
+    image: Tensor
+    capture: Capture
+    saturated: float
+    efficiency: float
+    residual: float
+    exposure: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What the registered camera would see without noise, differentiable: all that is fixed about a bench.
+
+    grids: per channel, where each pixel of the region lies on the panel's image, as ``sample`` takes it.
+    """
+
+    bench: SimulatedBench
+    grids: tuple[Tensor, ...]
+
+    def image(self, phase: Tensor) -> Tensor:
+        """Intensity ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; incident light is 1."""
+        samples = self.bench.image_samples
+        images = [self.bench.integrated(phase[channel], channel) for channel in range(phase.shape[0])]
+        return torch.stack([sample(image, grid, samples) for image, grid in zip(images, self.grids, strict=False)])
+
+
+@dataclass(frozen=True)
+class Workbench:
+    """A simulated bench and its calibration: one registration for all methods, made before any of them is shown."""
+
+    bench: SimulatedBench
+    seed: int
+
+    @property
+    def spec(self) -> DisplaySpec:
+        """Nominal optics."""
+        return self.bench.spec
+
+    @cached_property
+    def registration(self) -> Registration:
+        """Camera geometry from circle-grid holograms (protocol, step 2). CellError when it cannot be trusted."""
+        grid = fiducial(self.spec.region.shape)
+        target = grid.image.float().expand(len(self.spec.wavelengths), -1, -1)
+        return register(self._fiducial(target), grid, self.bench.profile.residual_bound)
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The bench as the registered camera sees it, without noise."""
+        points = self.bench.points.numpy()
+        grids = []
+        for warp in self.registration.warps:
+            x, y = warp.coordinates()
+            seen = cv2.remap(points, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
+            grids.append(sampling_grid(torch.from_numpy(seen), self.spec.shape))
+        return Simulation(self.bench, tuple(grids))
+
+    def _fiducial(self, target: Tensor) -> Tensor:
+        """Mean capture ``(C, Hs, Ws)`` of several holograms of the grid.
+
+        Their phases start at random, because a smoothly curved image phase turns a little defocus into a change of
+        scale, and each is shown with several constant phases added, because unmodulated light interferes with the
+        image and the mean over the steps cancels that; both then also average speckle.
+        """
+        light = self.exposure(target)
+        total = torch.zeros(())
+        for hologram in range(FIDUCIAL_HOLOGRAMS):
+            handle = self.for_method(Wirtinger(), "fiducial", target, "fiducial", hologram)
+            phase = Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]
+            for step in range(FIDUCIAL_STEPS):
+                session = self.bench.session(self.seed, "fiducial", hologram, step, exposure=light)
+                total = total + session.capture(phase + step * TAU / FIDUCIAL_STEPS).linear()
+        return total / (FIDUCIAL_HOLOGRAMS * FIDUCIAL_STEPS)
+
+    def exposure(self, target: Tensor) -> tuple[float, ...]:
+        """Electrons per unit of light and channel, from the target alone and so equal for every method.
+
+        A white pixel that gets all the light it can fills the well to 1 / headroom.
+        """
+        sensor = self.bench.profile.sensor
+        per_unit = sensor.full_well / sensor.headroom / concentration(target, self.spec)
+        return tuple(per_unit.tolist())
+
+    def for_method(self, method: object, label: str, target: Tensor, item: str, repeat: int) -> MeteredBench:
+        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)``."""
+        return MeteredBench(
+            self,
+            label,
+            target,
+            (self.seed, item, repeat),
+            camera=bool(getattr(method, "camera", False)),
+            privileged=bool(getattr(method, "privileged", False)),
+        )
+
+    def photograph(
+        self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
+    ) -> Shot:
+        """Show ``phase`` ``(C, H, W)`` [rad] and bring its capture into the frame of ``target`` ``(C, h, w)``.
+
+        Exposure "equal": the same light for every method; "matched": a metering capture first, then the laser power
+        that gives the region the target's mean brightness (paper section 7 does so for double-phase holograms).
+        """
+        check_phase(phase, self.spec, label)
+        light = self.exposure(target)
+        session = self.bench.session(self.seed, item, repeat, "score", exposure=light)
+        if exposure == "matched":
+            metered = self.rectified(session.capture(phase), target)
+            ratio = target.mean((-2, -1)) / metered.mean((-2, -1)).clamp_min(1e-3)
+            light = tuple((torch.tensor(light) * ratio).tolist())
+            session = self.bench.session(self.seed, item, repeat, "score", exposure=light)
+        capture = session.capture(phase)
+        image = self.rectified(capture, target)
+        share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
+        return Shot(
+            image=image,
+            capture=capture,
+            saturated=capture.saturated,
+            efficiency=float(share.mean()),
+            residual=max(self.registration.residual),
+            exposure=light,
+        )
+
+    def rectified(self, capture: Capture, target: Tensor) -> Tensor:
+        """A capture as ``(C, h, w)`` in the target's frame and in the unit of ``Shot.image``."""
+        light = self.registration.rectify(capture.linear())
+        return light / concentration(target, self.spec)[: light.shape[0], None, None]
+
+
+@dataclass
+class MeteredBench:
+    """All that a method sees of a display: nominal optics, a metered camera, named random numbers.
+
+    budget: captures that may be taken, None for no limit.
+    """
+
+    workbench: Workbench
+    label: str
+    target: Tensor
+    names: tuple[object, ...]
+    camera: bool = False
+    privileged: bool = False
+    budget: int | None = None
+    captures: int = 0
+
+    @property
+    def spec(self) -> DisplaySpec:
+        """Nominal optics, public."""
+        return self.workbench.spec
+
+    @property
+    def simulation(self) -> Simulation:
+        """The bench itself, for privileged methods alone."""
+        if not self.privileged:
+            raise CellError(f"{self.label}: only a method that declares privileged = True may see the simulated bench")
+        return self.workbench.simulation
+
+    def generator(self, *names: object) -> torch.Generator:
+        """Random numbers that depend on study seed, target, repeat and ``names``."""
+        return generator("method", *self.names, *names)
+
+    @cached_property
+    def _session(self) -> BenchSession:
+        light = self.workbench.exposure(self.target)
+        return self.workbench.bench.session(*self.names, "solve", exposure=light)
+
+    def capture(self, phase: Tensor) -> Capture:
+        """Show ``phase`` ``(C, H, W)`` [rad] and photograph it; counted. CellError if the method declares no camera."""
+        if not self.camera:
+            raise CellError(f"{self.label} took a capture, but declares no camera (camera = True)")
+        if self.budget is not None and self.captures >= self.budget:
+            raise BudgetError(f"{self.label} has used its {self.budget} captures")
+        check_phase(phase, self.spec, self.label)
+        self.captures += 1
+        return self._session.capture(phase)
+
+    def rectify(self, capture: Capture) -> Tensor:
+        """A capture in the target's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency."""
+        return self.workbench.rectified(capture, self.target)
+
+
+def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
+    """Refuse what no display can show; the error names the method."""
+    who = f"{label}: " if label else ""
+    if phase.ndim != 3 or tuple(phase.shape[-2:]) != spec.shape:
+        raise CellError(
+            f"{who}phase is {tuple(phase.shape)}, the display shows (channels, {spec.shape[0]}, {spec.shape[1]})"
+        )
+    if phase.is_complex() or not phase.is_floating_point():
+        raise CellError(f"{who}phase is {phase.dtype}, the display shows real numbers in radians")
+    bad = int((~torch.isfinite(phase)).sum())
+    if bad:
+        raise CellError(f"{who}phase holds {bad} values that are NaN or infinite; the display refuses it")
+
+
+def open_bench(profile: Profile, panel: tuple[int, int] | None = None, seed: int = 0) -> Workbench:
+    """The simulated bench of a profile on a panel of (rows, columns) pixels; ``seed`` names its noise."""
+    return Workbench(SimulatedBench(profile.scaled(panel)), seed)

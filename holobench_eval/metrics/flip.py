@@ -1,0 +1,30 @@
+"""LDR-FLIP, by its authors' own implementation (package flip-evaluator).
+
+P. Andersson et al., "FLIP: a difference evaluator for alternating images", Proc. ACM Comput. Graph. Interact. Tech. 3
+(2020).
+"""
+
+from __future__ import annotations
+
+import torch
+from flip_evaluator import evaluate
+from torch import Tensor
+
+from .base import Metric, as_rgb, paired
+
+
+def flip(image: Tensor, target: Tensor) -> Tensor:
+    """Mean FLIP error for low dynamic range at the default viewing condition of 67 pixels a degree.
+
+    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded; a gray image is taken as three equal channels.
+    Returns a scalar or (B,) without gradient; 0 (identical) to 1, lower is better. Raises ValueError (see ``paired``).
+    """
+    x, y = (as_rgb(side.detach().clamp(0, 1).float().cpu()) for side in paired(image, target))
+    means = []
+    for test, reference in zip(x, y, strict=True):
+        arrays = [side.permute(1, 2, 0).contiguous().numpy() for side in (reference, test)]
+        means.append(evaluate(*arrays, "LDR", inputsRGB=True, applyMagma=False)[1])
+    return torch.tensor(means, dtype=image.dtype, device=image.device).reshape(image.shape[:-3])
+
+
+FLIP = Metric("flip", "1", "lower", 0.0, ("srgb",), flip, differentiable=False)

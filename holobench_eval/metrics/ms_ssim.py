@@ -1,0 +1,43 @@
+"""Multi-scale structural similarity.
+
+Z. Wang, E. P. Simoncelli, A. C. Bovik, "Multi-scale structural similarity for image quality assessment",
+Asilomar Conf. Signals, Systems and Computers (2003).
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from .base import Metric, paired
+from .ssim import RADIUS, ssim_maps
+
+EXPONENTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
+SMALLEST = 161
+
+
+def ms_ssim(image: Tensor, target: Tensor) -> Tensor:
+    """Product of mean contrast-structure terms at four scales and of mean SSIM at the fifth, to the paper's exponents.
+
+    The windows are those of ``ssim``; a scale is half the one before by 2x2 means; the means go over pixels and
+    channels, and a negative mean counts as zero. As in torchmetrics, whose value this equals, the coarsest SSIM is
+    averaged over the whole image, mirrored at its edges, and the other terms over the windows that lie in the image.
+    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sides of at least 161 px.
+    Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
+    """
+    x, y = paired(image, target, smallest=SMALLEST)
+    means = []
+    for _ in EXPONENTS[:-1]:
+        means.append(ssim_maps(x, y)[1].mean(dim=(1, 2, 3)))
+        x, y = functional.avg_pool2d(x, 2), functional.avg_pool2d(y, 2)
+    x, y = (functional.pad(side, (RADIUS,) * 4, mode="reflect") for side in (x, y))
+    means.append(ssim_maps(x, y)[0].mean(dim=(1, 2, 3)))
+    value = x.new_ones(x.shape[0])
+    for mean, exponent in zip(means, EXPONENTS, strict=True):
+        # The power of zero has an infinite gradient, so zero is a branch of its own.
+        value = value * torch.where(mean > 0, torch.where(mean > 0, mean, 1.0).pow(exponent), 0.0)
+    return value.reshape(image.shape[:-3])
+
+
+MS_SSIM = Metric("ms_ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ms_ssim, smallest=SMALLEST)

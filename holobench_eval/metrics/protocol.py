@@ -1,0 +1,146 @@
+"""The metric protocol, version 1: everything between a rectified capture and its scores.
+
+Any change to a value that ``score`` gives is a new version.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ..capture.refine import refine as align
+from ..errors import UserError, suggest
+from ..optics.colour import srgb_encode
+from .base import Domain, Metric, gaussian_blur
+from .catalogue import catalogue
+from .speckle import speckle_contrast
+
+VERSION = "v1"
+SMALLEST = 16
+
+Image = Tensor | NDArray[np.floating]
+
+_ENCODINGS: dict[Domain, Callable[[Tensor], Tensor]] = {
+    "linear": lambda light: light,
+    "amplitude": torch.sqrt,
+    "srgb": srgb_encode,
+}
+_REPEATED = ("psnr", "ssim")  # also given after refinement and after blur
+
+
+def match(capture: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+    """Match the brightness of each colour channel by least squares, then clip to [0, 1].
+
+    s = sum(I T) / sum(I I) in linear light over the whole region, without an offset, and never negative.
+    capture: (C, h, w) linear light in any unit; target: (C, h, w) linear light in [0, 1].
+    Returns the matched image (C, h, w) and the factors (C,); a black channel has factor 0 and stays black.
+    """
+    factors = _factors(capture, target)
+    return (factors.view(-1, 1, 1) * capture).clamp(0, 1), factors
+
+
+def _factors(capture: Tensor, target: Tensor) -> Tensor:
+    # Divided by the peak first, so that the squares neither overflow nor vanish.
+    peak = capture.abs().amax(dim=(1, 2), keepdim=True)
+    peak = torch.where(peak > 0, peak, 1.0)
+    scaled = capture / peak
+    power = scaled.square().sum(dim=(1, 2))
+    shared = (scaled * target).sum(dim=(1, 2)).clamp_min(0)
+    return torch.where(power > 0, shared / torch.where(power > 0, power, 1.0), 0.0) / peak.flatten()
+
+
+@torch.no_grad()
+def score(
+    capture: Image,
+    target: Image,
+    *,
+    refine: bool = True,
+    blur: Sequence[float] = (0.5, 1.0),
+    metrics: Collection[str] | None = None,
+    lpips_weights: str | Path | None = None,
+) -> dict[str, float]:
+    """All scores of a capture against its target, after the intensity match.
+
+    capture: (C, h, w) linear light in any unit, dark level subtracted (noise may make it negative).
+    target: (C, h, w) linear light in [0, 1]; C = 1 or 3, sides of at least 16 px.
+    refine: also score after the bounded rigid refinement, whose move is given.
+    blur: widths [px] of Gaussians by which capture and target alike are blurred, in linear light and before the match.
+    metrics: names to compute (as in ``catalogue``, and ``speckle_contrast``), default all.
+    lpips_weights: file or folder of the LPIPS trunk, default torch's hub cache.
+
+    Returns ``<metric>_<domain>``; ``<metric>_linear_refined`` and ``<metric>_linear_blur<width>`` for PSNR and SSIM;
+    ``refine_dx_px``, ``refine_dy_px``, ``refine_theta_deg``; ``speckle_contrast``; ``brightness_ratio`` (mean of the
+    capture over mean of the target, before the match); ``scale_<channel>``, the match's factors. What cannot be given
+    is absent: a metric without its weights or for a larger image, the speckle contrast without a flat patch.
+    Raises ValueError for wrong shapes, values that are not finite and a target outside [0, 1]; UserError for unknown
+    metric names and for LPIPS weights that are named but cannot be used.
+    """
+    light, wanted = _checked(capture, target)
+    names, chosen = _chosen(metrics, lpips_weights)
+    image, factors = match(light, wanted)
+    pairs = {domain: (encode(image), encode(wanted)) for domain, encode in _ENCODINGS.items()}
+    scores: dict[str, float] = {}
+    for metric in chosen:
+        if min(image.shape[1:]) >= metric.smallest:
+            scores |= {f"{metric.name}_{domain}": float(metric.function(*pairs[domain])) for domain in metric.domains}
+    repeated = [metric for metric in chosen if metric.name in _REPEATED]
+    if refine and repeated:
+        moved = align(factors.view(-1, 1, 1) * light, wanted)
+        again, _ = match(moved.image.to(wanted), wanted)
+        scores |= {f"{metric.name}_linear_refined": float(metric.function(again, wanted)) for metric in repeated}
+        scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
+    for sigma in blur if repeated else ():
+        soft_capture, soft_target = _blurred(light, sigma), _blurred(wanted, sigma).clamp(0, 1)
+        soft, _ = match(soft_capture, soft_target)
+        scores |= {f"{m.name}_linear_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
+    if "speckle_contrast" in names:
+        contrast = speckle_contrast(light, wanted)
+        scores |= {} if math.isnan(contrast) else {"speckle_contrast": contrast}
+    if float(wanted.mean()) > 0:
+        scores["brightness_ratio"] = float(light.mean() / wanted.mean())
+    return scores | {f"scale_{channel}": float(factor) for channel, factor in enumerate(factors)}
+
+
+def _checked(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
+    """Both as float64 tensors on one device; float64, since SSIM subtracts nearly equal squares."""
+    light, wanted = (torch.as_tensor(side).detach().to(torch.float64) for side in (capture, target))
+    light = light.to(wanted.device)
+    if light.shape != wanted.shape or light.ndim != 3 or light.shape[0] not in (1, 3):
+        raise ValueError(
+            f"capture {tuple(light.shape)} and target {tuple(wanted.shape)} must both be (C, h, w) with C = 1 or 3"
+        )
+    if min(light.shape[1:]) < SMALLEST:
+        raise ValueError(f"image sides must be at least {SMALLEST} pixels, got {tuple(light.shape[1:])}")
+    if not bool(light.isfinite().all()):
+        raise ValueError("the capture holds values that are not finite")
+    low, high = (float(value) for value in wanted.aminmax())
+    if not (low >= -1e-6 and high <= 1 + 1e-6):
+        raise ValueError(f"target values must be in [0, 1], got [{low:.6g}, {high:.6g}]")
+    return light, wanted.clamp(0, 1)
+
+
+def _chosen(names: Collection[str] | None, weights: str | Path | None) -> tuple[set[str], list[Metric]]:
+    """The wanted names, and those of the full-reference metrics that can be computed here."""
+    known = catalogue(None if weights is None else Path(weights))
+    allowed = {"speckle_contrast", *(metric.name for metric in known)}
+    wanted = allowed if names is None else set(names)
+    for name in sorted(wanted - allowed):
+        raise UserError(f"unknown metric '{name}'; {suggest(name, allowed)}")
+    chosen = [metric for metric in known if metric.name in wanted]
+    reasons = {metric.name: metric.available() for metric in chosen}
+    missing = [reason for name, reason in reasons.items() if name.startswith("lpips") and reason is not None]
+    if weights is not None and missing and len(missing) == sum(name.startswith("lpips") for name in reasons):
+        raise UserError(missing[0])
+    return wanted, [metric for metric in chosen if reasons[metric.name] is None]
+
+
+def _blurred(image: Tensor, sigma: float) -> Tensor:
+    if not 0 < 4 * sigma < min(image.shape[1:]) - 1:
+        raise ValueError(f"blur width {sigma} px must be positive and less than a quarter of the image's side")
+    return gaussian_blur(image[None], sigma)[0]

@@ -1,0 +1,22 @@
+"""Reports: statistics over targets, tables, figures and report.md, all computed from the records of a study."""
+
+from .build import build_report, recompute_table, results_of, write_report
+from .layout import Layout, layout_of
+from .results import Results
+from .sections import headline_rows
+from .tables import csv_text, read_records, records_frame, table_from_records
+
+__all__ = [
+    "Layout",
+    "Results",
+    "build_report",
+    "csv_text",
+    "headline_rows",
+    "layout_of",
+    "read_records",
+    "recompute_table",
+    "records_frame",
+    "results_of",
+    "table_from_records",
+    "write_report",
+]

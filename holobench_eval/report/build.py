@@ -1,0 +1,126 @@
+"""report.md, table.csv, records.csv and the figures of a study, from its records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
+
+from ..study.store import write_atomically
+from . import sections
+from .description import Description, counts, describe, environment, method_parameters, rules, setup
+from .figures import Figures, draw_figures
+from .findings import findings
+from .layout import Layout, layout_of
+from .markdown import render
+from .results import Results
+from .statistics import RESAMPLES
+from .tables import csv_text, read_records, records_frame
+
+if TYPE_CHECKING:
+    from ..config import Study
+
+TEMPLATE = "report.md.j2"
+
+
+def build_report(
+    study: Study, records: Sequence[Mapping[str, Any]], output: Path, provenance: Mapping[str, Any]
+) -> Path:
+    """Write everything a reader of the study gets into ``output`` and return the path of report.md.
+
+    records: one for every planned cell, as ``Store.load`` gives them; thumbnails are taken from ``output/records``.
+    provenance: see ``study.provenance``. UserError when no record has the headline metric.
+    """
+    return write_report(layout_of(study), records, output, provenance, describe(study))
+
+
+def write_report(
+    layout: Layout,
+    records: Sequence[Mapping[str, Any]],
+    output: Path,
+    provenance: Mapping[str, Any],
+    description: Description,
+) -> Path:
+    """``build_report`` for a study that is given by its layout and description."""
+    results = Results(records_frame(records, layout), layout)
+    write_atomically(output / "records.csv", csv_text(results.frame).encode())
+    write_atomically(output / "table.csv", csv_text(results.table).encode())
+    context = _numbers(results) | _words(results, records, provenance, description)
+    figures = draw_figures(results, output)
+    text = render(TEMPLATE, context | _pictures(figures))
+    write_atomically(output / "report.md", text.encode())
+    return output / "report.md"
+
+
+def results_of(study: Study, records: Sequence[Mapping[str, Any]]) -> Results:
+    """The numbers of a study, for those who want to ask them without writing a report."""
+    layout = layout_of(study)
+    return Results(records_frame(records, layout), layout)
+
+
+def recompute_table(records_csv: str, layout: Layout) -> str:
+    """The text of table.csv computed anew from the text of records.csv; equal bytes mean that they belong together."""
+    return csv_text(Results(read_records(records_csv), layout).table)
+
+
+def _numbers(results: Results) -> dict[str, Any]:
+    """Everything in the template that is computed from the records."""
+
+    def each(section: Callable[[Results, str], Markup]) -> list[tuple[str, Markup]]:
+        shown = [(condition, section(results, condition)) for condition in results.conditions]
+        return [(condition, text) for condition, text in shown if text]
+
+    metrics = {score.metric for score in results.scores}
+    return {
+        "counts": counts(results),
+        "findings": findings(results),
+        "headline": results.headline,
+        "headline_tables": each(sections.headline),
+        "privileged": bool(results.layout.privileged),
+        "lpips": any(metric.startswith("lpips") for metric in metrics),
+        "mofd": "mofd" in metrics,
+        "floors": sections.floors(results) if results.floors else "",
+        "baseline": results.layout.baseline,
+        "baseline_tests": sections.tests(results, results.against_baseline) if results.against_baseline else "",
+        "all_tests": sections.tests(results, results.between_all) if results.between_all else "",
+        "domain_tables": each(sections.domains),
+        "geometry_tables": each(sections.geometry),
+        "blur_tables": each(sections.blur),
+        "light_tables": each(sections.light_and_time),
+        "target_tables": each(sections.per_target),
+        "holes": sections.holes(results),
+        "resamples": f"{RESAMPLES:,}",
+    }
+
+
+def _words(
+    results: Results,
+    records: Sequence[Mapping[str, Any]],
+    provenance: Mapping[str, Any],
+    description: Description,
+) -> dict[str, Any]:
+    """Everything in the template that describes the study."""
+    layout = results.layout
+    return rules(results) | {
+        "title": layout.title,
+        "setup": setup(results, records),
+        "profiles": description.displays,
+        "parameters": sections.parameters(method_parameters(results, records)),
+        "reported_source": layout.reported_source,
+        "seed": layout.seed,
+        "command": f"holoeval run {description.config_file or 'CONFIG.yaml'}",
+        "config_name": description.config_file,
+        "config_text": description.config_text,
+        "environment": environment(provenance),
+    }
+
+
+def _pictures(figures: Figures) -> dict[str, Any]:
+    return {
+        "charts": figures.charts,
+        "comparisons": figures.comparisons,
+        "stages": figures.stages,
+        "absent": figures.absent,
+    }

@@ -1,0 +1,63 @@
+"""One look for every figure: size in pixels, colours that colour-blind readers can tell apart, repeatable bytes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+DPI = 100
+
+# Okabe & Ito's palette without its yellow, which is too faint for marks on white.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6A3D9A", "#7F5539")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
+GREY = "#666666"
+PALE = "#BBBBBB"
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Matplotlib's own defaults, whatever the user's matplotlibrc says, with this project's font sizes."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(
+            {
+                "font.size": 9,
+                "axes.titlesize": 10,
+                "axes.spines.top": False,
+                "axes.spines.right": False,
+                "hatch.linewidth": 0.6,
+            }
+        )
+        yield
+
+
+def new_figure(width: int, height: int) -> Figure:
+    """An empty figure of ``width`` x ``height`` pixels; no pyplot, so no global state and no window."""
+    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write the figure as PNG, without the version stamp, so that equal figures have equal bytes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def slugs(names: Sequence[str]) -> dict[str, str]:
+    """File-name stems for condition names: safe characters only, and different names keep different stems."""
+    stems: dict[str, str] = {}
+    for name in names:
+        stem = base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "condition"
+        count = 1
+        while stem in stems.values():
+            count += 1
+            stem = f"{base}-{count}"
+        stems[name] = stem
+    return stems

@@ -1,0 +1,182 @@
+"""Every figure of a report: which there are, what is on them, and the captions they carry in report.md."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..study.plan import REFERENCE
+from ..study.store import Store
+from .figure_charts import Chart, quality_against_time, quality_bars, target_dots
+from .figure_comparison import draw_comparison, tile_size
+from .figure_style import slugs
+from .findings import FLOOR_NAMES
+from .gallery import Column, Picture, Tile, chunks, error_ceiling, error_map, load_picture, spread
+from .results import Results
+from .sections import label, leading_scores
+from .tables import DONE
+
+FOLDER = "figures"
+TARGETS_SHOWN = 8
+TARGETS_A_PAGE = 4
+METHODS_A_PAGE = 7
+PIXELS = 5e6
+"""Pixels of all comparison pages of a condition, at most: full-panel captures are shown for fewer targets."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure that was written: its path relative to the report, what a reader should know of it, its number."""
+
+    path: str
+    caption: str
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The figures of a report by kind, and the thumbnails that were wanted and not there."""
+
+    charts: list[Drawn]
+    comparisons: list[Drawn]
+    stages: list[Drawn]
+    absent: list[str]
+
+
+def draw_figures(results: Results, output: Path) -> Figures:
+    """Draw everything that the records allow into ``output/figures``; older figures of the same kinds go."""
+    folder = output / FOLDER
+    for pattern in ("comparison-*.png", "quality-*.png"):
+        for old in folder.glob(pattern):
+            old.unlink()
+    absent: list[str] = []
+    comparisons = [
+        drawn
+        for condition, stem in slugs(results.conditions).items()
+        for drawn in _comparison(results, output, condition, stem, absent)
+    ]
+    number = itertools.count(1)
+    charts, captures, stages = (
+        [replace(drawn, number=next(number)) for drawn in kind]
+        for kind in (_charts(results, folder), comparisons, _stages(results, folder))
+    )
+    return Figures(charts, captures, stages, sorted(set(absent)))
+
+
+def _charts(results: Results, folder: Path) -> list[Drawn]:
+    score = results.headline
+    table = results.table[results.table["condition"] != REFERENCE]
+    if score.key not in table or not np.isfinite(table[score.key]).any():
+        return []
+    methods = tuple(dict.fromkeys(table["method"]))
+    floors = {
+        FLOOR_NAMES[name]: float(results.row(name, REFERENCE)[score.key])
+        for name in ("floor_constant", "floor_speckle")
+        if name in results.floors
+    }
+    chart = Chart(score, methods, results.layout.privileged, floors)
+    quality_bars(folder / "quality-bars.png", table, chart)
+    bars = "Mean over targets with its 95 % interval. Vertical lines: the floor. Hatched: the ceiling."
+    drawn = [Drawn(f"{FOLDER}/quality-bars.png", f"{score.axis} by method and display. {bars}")]
+    values = {
+        condition: pd.DataFrame(
+            {name: results.values(name, condition) for name in results.methods(condition)}, index=results.targets
+        ).dropna(axis=1, how="all")
+        for condition in results.conditions
+    }
+    values = {condition: frame for condition, frame in values.items() if not frame.empty}
+    target_dots(folder / "quality-by-target.png", values, chart)
+    dots = "A dot is a target, a line joins the same target across methods (a gap is a hole), a bar is the mean."
+    drawn.append(Drawn(f"{FOLDER}/quality-by-target.png", f"{score.axis} of every target. {dots}"))
+    timed = table[(table["seconds"] > 0) & np.isfinite(table[score.key])]
+    if timed["method"].nunique() > 3:
+        quality_against_time(folder / "quality-time.png", table, chart)
+        time = f"{score.axis} against computing time per target, mean and 95 % interval."
+        drawn.append(Drawn(f"{FOLDER}/quality-time.png", time))
+    return drawn
+
+
+def _comparison(results: Results, output: Path, condition: str, stem: str, absent: list[str]) -> Iterator[Drawn]:
+    store = Store(output)
+    pictures = {target: load_picture(store.target_thumbnail(target)) for target in results.targets}
+    absent += [store.target_thumbnail(target).name for target, picture in pictures.items() if picture is None]
+    targets = {target: picture for target, picture in pictures.items() if picture is not None}
+    methods = results.methods(condition)
+    if not targets or not methods:
+        return
+    shown = _selection(results, condition, targets)
+    tiles = {
+        (name, target): _tile(results, store, (name, condition, target), targets[target].shape, absent)
+        for name in methods
+        for target in shown
+    }
+    errors = [error_map(tile.picture, targets[key[1]]) for key, tile in tiles.items() if tile.picture is not None]
+    if not errors:
+        return
+    pages = [(a, b) for a in chunks(shown, TARGETS_A_PAGE) for b in chunks(methods, METHODS_A_PAGE)]
+    scale = error_ceiling(errors)
+    for number, (rows, labels) in enumerate(pages, start=1):
+        columns = [Column(label(results, name), tuple(tiles[name, row] for row in rows)) for name in labels]
+        page = f", page {number} of {len(pages)}" if len(pages) > 1 else ""
+        path = f"{FOLDER}/comparison-{stem}-{number}.png"
+        title = f"{condition}: targets and matched captures{page}"
+        draw_comparison(output / path, title, [(row, targets[row]) for row in rows], columns, scale)
+        yield Drawn(path, _caption(results, condition, page, len(shown)))
+
+
+def _caption(results: Results, condition: str, page: str, shown: int) -> str:
+    total = len(results.targets)
+    chosen = "every target" if shown == total else f"{shown} of {total} targets, evenly spaced from worst to best"
+    return (
+        f"Captures on {condition}{page}: {chosen}. Each capture is registered, matched in intensity and sRGB-encoded; "
+        "below it, the most detailed window of the target enlarged twice as much, and the absolute error in sRGB."
+    )
+
+
+def _selection(results: Results, condition: str, targets: dict[str, Picture]) -> list[str]:
+    """All targets if they fit; else evenly spaced ones from worst to best by their mean over methods."""
+    tall, wide = tile_size(next(iter(targets.values())).shape)
+    row = 1.5 * tall * wide * (1 + len(results.methods(condition)))
+    most = int(min(TARGETS_SHOWN, max(2, PIXELS // row)))
+    if len(targets) <= most:
+        return list(targets)
+    values = np.vstack([results.values(name, condition) for name in results.methods(condition)])
+    known = np.isfinite(values)
+    means = np.where(known, values, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    sign = 1 if results.headline.higher_is_better else -1
+    quality = dict(zip(results.targets, sign * means, strict=True))
+    return spread(sorted(targets, key=lambda target: quality[target]), most)
+
+
+def _tile(results: Results, store: Store, place: tuple[str, str, str], shape: Sequence[int], absent: list[str]) -> Tile:
+    """The capture of the first repeat that is done, with its own scores; without one, the reason in its place."""
+    name, condition, target = place
+    cells = results.cells(name, condition)
+    cells = cells[cells["target"] == target]
+    if cells.empty:
+        return Tile(None, "not planned")
+    done = cells[cells["state"] == DONE]
+    if done.empty:
+        return Tile(None, f"{cells.iloc[0]['state']}: {cells.iloc[0]['reason']}")
+    cell = done.iloc[0]
+    file = store.thumbnail(str(cell["cell"]))
+    picture = load_picture(file)
+    if picture is None:
+        absent.append(file.name)
+        return Tile(None, "no thumbnail of this capture")
+    if picture.shape != tuple(shape):
+        return Tile(None, f"thumbnail is {picture.shape[1]} x {picture.shape[0]}, target {shape[1]} x {shape[0]}")
+    scores = [results.headline, *(s for s in leading_scores(results) if s.metric == "ssim")]
+    return Tile(picture, "   ".join(f"{s.title} {s.with_unit(float(cell[s.key]))}" for s in scores))
+
+
+def _stages(results: Results, folder: Path) -> list[Drawn]:
+    """Pictures of the bench's stages, drawn elsewhere, where they are."""
+    profiles = [name for name in dict.fromkeys(results.frame["profile"]) if name]
+    found = [name for name in profiles if (folder / f"stages-{name}.png").is_file()]
+    return [Drawn(f"{FOLDER}/stages-{name}.png", f"Stages of the simulated bench {name}.") for name in found]

@@ -1,0 +1,102 @@
+"""The pictures behind a comparison figure: thumbnails of targets and captures, the crop to enlarge, the error map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.io import imread
+
+Picture = NDArray[np.float64]
+
+CROP_FRACTION = 4
+"""The enlarged window is a quarter of the picture in each direction."""
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A window of a picture, in pixels."""
+
+    top: int
+    left: int
+    height: int
+    width: int
+
+    def of(self, picture: Picture) -> Picture:
+        """The window of ``picture`` ``(h, w, 3)``; a view."""
+        return picture[self.top : self.top + self.height, self.left : self.left + self.width]
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One capture in a comparison: the picture ``(h, w, 3)`` sRGB in [0, 1], or None and the note why it is absent."""
+
+    picture: Picture | None
+    note: str
+
+
+@dataclass(frozen=True)
+class Column:
+    """All captures of one method under one condition, in the order of the figure's targets."""
+
+    title: str
+    tiles: tuple[Tile, ...]
+
+
+def load_picture(path: Path) -> Picture | None:
+    """A thumbnail as ``(h, w, 3)`` sRGB values in [0, 1]; None when the file is not there."""
+    if not path.is_file():
+        return None
+    picture = np.asarray(imread(path), dtype=np.float64) / 255
+    if picture.ndim == 2:
+        picture = np.repeat(picture[..., None], 3, axis=2)
+    return picture[..., :3]
+
+
+def most_detailed(target: Picture) -> Crop:
+    """The window of ``target`` with the largest summed gradient magnitude; the first one where windows tie."""
+    height, width = target.shape[:2]
+    rows, columns = max(1, height // CROP_FRACTION), max(1, width // CROP_FRACTION)
+    vertical, horizontal = np.gradient(target.mean(axis=2))
+    detail = np.hypot(vertical, horizontal)
+    summed = np.pad(detail.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    windows = summed[rows:, columns:] - summed[:-rows, columns:] - summed[rows:, :-columns] + summed[:-rows, :-columns]
+    # Six decimals: summation order must not decide between equal windows.
+    top, left = np.unravel_index(int(np.argmax(np.round(windows, 6))), windows.shape)
+    return Crop(int(top), int(left), rows, columns)
+
+
+def error_map(capture: Picture, target: Picture) -> NDArray[np.float64]:
+    """``(h, w)`` absolute difference of sRGB values, mean over the three channels, in [0, 1]."""
+    error: NDArray[np.float64] = np.abs(capture - target).mean(axis=2)
+    return error
+
+
+def halved(picture: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean over 2 x 2 blocks, ``(h, w) -> (h // 2, w // 2)``, so that a map drawn at half size keeps its mean."""
+    height, width = picture.shape[0] // 2, picture.shape[1] // 2
+    blocks = picture[: 2 * height, : 2 * width].reshape(height, 2, width, 2)
+    means: NDArray[np.float64] = blocks.mean(axis=(1, 3))
+    return means
+
+
+def error_ceiling(errors: Sequence[NDArray[np.float64]]) -> float:
+    """The upper end of the shared error scale: the 99th percentile of all errors, rounded up to a tenth."""
+    high = float(np.quantile(np.concatenate([error.ravel() for error in errors]), 0.99))
+    return min(1.0, max(0.1, math.ceil(high * 10 - 1e-9) / 10))
+
+
+def spread(names: Sequence[str], most: int) -> list[str]:
+    """``most`` of ``names``, evenly spaced from first to last, in their order; ``2 <= most <= len(names)``."""
+    picks = np.linspace(0, len(names) - 1, most).round().astype(int)
+    return [names[index] for index in picks]
+
+
+def chunks(names: Sequence[str], size: int) -> Iterator[list[str]]:
+    """Consecutive pieces of ``names`` of at most ``size``."""
+    for start in range(0, len(names), size):
+        yield list(names[start : start + size])

@@ -1,0 +1,70 @@
+"""What the tables need to know of a study: which rows there should be, in which order, and how they are marked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from .. import registry
+from ..study.bench import condition
+from ..study.plan import scored_dataset
+
+if TYPE_CHECKING:
+    from ..config import Study
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The rows of a study's tables.
+
+    pairs: (method label, condition) of every planned row, in the order of the config: methods, then conditions.
+    targets: what every pair is measured on, in the order of the dataset; seed: of the study.
+    baseline: label that every method is tested against (None: no such tests).
+    headline: score key of the headline metric, such as ``psnr_linear``.
+    privileged: labels of methods that may differentiate through the bench; they are the ceiling, not competitors.
+    reported: published figures by label, ``{label: {metric: value}}``, and where they were published.
+    """
+
+    title: str
+    pairs: tuple[tuple[str, str], ...]
+    targets: tuple[str, ...]
+    seed: int = 0
+    headline: str = "psnr_linear"
+    baseline: str | None = None
+    privileged: frozenset[str] = frozenset()
+    reported: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    reported_source: str = ""
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Method labels in the order of the config."""
+        return tuple(dict.fromkeys(label for label, _ in self.pairs))
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions in the order of the config."""
+        return tuple(dict.fromkeys(condition for _, condition in self.pairs))
+
+    @property
+    def reported_metrics(self) -> tuple[str, ...]:
+        """Names of the published figures, in the order in which the config first names them."""
+        return tuple(dict.fromkeys(name for row in self.reported.values() for name in row))
+
+
+def layout_of(study: Study) -> Layout:
+    """The layout of a checked study. Reads its profiles and lists its dataset; computes nothing."""
+    display, reported = study.display, study.reported
+    names = {source: condition(source, display.panel, study.folder).name for source in display.profiles}
+    methods = {entry.label: registry.find("methods", entry.name, study.folder) for entry in study.methods}
+    return Layout(
+        title=study.title,
+        pairs=tuple((entry.label, names[source]) for entry in study.methods for source in entry.profiles),
+        targets=tuple(scored_dataset(study).items()),
+        seed=study.seed,
+        headline=study.headline,
+        baseline=study.baseline,
+        privileged=frozenset(label for label, method in methods.items() if getattr(method, "privileged", False)),
+        reported=reported.rows if reported else {},
+        reported_source=reported.source if reported else "",
+    )

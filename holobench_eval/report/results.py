@@ -1,0 +1,138 @@
+"""The numbers of a study, ready to be asked: values by target, ranks, paired tests, floors."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from ..errors import UserError, suggest
+from ..study.plan import FLOORS, REFERENCE
+from .layout import Layout
+from .scores import Score, parse
+from .statistics import Array, PairedTest, holm, paired_test
+from .tables import DONE, per_target, score_columns, table_from_records
+
+
+@dataclass(frozen=True)
+class Results:
+    """A records frame with the layout of its study; see ``tables.records_frame``."""
+
+    frame: pd.DataFrame
+    layout: Layout
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """A row per method and condition, as in table.csv."""
+        return table_from_records(self.frame, self.layout)
+
+    @cached_property
+    def scores(self) -> list[Score]:
+        """Every score of the records, in the order of the tables."""
+        return [parse(key) for key in score_columns(self.frame)]
+
+    @cached_property
+    def headline(self) -> Score:
+        """The headline metric. UserError when no record has it, though some were scored."""
+        keys = score_columns(self.frame)
+        if keys and self.layout.headline not in keys:
+            plain = [score.key for score in self.scores if score.domain and not score.variant]
+            raise UserError(
+                f"headline '{self.layout.headline}' is in no record; {suggest(self.layout.headline, plain)}"
+            )
+        return parse(self.layout.headline)
+
+    @cached_property
+    def targets(self) -> list[str]:
+        """Names of the targets, those of the dataset first and in its order."""
+        return list(dict.fromkeys([*self.layout.targets, *self.frame["target"]]))
+
+    @cached_property
+    def conditions(self) -> list[str]:
+        """Conditions that have rows, without the reference."""
+        return [name for name in dict.fromkeys(self.table["condition"]) if name != REFERENCE]
+
+    def methods(self, condition: str) -> list[str]:
+        """Labels with a row under ``condition``, in the order of the table."""
+        return list(self.table.loc[self.table["condition"] == condition, "method"])
+
+    def row(self, label: str, condition: str) -> pd.Series:
+        """A row of the table."""
+        found = self.table[(self.table["method"] == label) & (self.table["condition"] == condition)]
+        return found.iloc[0]
+
+    def cells(self, label: str, condition: str) -> pd.DataFrame:
+        """The records of a method under a condition."""
+        return self.frame[(self.frame["method"] == label) & (self.frame["condition"] == condition)]
+
+    def values(self, label: str, condition: str, key: str | None = None) -> Array:
+        """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
+        rows = self.cells(label, condition)
+        if (key or self.headline.key) not in rows:
+            return np.full(len(self.targets), np.nan)
+        return per_target(rows, key or self.headline.key).reindex(self.targets).to_numpy(dtype=np.float64)
+
+    def complete(self, condition: str, key: str | None = None) -> list[str]:
+        """Unprivileged methods with a value for every target: the only means that may be ranked."""
+        return [
+            label
+            for label in self.methods(condition)
+            if label not in self.layout.privileged and not np.isnan(self.values(label, condition, key)).any()
+        ]
+
+    def ranking(self, condition: str, key: str | None = None) -> list[str]:
+        """Complete unprivileged methods, best mean first."""
+        score = parse(key) if key else self.headline
+        sign = -1 if score.higher_is_better else 1
+        return sorted(self.complete(condition, key), key=lambda label: sign * self.values(label, condition, key).mean())
+
+    @cached_property
+    def floors(self) -> list[str]:
+        """Names of the reference rows that have a headline score."""
+        rows = (name for name in FLOORS if name in self.methods(REFERENCE))
+        return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.key])]
+
+    @cached_property
+    def holes(self) -> pd.DataFrame:
+        """The records without a score."""
+        return self.frame[self.frame["state"] != DONE]
+
+    @cached_property
+    def against_baseline(self) -> list[PairedTest]:
+        """Every method against the baseline; one family of tests per condition."""
+        baseline = self.layout.baseline
+        return [
+            test
+            for condition in self.conditions
+            if baseline in self.methods(condition)
+            for test in self._family(
+                condition, ((str(baseline), other) for other in self.methods(condition) if other != baseline)
+            )
+        ]
+
+    @cached_property
+    def between_all(self) -> list[PairedTest]:
+        """Every method against every other; one family of tests per condition."""
+        return [
+            test
+            for condition in self.conditions
+            for test in self._family(condition, itertools.combinations(self.methods(condition), 2))
+        ]
+
+    def _family(self, condition: str, pairs: Iterable[tuple[str, str]]) -> list[PairedTest]:
+        tests = [
+            paired_test(condition, first, second, (self.values(first, condition), self.values(second, condition)))
+            for first, second in pairs
+        ]
+        corrected = holm([test.p for test in tests])
+        return [replace(test, p_holm=p) for test, p in zip(tests, corrected, strict=True)]
+
+    def floor_difference(self, label: str, condition: str, floor: str) -> float:
+        """Mean headline difference of a method to a floor row, over the targets that both have."""
+        difference = self.values(label, condition) - self.values(floor, REFERENCE)
+        known = difference[np.isfinite(difference)]
+        return float(known.mean()) if known.size else float("nan")

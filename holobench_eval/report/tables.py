@@ -1,0 +1,160 @@
+"""records.csv, a row a cell, and table.csv, a row per method and condition, computed from the former alone.
+
+Numbers are rounded to six significant digits once, when records become a frame; everything after is computed from the
+rounded numbers. So table.csv computed from a records.csv that was read back has the same bytes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..errors import UserError
+from ..study.identity import digest
+from ..study.plan import FLOORS, REFERENCE
+from .layout import Layout
+from .scores import order_scores, parse
+from .statistics import bootstrap_mean
+
+TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
+MEASURED_COLUMNS = ("captures", "seconds", "registration_residual_px", "saturated")
+IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol")
+
+_NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
+_NOT_SCORES = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
+DONE = "done"
+
+
+def format_number(value: float) -> str:
+    """Six significant digits; empty for NaN."""
+    return "" if np.isnan(value) else f"{value:.6g}"
+
+
+def _rounded(value: Any) -> float:
+    return float("nan") if value is None else float(f"{float(value):.6g}")
+
+
+def _row(record: Mapping[str, Any], identity: str) -> dict[str, Any]:
+    cell = record["cell"]
+    text = {
+        "method": record["label"],
+        "name": cell["method"],
+        "condition": cell["condition"],
+        "target": cell["target"],
+        "state": record["state"],
+        "reason": " ".join(str(record.get("reason", "")).split()),
+        "cell": identity,
+        **{key: cell.get(key, "") for key in IDENTITY_COLUMNS[1:]},
+    }
+    scores = record.get("scores", {}) if record["state"] == DONE else {}
+    numbers = {
+        "repeat": cell.get("repeat", 0),
+        **{key: record.get(key) for key in MEASURED_COLUMNS},
+        **scores,
+    }
+    clash = set(scores) & _NOT_SCORES
+    if clash:
+        raise UserError(f"record {identity}: score named like a column of records.csv: {', '.join(sorted(clash))}")
+    return {key: str(value) for key, value in text.items()} | {key: _rounded(value) for key, value in numbers.items()}
+
+
+def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.DataFrame:
+    """A row a cell, in an order that does not depend on the order of the records.
+
+    records: as ``study.store.Store.load`` gives them, one for every planned cell, those without a score included.
+    """
+    rows = [_row(record, digest(record["cell"])) for record in records]
+    frame = pd.DataFrame(rows)
+    # Without any score the headline still has its column, empty, so that the holes have a table to show in.
+    scores = order_scores(column for column in frame.columns if column not in _NOT_SCORES) or [layout.headline]
+    columns = ["method", "name", "condition", "target", "repeat", "state", "reason"]
+    frame = frame.reindex(columns=[*columns, *scores, *MEASURED_COLUMNS, *IDENTITY_COLUMNS])
+    return _sorted(frame, layout)
+
+
+def row_order(frame: pd.DataFrame, layout: Layout) -> list[tuple[str, str]]:
+    """(method, condition) of every row: planned pairs, pairs outside the plan by name, then the reference rows."""
+    found = set(zip(frame["method"], frame["condition"], strict=True))
+    floors = [(name, REFERENCE) for name in FLOORS if (name, REFERENCE) in found]
+    extra = sorted(found - set(layout.pairs) - set(floors))
+    return [*(pair for pair in layout.pairs if pair in found), *extra, *floors]
+
+
+def _sorted(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
+    rank = {pair: index for index, pair in enumerate(row_order(frame, layout))}
+    target_rank = {target: index for index, target in enumerate(layout.targets)}
+    pairs = zip(frame["method"], frame["condition"], strict=True)
+    ordered = frame.assign(
+        _row=[rank[pair] for pair in pairs],
+        _target=[target_rank.get(target, len(target_rank)) for target in frame["target"]],
+    )
+    ordered = ordered.sort_values(["_row", "_target", "target", "repeat", "cell"], kind="stable")
+    return ordered.drop(columns=["_row", "_target"]).reset_index(drop=True)
+
+
+def score_columns(frame: pd.DataFrame) -> list[str]:
+    """The score columns of a records frame, in their order."""
+    return [str(column) for column in frame.columns if column not in _NOT_SCORES]
+
+
+def per_target(rows: pd.DataFrame, score: str) -> pd.Series:
+    """One value per target of the done cells in ``rows``, repeats averaged; targets in the order of the rows."""
+    done = rows[rows["state"] == DONE]
+    return done.groupby("target", sort=False)[score].mean()
+
+
+def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
+    """A row per method and condition: means over targets with 95 % bootstrap intervals.
+
+    ``n`` counts targets with at least one done cell and ``failed`` counts cells without a score. A metric that only
+    some of the ``n`` targets have is left empty, so that its mean always stands for the ``n`` beside it; figures that
+    describe the capture, such as the speckle contrast of flat patches, are means over the targets that have them.
+    """
+    groups = dict(list(frame.groupby(["method", "condition"], sort=False)))
+    scores = score_columns(frame)
+    rows = [_table_row(groups[pair], pair, scores, layout) for pair in row_order(frame, layout)]
+    return pd.DataFrame(rows)
+
+
+def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str], layout: Layout) -> dict[str, Any]:
+    label, condition = pair
+    done = rows[rows["state"] == DONE]
+    n = done["target"].nunique()
+    row: dict[str, Any] = {"method": label, "condition": condition, "n": n, "failed": len(rows) - len(done)}
+    for score in scores:
+        values = per_target(done, score).dropna().to_numpy()
+        estimate = bootstrap_mean(values if values.size == n or not parse(score).domain else [])
+        row |= {score: estimate.mean, f"{score}_lo": estimate.low, f"{score}_hi": estimate.high}
+    row |= {"captures": done["captures"].mean(), "seconds": done["seconds"].mean()}
+    published = layout.reported.get(label, {})
+    return row | {f"reported_{name}": published.get(name, np.nan) for name in layout.reported_metrics}
+
+
+def csv_text(frame: pd.DataFrame) -> str:
+    """The frame as CSV with fixed formatting: the same numbers give the same bytes."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(frame.columns)
+    for row in frame.itertuples(index=False):
+        writer.writerow([value if isinstance(value, str) else format_number(value) for value in row])
+    return text.getvalue()
+
+
+def read_records(text: str) -> pd.DataFrame:
+    """The records frame from the text of records.csv; inverse of :func:`csv_text` on such a frame."""
+    frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+    lacking = _NOT_SCORES - set(frame.columns)
+    if lacking:
+        raise UserError(
+            f"records.csv lacks the columns {', '.join(sorted(lacking))}; it was written by another version"
+        )
+    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS}
+    for column in frame.columns:
+        if column not in text_columns:
+            frame[column] = [float(value) if value else np.nan for value in frame[column]]
+    return frame

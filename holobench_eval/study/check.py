@@ -1,0 +1,56 @@
+"""Are committed reports still what their studies say? Re-checked without computing a cell."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..config import load_study
+from ..errors import UserError
+from . import provenance
+from .bench import condition
+
+if TYPE_CHECKING:
+    from ..config import Study
+
+
+def check(folder: Path) -> tuple[int, list[str]]:
+    """Number of reports in a folder, and a line for everything that no longer holds."""
+    reports = sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
+    if not reports:
+        raise UserError(f"{folder}: no reports in this folder (looked for */{provenance.FILE})")
+    return len(reports), [f"{report}: {problem}" for report in reports for problem in _problems(report)]
+
+
+def _problems(report: Path) -> Iterator[str]:
+    try:
+        known = provenance.read(report)
+        lacking = [key for key in ("config", "config_sha256", "profiles") if key not in known]
+        if lacking:
+            raise UserError(f"{provenance.FILE} lacks {', '.join(lacking)}")
+        study = load_study(report / str(known["config"]))
+        yield from _study_problems(study, known)
+        yield from _table_problems(report, study)
+    except (UserError, OSError) as error:
+        yield str(error)
+
+
+def _study_problems(study: Study, known: dict[str, Any]) -> Iterator[str]:
+    if hashlib.sha256(study.text.encode()).hexdigest() != known["config_sha256"]:
+        yield "the config has changed since the report was made; run the study again"
+    for source in study.display.profiles:
+        place = condition(source, study.display.panel, study.folder)
+        now = {"version": place.version, "sha256": place.digest}
+        then = dict(known["profiles"]).get(place.name)
+        if then != now:
+            yield f"profile '{place.name}' was {then}, is now {now}; run the study again"
+
+
+def _table_problems(report: Path, study: Study) -> Iterator[str]:
+    from ..report import layout_of, recompute_table
+
+    again = recompute_table((report / "records.csv").read_text(encoding="utf-8"), layout_of(study))
+    if again != (report / "table.csv").read_text(encoding="utf-8"):
+        yield "table.csv does not follow from records.csv; run 'holoeval report' on its config"

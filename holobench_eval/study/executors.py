@@ -1,0 +1,116 @@
+"""Where tasks are computed: in this process, or in several processes of this machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from ..errors import UserError, suggest
+
+J = TypeVar("J")
+R = TypeVar("R")
+
+
+class Executor(Protocol):
+    """Runs a function over jobs.
+
+    ``map`` takes a job from the iterable when it starts it, and yields (job, result) as results come, in any
+    order; a job whose worker was lost gives the exception instead of a result.
+    """
+
+    @property
+    def workers(self) -> int:
+        """Jobs computed side by side."""
+        ...
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R | Exception]]:
+        """Results of ``function`` over ``jobs``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Serial:
+    """One job after the other, in this process."""
+
+    workers: int = 1
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R | Exception]]:
+        """Results in the order of the jobs."""
+        for job in jobs:
+            yield job, function(job)
+
+
+@dataclass(frozen=True)
+class Local:
+    """Jobs in worker processes of this machine (Dask). A worker that dies costs one job, after a second try."""
+
+    workers: int
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R | Exception]]:
+        """Results as they come. No more jobs are taken than there are workers."""
+        import dask
+        from distributed import Client, LocalCluster, as_completed
+
+        # A worker lost twice on the same job is the job's fault; and no worker may die because others fill the memory.
+        settings = {"distributed.scheduler.allowed-failures": 1, "distributed.logging.distributed": "critical"}
+        with (
+            dask.config.set(settings),
+            LocalCluster(  # type: ignore[no-untyped-call]
+                n_workers=self.workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=0,
+                dashboard_address=None,
+                silence_logs=50,
+            ) as cluster,
+            Client(cluster) as client,  # type: ignore[no-untyped-call]
+        ):
+            client.register_plugin(_interrupts_for_the_parent())
+            waiting = iter(jobs)
+            running: dict[Any, J] = {}
+            completed = as_completed()  # type: ignore[no-untyped-call]
+
+            def start() -> None:
+                for job in waiting:
+                    future = client.submit(function, job, pure=False)
+                    running[future] = job
+                    completed.add(future)  # type: ignore[no-untyped-call]
+                    return
+
+            for _ in range(self.workers):
+                start()
+            for future in completed:
+                job = running.pop(future)
+                error = future.exception()
+                yield job, error if error is not None else future.result()
+                start()
+
+
+def _interrupts_for_the_parent() -> Any:
+    """A plugin by which every worker, a restarted one too, leaves Ctrl-C to the process that started it."""
+    from distributed import WorkerPlugin
+
+    class IgnoreInterrupts(WorkerPlugin):
+        def setup(self, worker: object) -> None:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return IgnoreInterrupts()
+
+
+NAMES = ("serial", "local")
+
+
+def executor(name: str, workers: int | None) -> Executor:
+    """The executor of a name; ``workers`` defaults to the number of processors."""
+    if name not in NAMES:
+        raise UserError(f"unknown executor '{name}'; {suggest(name, NAMES)}")
+    if workers is not None and workers < 1:
+        raise UserError(f"--workers should be at least 1, got {workers}")
+    if name == "serial":
+        if workers not in (None, 1):
+            raise UserError(f"--workers {workers} needs --executor local; the serial executor has one")
+        return Serial()
+    return Local(workers or len(os.sched_getaffinity(0)))

@@ -1,0 +1,68 @@
+"""What a cell is, in plain words, and the hash that names it."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import inspect
+import json
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from ..errors import UserError
+
+
+def canonical(description: Any) -> str:
+    """JSON text that depends on the content only: sorted keys, no spaces, ASCII, finite numbers."""
+    try:
+        return json.dumps(description, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise UserError(f"not a plain description: {error}; use text, finite numbers, lists and mappings") from error
+
+
+def digest(description: Any) -> str:
+    """sha256 of the canonical text, 64 hexadecimal digits."""
+    return hashlib.sha256(canonical(description).encode()).hexdigest()
+
+
+def params_of(plugin: Any) -> dict[str, Any]:
+    """Every parameter of a method or dataset as plain JSON values, defaults included."""
+    from pydantic import TypeAdapter
+
+    params: dict[str, Any] = TypeAdapter(type(plugin)).dump_python(plugin, mode="json")
+    canonical(params)
+    return params
+
+
+def code_digest(cls: type[Any]) -> str:
+    """sha256 of the code that defines a class, without comments and docstrings.
+
+    It covers the files of the class and its bases, and the modules beside them that they import
+    (``from .losses import ...``); other imports are not followed. As part of a cell's identity it has cells
+    computed again after a change of the method, but not after a change of its documentation.
+    """
+    members = [member for base in cls.__mro__ for member in vars(base).values()]
+    functions = [inspect.unwrap(member) for member in members if inspect.isfunction(member)]
+    waiting = {Path(function.__code__.co_filename) for function in functions}
+    code: dict[Path, str] = {}
+    while waiting:
+        file = waiting.pop()
+        if file not in code and file.is_file():
+            code[file], beside = _code(file, file.stat().st_mtime_ns)
+            waiting |= beside
+    return digest(sorted(code.values()))
+
+
+@lru_cache(maxsize=64)
+def _code(file: Path, _modified: int) -> tuple[str, frozenset[Path]]:
+    """A file's code in one normal form, and the files beside it that it imports; cached until it is modified."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    beside = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            node.body = node.body[1:] or [ast.Pass()]
+        if isinstance(node, ast.ImportFrom) and node.level == 1:
+            modules = [node.module] if node.module else [alias.name for alias in node.names]
+            beside |= {file.parent.joinpath(*module.split(".")).with_suffix(".py") for module in modules}
+    return ast.unparse(tree), frozenset(beside)

@@ -1,0 +1,204 @@
+"""The grid of cells of a study: which number is measured how. Nothing is computed or written here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from .. import registry
+from ..errors import UserError
+from .bench import Condition, condition
+from .identity import code_digest, digest
+
+if TYPE_CHECKING:
+    from ..config import MethodEntry, Study
+
+REFERENCE = "reference"
+"""The condition of the floor cells."""
+Made = tuple[str, str, Mapping[str, Any]]
+"""Method, digest of its code, parameters."""
+FLOORS = (
+    "floor_constant",
+    "floor_black",
+    "floor_speckle",
+    "floor_wrong_target",
+    "floor_mirrored",
+    "floor_shift_1px",
+)
+"""What a study without any display would score: see ``holobench_eval.metrics.references``."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One number of every table: the plain description that is hashed to name its record.
+
+    method: registered name or ``file.py:Class``; method_sha256: its code (``identity.code_digest``); params:
+    all of them; target_sha256: digest of the source image; profile_version, profile_sha256: of the display;
+    panel: rows and columns in pixels; condition: name of the display, or ``reference`` for the floor;
+    repeat, seed: names of the noise; metrics: name and version of every metric that can be computed here.
+    """
+
+    method: str
+    method_sha256: str
+    params: Mapping[str, Any]
+    dataset: str
+    dataset_params: Mapping[str, Any]
+    target: str
+    target_sha256: str
+    profile: str
+    profile_version: int
+    profile_sha256: str
+    panel: tuple[int, int]
+    condition: str
+    repeat: int
+    seed: int
+    protocol: str
+    metrics: tuple[str, ...]
+    exposure: Literal["equal", "matched"]
+
+    def description(self) -> dict[str, Any]:
+        """The cell as plain JSON values."""
+        return {**asdict(self), "panel": list(self.panel), "metrics": list(self.metrics)}
+
+    @cached_property
+    def id(self) -> str:
+        """sha256 of the description: the name of the record."""
+        return digest(self.description())
+
+
+@dataclass(frozen=True)
+class Task:
+    """Cells that share one solution: a method solves a target once, and the phase is shown on each of the
+    displays.
+
+    conditions: the display of each cell; the method meets the first one while it solves. A floor task has no
+    solution and one display, which gives the size of the scored region.
+    """
+
+    label: str
+    cells: tuple[Cell, ...]
+    conditions: tuple[Condition, ...]
+
+    @property
+    def is_floor(self) -> bool:
+        """Whether the cells are references that no method made."""
+        return self.cells[0].condition == REFERENCE
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Every task of a study, in the order in which they are run and reported."""
+
+    tasks: tuple[Task, ...]
+
+    def labelled(self) -> Iterator[tuple[str, Cell]]:
+        """(label in tables, cell) of every cell; the label of a floor cell is its method."""
+        for task in self.tasks:
+            for cell in task.cells:
+                yield (cell.method if task.is_floor else task.label), cell
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Every cell."""
+        return tuple(cell for task in self.tasks for cell in task.cells)
+
+
+def scored_dataset(study: Study) -> Any:
+    """The dataset whose images are scored. UserError for one that methods may train on."""
+    targets = study.targets
+    dataset = registry.build("datasets", targets.dataset, dict(targets.params), study.folder)
+    if getattr(dataset, "training", False):
+        raise UserError(
+            f"dataset '{targets.dataset}' holds training images, which are never scored; choose another one"
+        )
+    return dataset
+
+
+def plan(study: Study) -> Plan:
+    """The grid of a study. Reads profiles and the digests of target images, and nothing else."""
+    dataset = scored_dataset(study)
+    targets = [(item, dataset.digest(item)) for item in dataset.items()]
+    shown = {source: condition(source, study.display.panel, study.folder) for source in study.display.profiles}
+    ground = _Ground(study, _metrics(study))
+    first = next(iter(shown.values()))
+    tasks = [ground.floor(first, target, targets[(i + 1) % len(targets)]) for i, target in enumerate(targets)]
+    for entry in study.methods:
+        tasks += ground.solutions(entry, [shown[source] for source in entry.profiles], targets)
+    return Plan(tuple(tasks))
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What all cells of a study have in common."""
+
+    study: Study
+    metrics: tuple[str, ...]
+
+    def cell(self, target: tuple[str, str], place: Condition, condition: str, repeat: int, made: Made) -> Cell:
+        """A cell; ``target`` is a name and its digest, ``made`` says by what the picture is made."""
+        study = self.study
+        method, code, params = made
+        return Cell(
+            method=method,
+            method_sha256=code,
+            params=params,
+            dataset=study.targets.dataset,
+            dataset_params=study.targets.params,
+            target=target[0],
+            target_sha256=target[1],
+            profile=place.name,
+            profile_version=place.version,
+            profile_sha256=place.digest,
+            panel=place.spec.shape,
+            condition=condition,
+            repeat=repeat,
+            seed=study.seed,
+            protocol=study.protocol.version,
+            metrics=self.metrics,
+            exposure=study.display.exposure,
+        )
+
+    def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[tuple[str, str]]) -> Iterator[Task]:
+        """A task for every solution of a method: target by target, repeat by repeat."""
+        cls = registry.find("methods", entry.name, self.study.folder)
+        made = (entry.name, code_digest(cls), entry.params)
+        for group in _sharing(cls, shown):
+            for target in targets:
+                for repeat in range(self.study.repeats):
+                    cells = (self.cell(target, place, place.name, repeat, made) for place in group)
+                    yield Task(entry.label, tuple(cells), group)
+
+    def floor(self, place: Condition, target: tuple[str, str], wrong: tuple[str, str]) -> Task:
+        """The references of a target; ``wrong`` is the target that is shown in its place."""
+        shown = {"target": wrong[0], "target_sha256": wrong[1]}
+        params = {name: shown if name == "floor_wrong_target" else {} for name in FLOORS}
+        if wrong == target:
+            del params["floor_wrong_target"]
+        cells = tuple(self.cell(target, place, REFERENCE, 0, (name, "", given)) for name, given in params.items())
+        return Task("floor", cells, (place,) * len(cells))
+
+
+def _metrics(study: Study) -> tuple[str, ...]:
+    """Name and version of every metric that can be computed here: LPIPS needs weights that may come later."""
+    from ..metrics import catalogue
+
+    weights = study.protocol.lpips_weights
+    known = catalogue(None if weights is None else Path(weights))
+    return tuple(f"{metric.name} {metric.version}" for metric in known if metric.available() is None)
+
+
+def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ...]]:
+    """Displays grouped so that one solution serves a group.
+
+    A method that neither captures nor looks into the bench knows only the nominal optics, so displays with equal
+    nominal optics get the same phase from it.
+    """
+    if getattr(cls, "camera", False) or getattr(cls, "privileged", False):
+        return [(place,) for place in shown]
+    groups: dict[Any, list[Condition]] = {}
+    for place in shown:
+        groups.setdefault(replace(place.spec, name=""), []).append(place)
+    return [tuple(group) for group in groups.values()]

@@ -1,0 +1,84 @@
+"""What a study would compute, as a table, before it computes anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+from rich.table import Table
+
+from . import timings
+from .plan import Plan, Task
+from .store import Store
+
+if TYPE_CHECKING:
+    from ..config import Study
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method of a plan.
+
+    label; conditions: displays it is shown on; targets, cells: their numbers; captures: the method's own limit on
+    camera captures, if it has one; done, failed, missing: cells by state; seconds: time its missing solutions would
+    take, from the solutions that were timed before (None: none was).
+    """
+
+    label: str
+    conditions: int
+    targets: int
+    cells: int
+    captures: int | None
+    done: int
+    failed: int
+    missing: int
+    seconds: float | None
+
+
+def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int) -> list[Row]:
+    """A row per method, the floor first."""
+    limits = {entry.label: entry.params.get("captures") for entry in study.methods}
+    labels = dict.fromkeys(task.label for task in plan.tasks)
+    return [
+        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, threads, workers)
+        for label in labels
+    ]
+
+
+def _row(label: str, tasks: list[Task], limit: int | None, store: Store, threads: int, workers: int) -> Row:
+    cells = [cell for task in tasks for cell in task.cells]
+    states = [record.state if (record := store.read(cell.id)) else "missing" for cell in cells]
+    unsolved = [task for task in tasks if store.missing(task.cells)]
+    known = [timings.known(timings.key(task, threads, workers)) for task in tasks if not task.is_floor]
+    timed = [seconds for seconds in known if seconds is not None]
+    return Row(
+        label=label,
+        conditions=len({cell.condition for cell in cells}),
+        targets=len({cell.target for cell in cells}),
+        cells=len(cells),
+        captures=limit if isinstance(limit, int) else None,
+        done=states.count("done"),
+        failed=states.count("failed"),
+        missing=states.count("missing"),
+        seconds=sum(timed) / len(timed) * len(unsolved) if timed else None,
+    )
+
+
+def table(study: Study, rows: list[Row]) -> Table:
+    """The rows as a table with a line of sums."""
+    result = Table(title=escape(study.title), title_justify="left", show_footer=True)
+    result.add_column("method", footer="all", overflow="fold")
+    for name in ("conditions", "targets"):
+        result.add_column(name, justify="right")
+    for name in ("cells", "done", "failed", "missing"):
+        result.add_column(name, justify="right", footer=str(sum(getattr(row, name) for row in rows)))
+    result.add_column("captures", justify="right")
+    known = [row.seconds for row in rows if row.seconds is not None]
+    result.add_column(escape("solving [s]"), justify="right", footer=f"{sum(known):.3g}" if known else "")
+    for row in rows:
+        limit = "" if row.captures is None else str(row.captures)
+        seconds = "" if row.label == "floor" else "not timed" if row.seconds is None else f"{row.seconds:.3g}"
+        numbers = (row.conditions, row.targets, row.cells, row.done, row.failed, row.missing)
+        result.add_row(escape(row.label), *map(str, numbers), limit, seconds)
+    return result

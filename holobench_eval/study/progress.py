@@ -1,0 +1,110 @@
+"""How a run shows where it is: a live bar on a terminal, a line every few seconds elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from .plan import Task
+from .run import Watch
+from .store import Record
+
+SECONDS_BETWEEN_LINES = 5.0
+
+
+def _name(task: Task) -> str:
+    return f"{task.label} · {task.cells[0].target}"
+
+
+def _failure(record: Record) -> str:
+    cell = record.cell
+    return f"failed: {record.label} · {cell['condition']} · {cell['target']}: {record.reason}"
+
+
+@dataclass
+class Bar:
+    """A bar with the task in work, the cells done, the time left and the number of failures."""
+
+    progress: Progress
+    bar: TaskID
+    failures: int = 0
+
+    def planned(self, cells: int, missing: int) -> None:
+        """Start at the cells that have a record already."""
+        self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
+
+    def started(self, task: Task) -> None:
+        """Name the task in work."""
+        self.progress.update(self.bar, description=escape(_name(task)))
+
+    def finished(self, records: list[Record]) -> None:
+        """Advance, and print what failed above the bar."""
+        for record in records:
+            if record.state == "failed":
+                self.failures += 1
+                self.progress.console.print(escape(_failure(record)), style="red", highlight=False, soft_wrap=True)
+        self.progress.update(self.bar, advance=len(records), failures=f"{self.failures} failed" * bool(self.failures))
+
+
+@dataclass
+class Lines:
+    """Plain lines: at most one every few seconds, and one for every failure."""
+
+    write: Callable[[str], None]
+    clock: Callable[[], float] = time.monotonic
+    total: int = 0
+    done: int = 0
+    failures: int = 0
+    begun: float = field(init=False)
+    last: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.begun = self.last = self.clock()
+
+    def planned(self, cells: int, missing: int) -> None:
+        """Say what there is to do."""
+        self.total = missing
+        self.write(f"{missing} of {cells} cells to compute")
+
+    def started(self, task: Task) -> None:
+        """Name the task in work, if the last line is old enough."""
+        now = self.clock()
+        if now - self.last >= SECONDS_BETWEEN_LINES:
+            self.last = now
+            self.write(f"{self.done}/{self.total} cells, {self.failures} failed{self._left(now)}; now {_name(task)}")
+
+    def finished(self, records: list[Record]) -> None:
+        """Count, and write a line for every failure."""
+        self.done += len(records)
+        for record in records:
+            if record.state == "failed":
+                self.failures += 1
+                self.write(_failure(record))
+
+    def _left(self, now: float) -> str:
+        if not self.done:
+            return ""
+        return f", about {(now - self.begun) / self.done * (self.total - self.done):.0f} s left"
+
+
+@contextmanager
+def watching(console: Console) -> Iterator[Watch]:
+    """The watch that suits a console."""
+    if not console.is_terminal:
+        yield Lines(lambda line: console.print(line, markup=False, highlight=False, soft_wrap=True))
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("[red]{task.fields[failures]}"),
+    )
+    with Progress(*columns, console=console) as progress:
+        yield Bar(progress, progress.add_task("planning", total=None, failures=""))

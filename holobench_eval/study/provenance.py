@@ -1,0 +1,112 @@
+"""What was run, on what, and when. Times of day are only here, never in a table."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import shlex
+import subprocess
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import __version__
+from ..errors import UserError
+from .plan import Plan
+from .store import write_atomically
+from .timings import cpu_model
+
+if TYPE_CHECKING:
+    from ..config import Study
+
+PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "scikit-image", "kornia", "torchmetrics")
+FILE = "provenance.json"
+
+
+def now() -> str:
+    """The present time, UTC, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int) -> dict[str, Any]:
+    """Everything about the present run that is not in its config: versions, revision, machine, displays, command."""
+    shown = {place.name: place for task in plan.tasks for place in task.conditions}
+    return {
+        "package": __version__,
+        **_revision(),
+        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "config": os.path.relpath(study.file, output),
+        "config_sha256": hashlib.sha256(study.text.encode()).hexdigest(),
+        "profiles": {name: {"version": place.version, "sha256": place.digest} for name, place in shown.items()},
+        "python": platform.python_version(),
+        "packages": {name: _version(name) for name in PACKAGES},
+        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "cpu": cpu_model(),
+        "threads": threads,
+        "workers": workers,
+        "started": now(),
+        "ended": None,
+    }
+
+
+def _version(package: str) -> str | None:
+    """A package's version; None where it is not installed, as when another build of OpenCV takes its place."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _revision() -> dict[str, Any]:
+    """The git revision of the package and whether its files were changed since; nothing outside a checkout."""
+    folder = Path(__file__).parent
+    try:
+        _git(folder, "ls-files", "--error-unmatch", Path(__file__).name)
+        changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
+        return {"revision": _git(folder, "rev-parse", "HEAD"), "dirty": bool(changed)}
+    except (OSError, subprocess.SubprocessError):
+        return {"revision": None, "dirty": None}
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, timeout=20, check=True)
+    return done.stdout.strip()
+
+
+def begin(output: Path, provenance: dict[str, Any], resumed: bool) -> dict[str, Any]:
+    """Write ``provenance.json`` at the start of a run; runs that this one completes are kept under
+    ``earlier``.
+
+    Written first, so that a run that is killed leaves its trace beside the records it made.
+    """
+    earlier = []
+    if resumed and (before := read(output)):
+        earlier = [*before.pop("earlier", []), before]
+    return _write(output, {**provenance, "earlier": earlier})
+
+
+def end(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:
+    """Note the end of the run."""
+    return _write(output, {**provenance, "ended": now()})
+
+
+def _write(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:
+    write_atomically(output / FILE, f"{json.dumps(provenance, indent=1)}\n".encode())
+    return provenance
+
+
+def read(output: Path) -> dict[str, Any]:
+    """The provenance of an output folder, empty if there is none yet."""
+    try:
+        content = json.loads((output / FILE).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except ValueError as error:
+        raise UserError(f"{output / FILE}: not JSON ({error}); delete the file and run the study again") from error
+    if not isinstance(content, dict):
+        raise UserError(f"{output / FILE}: not a mapping; delete the file and run the study again")
+    return content

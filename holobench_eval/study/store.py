@@ -1,0 +1,169 @@
+"""One small file a cell: written whole or not at all, so that a run can be killed at any moment and resumed."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from ..errors import UserError
+from .identity import digest
+from .plan import Cell, Plan
+
+State = Literal["done", "failed", "skipped", "unavailable", "missing"]
+"""``missing`` is the state of a planned cell that has no record; ``Store.load`` gives it and no file holds it."""
+
+_TEMPORARY = ".writing-"
+
+
+@dataclass(frozen=True)
+class Record:
+    """What was measured in a cell.
+
+    cell: its description; state: ``done``, or why there is no score in ``reason``; scores: flat metric names
+    to numbers; captures: camera captures the method used; seconds: wall time of the solution; label: the
+    method's name in tables; registration_residual_px: rms error of the registration, in pixels of the scored
+    region; saturated: fraction of saturated samples. None: does not apply, as to a floor cell.
+    """
+
+    cell: dict[str, Any]
+    state: State
+    label: str
+    reason: str = ""
+    scores: dict[str, float] = field(default_factory=dict)
+    captures: int = 0
+    seconds: float | None = None
+    registration_residual_px: float | None = None
+    saturated: float | None = None
+
+    @property
+    def id(self) -> str:
+        """The name of the record: the hash of its cell."""
+        return digest(self.cell)
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file under a temporary name in the same folder, then rename it: readers see all of it or nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=_TEMPORARY, dir=path.parent)
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def file_name(text: str) -> str:
+    """A label or item as a file name in any folder; different texts get different names.
+
+    Anything but letters, digits, dot, dash and underscore becomes ``_``, and a changed name gets a part of its hash.
+    """
+    name = re.sub(r"[^A-Za-z0-9._-]", "_", text).lstrip(".")[:100]
+    return name if name and name == text else f"{name}-{digest(text)[:8]}"
+
+
+@dataclass(frozen=True)
+class Store:
+    """The records of an output folder."""
+
+    output: Path
+
+    @property
+    def folder(self) -> Path:
+        """Where the records are."""
+        return self.output / "records"
+
+    def path(self, identity: str) -> Path:
+        """The record's file."""
+        return self.folder / f"{identity}.json"
+
+    def log(self, identity: str) -> Path:
+        """The file with the traceback of a failed cell."""
+        return self.folder / f"{identity}.log"
+
+    def thumbnail(self, identity: str) -> Path:
+        """The matched, rectified capture as a small sRGB picture."""
+        return self.folder / f"{identity}.png"
+
+    def target_thumbnail(self, target: str) -> Path:
+        """The target as a small sRGB picture."""
+        return self.folder / f"target-{file_name(target)}.png"
+
+    def write(self, record: Record) -> None:
+        """Write a record, whole or not at all."""
+        text = json.dumps(asdict(record), indent=1, sort_keys=True, allow_nan=False)
+        write_atomically(self.path(record.id), f"{text}\n".encode())
+
+    def read(self, identity: str) -> Record | None:
+        """The record of a cell, None if there is none. UserError for a file that is not that record."""
+        path = self.path(identity)
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as error:
+            raise UserError(f"{path}: unreadable record ({error}); delete the file and run the study again") from error
+        return _checked(path, identity, content)
+
+    def load(self, plan: Plan) -> list[dict[str, Any]]:
+        """A record for every cell of the plan, in its order, under the plan's labels.
+
+        A cell without a record has the state ``missing``, so that no hole in a table is silent.
+        """
+        found = []
+        for label, cell in plan.labelled():
+            record = self.read(cell.id)
+            if record is None:
+                record = Record(cell.description(), "missing", label, "no record: not run")
+            found.append({**asdict(record), "label": label})
+        return found
+
+    def missing(self, cells: tuple[Cell, ...], retry_failed: bool = False) -> list[Cell]:
+        """The cells that a run has to compute: those without a record, and failed ones if they are to be retried."""
+        records = {cell.id: self.read(cell.id) for cell in cells}
+        return [
+            cell
+            for cell in cells
+            if (record := records[cell.id]) is None or (retry_failed and record.state == "failed")
+        ]
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out of the folder. The lock dies with its process, so it never outlives a kill."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with (self.folder / ".lock").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise UserError(
+                    f"{self.output}: another run is using this folder; wait for it or give --output"
+                ) from None
+            for left in self.folder.glob(f"{_TEMPORARY}*"):
+                left.unlink()
+            yield
+
+
+def _checked(path: Path, identity: str, content: Any) -> Record:
+    """The record in a file, after checking that it is one, and the one that the file's name says."""
+    names = {item.name for item in fields(Record)}
+    if not isinstance(content, dict) or set(content) != names:
+        raise UserError(f"{path}: not a record of this version; delete the file and run the study again")
+    record = Record(**content)
+    if not isinstance(record.cell, dict) or digest(record.cell) != identity:
+        raise UserError(f"{path}: holds another cell than its name says; delete the file and run the study again")
+    if record.state not in get_args(State) or not isinstance(record.scores, dict):
+        raise UserError(f"{path}: unknown state '{record.state}'; delete the file and run the study again")
+    return record

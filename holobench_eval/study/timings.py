@@ -1,0 +1,78 @@
+"""The time a solution takes is measured once on a machine and then kept.
+
+Wall time is the one number of a table that differs from run to run. So that the same command on the same
+machine gives the same table, and a run that was killed and resumed gives the table of one that was not, the
+first measurement of every solution is kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``)
+``/holobench_eval/timings/`` and later runs report it. ``holoeval run --retime`` measures again. Where the
+folder cannot be written, every run reports what it measures itself.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from .identity import digest
+from .plan import Task
+from .store import write_atomically
+
+
+def folder() -> Path:
+    """Where timings are kept."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "holobench_eval" / "timings"
+
+
+@cache
+def cpu_model() -> str:
+    """The processor's name, as far as the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return named[0] if named else platform.processor() or platform.machine()
+
+
+def key(task: Task, threads: int, workers: int) -> str:
+    """Name of a task's timing: the hash of everything its wall time should depend on."""
+    cell, place = task.cells[0], task.conditions[0]
+    return digest(
+        {
+            "method": [cell.method, cell.method_sha256, dict(cell.params)],
+            "target": [cell.target_sha256, dict(cell.dataset_params)],
+            "display": [repr(place.spec), place.digest, cell.exposure],
+            "noise": [cell.seed, cell.repeat],
+            "machine": [cpu_model(), platform.machine(), threads, workers],
+            "versions": [version("torch"), __version__],
+        }
+    )
+
+
+def known(name: str) -> float | None:
+    """The first measurement under a name [s], None if there is none."""
+    try:
+        content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
+        seconds = float(content["seconds"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    return seconds if math.isfinite(seconds) and seconds >= 0 else None
+
+
+def keep(name: str, seconds: float, again: bool = False) -> float:
+    """Note a measurement [s] and return the one to report: the first, or this one when it is measured again."""
+    first = None if again else known(name)
+    if first is not None:
+        return first
+    try:
+        write_atomically(folder() / f"{name}.json", json.dumps({"seconds": seconds}).encode())
+    except OSError:
+        return seconds
+    return seconds

@@ -1,0 +1,189 @@
+"""YAML with positions: every value knows the line and column it came from, so an error can point at it.
+
+The subset is that of the YAML 1.2 core schema (``yes`` is text, ``1e-3`` is a number), without aliases, tags
+of other kinds, duplicate keys or numbers that are not finite.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from .errors import UserError
+
+LARGEST_BYTES = 1_000_000
+DEEPEST = 20
+
+_CORE = "tag:yaml.org,2002:"
+
+Keys = tuple[str | int, ...]
+"""Where a value is: ``("methods", 2, "params")``."""
+
+
+class Position(NamedTuple):
+    """Line and column, counted from one."""
+
+    line: int
+    column: int
+
+
+@dataclass(frozen=True)
+class Document:
+    """A YAML mapping as plain Python values, and where each of them stands.
+
+    name: the path as the user gave it; text: the file's contents; keys, values: positions of every mapping
+    key and of every value.
+    """
+
+    name: str
+    text: str
+    data: dict[str, Any]
+    keys: dict[Keys, Position]
+    values: dict[Keys, Position]
+
+    def error(self, where: Keys, message: str, at_key: bool = False) -> UserError:
+        """An error at a value (or at its key), or at the nearest enclosing value that is in the file."""
+        positions = self.keys if at_key and where in self.keys else self.values
+        while where not in positions:
+            where = where[:-1]
+        line, column = positions[where]
+        return UserError(f"{self.name}:{line}:{column}: {message}")
+
+
+def load(path: Path) -> Document:
+    """Read a YAML mapping; every fault is a one-line UserError with its position."""
+    return parse(str(path), _read(path))
+
+
+def _read(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+        if len(content) > LARGEST_BYTES:
+            raise UserError(f"{path}: larger than {LARGEST_BYTES} bytes; that is no config")
+        return content.decode("utf-8")
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+
+
+def parse(name: str, text: str) -> Document:
+    """The document in a text; ``name`` is used in error lines."""
+    reader = _Reader(name)
+    try:
+        root = _Loader(text).get_single_node()
+    except yaml.MarkedYAMLError as error:
+        raise UserError(f"{name}:{_place(error)}: {_sentence(error)}") from error
+    except yaml.YAMLError as error:
+        raise UserError(f"{name}: not YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(root, yaml.MappingNode):
+        found = "is empty" if root is None else "is not a mapping"
+        raise UserError(f"{name}:1:1: the file {found}; expected 'key: value' lines")
+    data = reader.value(root, ())
+    return Document(name, text, data, reader.keys, reader.values)
+
+
+def _place(error: yaml.MarkedYAMLError) -> str:
+    mark = error.problem_mark or error.context_mark
+    return "1:1" if mark is None else f"{mark.line + 1}:{mark.column + 1}"
+
+
+def _sentence(error: yaml.MarkedYAMLError) -> str:
+    parts = [part for part in (error.context, error.problem) if part]
+    return " ".join(", ".join(parts).split())
+
+
+class _Loader(yaml.SafeLoader):
+    """Composes nodes only: plain scalars resolve as in YAML 1.2, aliases are refused, depth is limited."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(None, None, "aliases (*name) are not allowed; write the value out", mark)
+        self._depth += 1
+        if self._depth > DEEPEST:
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(None, None, f"nested deeper than {DEEPEST} levels", mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+_Loader.yaml_implicit_resolvers = {}
+for _kind, _pattern, _first in (
+    ("null", r"(?:~|null|Null|NULL|)", ["~", "n", "N", ""]),
+    ("bool", r"(?:true|True|TRUE|false|False|FALSE)", list("tTfF")),
+    ("int", r"[-+]?[0-9]+", list("-+0123456789")),
+    ("float", r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?", list("-+.0123456789")),
+    ("float", r"(?:[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))", list("-+.")),
+):
+    _Loader.add_implicit_resolver(_CORE + _kind, re.compile(f"^{_pattern}$"), _first)
+
+
+class _Reader:
+    """Turns nodes into Python values and remembers their positions."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.keys: dict[Keys, Position] = {}
+        self.values: dict[Keys, Position] = {}
+
+    def value(self, node: yaml.Node, where: Keys) -> Any:
+        """The node as a plain value; its position is noted under ``where``."""
+        self.values[where] = _position(node)
+        if isinstance(node, yaml.MappingNode) and node.tag == _CORE + "map":
+            return self._mapping(node, where)
+        if isinstance(node, yaml.SequenceNode) and node.tag == _CORE + "seq":
+            return [self.value(item, (*where, index)) for index, item in enumerate(node.value)]
+        return self._scalar(node)
+
+    def _mapping(self, node: yaml.MappingNode, where: Keys) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise self._error(key_node, "a key must be a plain word")
+            key = str(key_node.value)
+            if key in result:
+                first = self.keys[(*where, key)]
+                raise self._error(key_node, f"duplicate key '{key}'; first given in line {first.line}")
+            self.keys[(*where, key)] = _position(key_node)
+            result[key] = self.value(value_node, (*where, key))
+        return result
+
+    def _scalar(self, node: yaml.Node) -> Any:
+        text = str(node.value)
+        try:
+            match node.tag.removeprefix(_CORE):
+                case "str":
+                    return text
+                case "null":
+                    return None
+                case "bool":
+                    return {"true": True, "false": False}[text.lower()]
+                case "int":
+                    return int(text)
+                case "float" if math.isfinite(number := float(text)):
+                    return number
+                case "float":
+                    raise ValueError
+        except (ValueError, KeyError):
+            raise self._error(node, f"'{text[:40]}' is not a finite number or a boolean") from None
+        raise self._error(node, f"values of the kind '{node.tag}' are not allowed")
+
+    def _error(self, node: yaml.Node, message: str) -> UserError:
+        line, column = _position(node)
+        return UserError(f"{self.name}:{line}:{column}: {message}")
+
+
+def _position(node: yaml.Node) -> Position:
+    return Position(node.start_mark.line + 1, node.start_mark.column + 1)

@@ -1,0 +1,33 @@
+"""What descent methods share: the best phase so far, and a decaying step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import InitVar, dataclass, field
+
+import torch
+from torch import Tensor
+
+
+@dataclass
+class Best:
+    """The phase of the least loss seen, per image; a copy, since optimisers change their phase in place."""
+
+    start: InitVar[Tensor]
+    phase: Tensor = field(init=False)
+    loss: Tensor = field(init=False)
+
+    def __post_init__(self, start: Tensor) -> None:
+        self.phase = start.detach().clone()
+        self.loss = start.new_full((len(start),), torch.inf)
+
+    def update(self, loss: Tensor, phase: Tensor) -> None:
+        """Keep ``phase`` ``(B, H, W)`` where ``loss`` ``(B,)`` is the least so far."""
+        better = loss < self.loss
+        self.phase = torch.where(better[:, None, None], phase.detach(), self.phase)
+        self.loss = torch.where(better, loss.detach(), self.loss)
+
+
+def cosine_decay(step: float, iteration: int, iterations: int) -> float:
+    """A step that falls from ``step`` to zero along half a cosine."""
+    return step * (1 + math.cos(math.pi * iteration / iterations)) / 2

@@ -1,0 +1,122 @@
+"""Double phase encoding: a complex field shown on a phase-only panel without iteration.
+
+Maimone, Georgiou & Kollin, "Holographic near-eye displays for virtual and augmented reality",
+ACM Trans. Graph. 36(4), 85 (2017), after Hsueh & Sawchuk, Appl. Opt. 17, 3874 (1978).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from ..optics.convolution import frequencies, iris
+from .common import Bench, Offset, nominal_model, per_channel, with_offset
+
+
+@dataclass(frozen=True)
+class DoublePhase:
+    """Double phase amplitude coding (Maimone et al. 2017).
+
+    The image plane holds the target amplitude with constant phase, and black outside the region.
+    quantile: the amplitude at the panel that is encoded as 1; larger ones are cut to 1. 1 is the maximum, as
+    published; a lower quantile gives a brighter image and more clipping.
+    offset: global phase offset, see ``common.with_offset``.
+    """
+
+    quantile: Annotated[float, Interval(gt=0, le=1)] = 1.0
+    offset: Offset = "centre"
+
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        return per_channel(target, lambda image, channel: self.solve_channel(image, bench, channel))
+
+    def solve_channel(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """One colour: linear intensity ``(B, h, w)`` to phase ``(B, H, W)`` [rad]."""
+        spec = bench.spec
+        amplitude = spec.region.embed(target.clamp_min(0).sqrt(), spec.shape)
+        at_image = torch.complex(amplitude, torch.zeros_like(amplitude))
+        at_panel = self.filter(nominal_model(bench, channel, target).adjoint(at_image), spec.pitch)
+        return with_offset(encode(at_panel, self.quantile), self.offset)
+
+    def filter(self, field: Tensor, pitch: float) -> Tensor:
+        """What is done to the complex field at the panel before it is encoded: nothing."""
+        return field
+
+
+@dataclass(frozen=True)
+class AntiAliasedDoublePhase(DoublePhase):
+    """Anti-aliased double phase (Shi et al., "Towards real-time photorealistic 3D holography with deep neural
+    networks", Nature 591, 234 (2021), Methods).
+
+    The complex field at the panel is blurred by a small Gaussian of ``sigma`` pixels before encoding, so that
+    neighbours in the checkerboard encode nearly the same value and fast phase changes do not alias.
+    """
+
+    sigma: Annotated[float, Interval(gt=0, le=5)] = 0.5
+
+    def filter(self, field: Tensor, pitch: float) -> Tensor:
+        """Gaussian blur of the complex field."""
+        fy, fx = frequencies(_padded(field), pitch, field.device)
+        transfer = torch.exp(-2 * (torch.pi * self.sigma * pitch) ** 2 * (fy**2 + fx**2))
+        return _filtered(field, transfer)
+
+
+@dataclass(frozen=True)
+class BandLimitedDoublePhase(DoublePhase):
+    """Band-limited double phase (Sui et al., "Band-limited double-phase method for enhancing image sharpness in
+    complex modulated computer-generated holograms", Opt. Express 29, 2597 (2021)).
+
+    The checkerboard of the encoding repeats the spectrum around the corners of the band (half a cycle per pixel
+    in both directions). The field is limited to ``band``, a diameter as a fraction of the panel's band 1/pitch,
+    before encoding, so that those copies keep clear of it: at most 1/sqrt(2) for a round limit, 1/2 for a square.
+    """
+
+    band: Annotated[float, Interval(gt=0, le=1)] = 0.7
+    shape: Literal["round", "square"] = "round"
+
+    def filter(self, field: Tensor, pitch: float) -> Tensor:
+        """Ideal low-pass of the complex field."""
+        fy, fx = frequencies(_padded(field), pitch, field.device)
+        edge = self.band / (2 * pitch)
+        passed = iris(fy, fx, pitch, self.band) if self.shape == "round" else (fy.abs() <= edge) & (fx.abs() <= edge)
+        return _filtered(field, passed)
+
+
+def encode(field: Tensor, quantile: float = 1.0) -> Tensor:
+    """Two phases ``phi +- arccos(a)`` in a checkerboard, whose mean is ``a exp(i phi)`` (Maimone et al. 2017).
+
+    field: ``(..., H, W)`` complex. a is its amplitude over its maximum in the panel (or a lower quantile).
+    """
+    amplitude, phase = field.abs(), field.angle()
+    if quantile == 1:
+        white = amplitude.amax(dim=(-2, -1), keepdim=True)
+    else:
+        # kthvalue, since torch.quantile refuses more than 2^24 values
+        flat = amplitude.flatten(-2)
+        rank = max(1, round(quantile * flat.shape[-1]))
+        white = flat.kthvalue(rank, dim=-1).values[..., None, None]
+    spread = torch.acos((amplitude / white.clamp_min(torch.finfo(white.dtype).tiny)).clamp(max=1))
+    rows, columns = field.shape[-2:]
+    parity = (
+        torch.arange(rows, device=field.device)[:, None] + torch.arange(columns, device=field.device)[None, :]
+    ) % 2
+    return phase + torch.where(parity == 0, spread, -spread)
+
+
+def _padded(field: Tensor) -> tuple[int, int]:
+    return 2 * field.shape[-2], 2 * field.shape[-1]
+
+
+def _filtered(field: Tensor, transfer: Tensor) -> Tensor:
+    """Filter a field with zeros around it; the transfer function is on the ``fftfreq`` grid of twice its size."""
+    rows, columns = field.shape[-2:]
+    spectrum = torch.fft.fft2(field, s=_padded(field)) * transfer.to(field.real.dtype)
+    filtered: Tensor = torch.fft.ifft2(spectrum)
+    return filtered[..., :rows, :columns]

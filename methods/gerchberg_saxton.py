@@ -1,0 +1,69 @@
+"""Gerchberg-Saxton phase retrieval.
+
+R. W. Gerchberg and W. O. Saxton, "A practical algorithm for the determination of phase from image and
+diffraction plane pictures", Optik 35, 237 (1972).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from annotated_types import Interval
+from torch import Tensor
+
+from ..optics import AngularSpectrum
+from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
+from .initial_phase import InitialPhase, initial_phase
+
+if TYPE_CHECKING:
+    from ..display.contract import Region
+
+
+@dataclass(frozen=True)
+class GerchbergSaxton:
+    """Alternate between the target amplitude in the region and unit amplitude at the panel.
+
+    Light outside the region is free: whatever falls there is kept. The target's brightness is set once, so that
+    it holds the light which the initial phase sends into the region; were it fitted again in each iteration,
+    the error would shrink by moving the light out of the picture.
+    """
+
+    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
+    initial_phase: InitialPhase = "random"
+    offset: Offset = "centre"
+
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
+
+    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        model, region = nominal_model(bench, channel, target), bench.spec.region
+        phase = initial_phase(self.initial_phase, target, bench, channel)
+        amplitude = as_bright(target, phase, model, region)
+        for _ in range(self.iterations):
+            phase, _ = step(phase, amplitude, model, region)
+        return with_offset(phase, self.offset)
+
+
+def as_bright(target: Tensor, phase: Tensor, model: AngularSpectrum, region: Region) -> Tensor:
+    """The target's amplitude ``(B, h, w)``, with as much light as ``phase`` sends into the region."""
+    light = region.crop(model.forward(unit_field(phase))).abs().square().sum(dim=(-2, -1), keepdim=True)
+    return (target.clamp_min(0) * light / target.sum(dim=(-2, -1), keepdim=True).clamp_min(1e-12)).sqrt()
+
+
+def step(phase: Tensor, amplitude: Tensor, model: AngularSpectrum, region: Region) -> tuple[Tensor, Tensor]:
+    """One iteration: the new phase, and the squared error ``(B,)`` of the amplitude before it.
+
+    Only the correction inside the region travels back, and is added to the field that is there. This equals
+    replacing the amplitude in the region and keeping everything else, also the light that leaves the window or
+    stops at the iris and so is not in the image; with it the error can not rise (Fienup, Appl. Opt. 21, 2758 (1982)).
+    """
+    field = unit_field(phase)
+    found = region.crop(model.forward(field))
+    correction = amplitude * unit_field(found.angle()) - found
+    returned = model.adjoint(region.embed(correction, model.shape))
+    return (field + returned).angle(), correction.abs().square().sum(dim=(-2, -1))

@@ -1,0 +1,59 @@
+"""Hybrid input-output phase retrieval, for a phase-only panel.
+
+J. R. Fienup, "Phase retrieval algorithms: a comparison", Appl. Opt. 21, 2758 (1982); the input-output
+idea was made for computer-generated holograms in J. R. Fienup, Opt. Eng. 19, 297 (1980).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
+from .gerchberg_saxton import as_bright
+from .initial_phase import InitialPhase, initial_phase
+
+
+@dataclass(frozen=True)
+class HybridInputOutput:
+    """Drive the panel with an input image that over-corrects, instead of with the target itself.
+
+    Fienup's two planes map as follows. The Fourier modulus, which is known exactly, is the unit amplitude of
+    the panel. The object constraint is the target amplitude in the region. Where the output violates it
+    (inside the region) the next input is the last input plus ``beta`` times the change wanted; where nothing is
+    wanted (outside) the next input is the output. The error is not monotone, so the best phase is returned.
+    """
+
+    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
+    beta: Annotated[float, Interval(gt=0, le=2)] = 0.9
+    initial_phase: InitialPhase = "random"
+    offset: Offset = "centre"
+
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
+
+    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        model, region = nominal_model(bench, channel, target), bench.spec.region
+        phase = initial_phase(self.initial_phase, target, bench, channel)
+        amplitude = as_bright(target, phase, model, region)
+        driving = region.crop(model.forward(unit_field(phase)))
+        best, least = phase, target.new_full((target.shape[0],), torch.inf)
+        for _ in range(self.iterations):
+            field = unit_field(phase)
+            output = region.crop(model.forward(field))
+            wanted = amplitude * unit_field(output.angle()) - output
+            error = wanted.abs().square().sum(dim=(-2, -1))
+            best = torch.where((error < least)[:, None, None], phase, best)
+            least = torch.minimum(error, least)
+            driving = driving + self.beta * wanted
+            returned = model.adjoint(region.embed(driving - output, model.shape))
+            phase = (field + returned).angle()
+        return with_offset(best, self.offset)

@@ -1,0 +1,47 @@
+"""Where phase retrieval starts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import torch
+from torch import Tensor
+
+from ..optics.phase import TAU, lens
+from .common import Bench
+from .double_phase import DoublePhase
+
+if TYPE_CHECKING:
+    from ..display.contract import DisplaySpec
+
+InitialPhase = Literal["random", "narrow", "constant", "quadratic", "dpe"]
+
+
+def initial_phase(kind: InitialPhase, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    """A phase ``(B, H, W)`` [rad] to start from; target: linear intensity ``(B, h, w)``.
+
+    random: uniform over 2 pi, the same for every image of a batch, so that an image's result does not depend
+    on its company; narrow: the same over 1 rad (as in the released code of Peng et al. 2020); constant: zero;
+    quadratic: the lens that gathers the light of the whole panel in the region; dpe: the double phase hologram
+    (Maimone et al. 2017), which already shows the image.
+    """
+    spec = bench.spec
+    if kind == "dpe":
+        return DoublePhase(offset="none").solve_channel(target, bench, channel)
+    if kind in ("random", "narrow"):
+        draw = torch.rand(spec.shape, generator=bench.generator("initial phase", channel), dtype=torch.float64)
+        phase = (draw * (TAU if kind == "random" else 1.0)).to(target.device, target.dtype)
+    elif kind == "quadratic":
+        phase = gathering_lens(spec, channel, target)
+    else:
+        phase = target.new_zeros(spec.shape)
+    return phase.expand(target.shape[0], *spec.shape).clone()
+
+
+def gathering_lens(spec: DisplaySpec, channel: int, like: Tensor) -> Tensor:
+    """Phase ``(H, W)`` [rad] of the lens that shrinks the panel to the size of the region at the image plane."""
+    magnification = max(spec.region.height / spec.shape[0], spec.region.width / spec.shape[1])
+    if magnification >= 1:
+        return like.new_zeros(spec.shape)
+    focal_length = spec.distance / (1 - magnification)
+    return lens(spec.shape, spec.pitch, spec.wavelengths[channel], focal_length, dtype=like.dtype, device=like.device)

@@ -1,0 +1,52 @@
+import re
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+from markupsafe import Markup
+
+from holobench_eval.report.markdown import code, code_block, escape, table
+
+ANY_TEXT = st.text(max_size=40)
+
+
+@given(ANY_TEXT)
+@example("<script>alert(1)</script>")
+@example("a | b \\| c")
+@example("[x](javascript:alert(1)) ![y](z)")
+@example("**bold** _under_ `code` &lt;b&gt; $x$ ~~gone~~")
+def test_escaped_text_opens_no_tag_link_or_code_and_has_no_bare_pipe(text):
+    escaped = str(escape(text))
+    assert "\n" not in escaped
+    assert not re.search(r"<[A-Za-z/!?]", escaped)
+    bare = re.sub(r"\\.", "", escaped)
+    assert not re.search(r"[|`*$~]", bare)
+    assert not re.search(r"\]\s*[(\[]", bare)
+
+
+def test_ordinary_text_stays_legible():
+    for text in ("double_phase", "PSNR [dB], p < 0.05", "a & b", "HIL (50 captures)", "50 % of 8"):
+        assert str(escape(text)) == text
+
+
+def test_text_that_was_made_here_is_not_escaped_again():
+    assert str(escape(Markup("**n**"))) == "**n**"
+
+
+@given(st.lists(st.lists(ANY_TEXT, min_size=3, max_size=3), max_size=4))
+def test_a_table_has_the_same_columns_in_every_line(rows):
+    lines = str(table(["a|b", "c", "d"], rows)).split("\n")
+    assert len(lines) == len(rows) + 2
+    assert {len(re.findall(r"(?<!\\)\|", line.replace("\\\\", ""))) for line in lines} == {4}
+
+
+def test_columns_of_numbers_stand_to_the_right():
+    rule = str(table(["name", "value", "note"], [["a", "1.5 [1, 2]", "x"], ["b", "–", "2 of"]])).split("\n")[1]
+    assert rule == "| --- | ---: | --- |"
+
+
+@given(ANY_TEXT)
+@example("``` \n# title")
+def test_code_cannot_be_closed_from_inside(text):
+    fence = re.match("`+", str(code_block(text)))[0]
+    assert max((len(run) for run in re.findall("`+", text)), default=0) < len(fence)
+    assert "\n" not in str(code(text))

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fake_study
+import pytest
+from fake_study import solves, write_config
+
+from holobench_eval.config import load_study
+from holobench_eval.report import build_report
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
+
+TARGETS = 5
+
+
+def start(config: Path, output: Path, *options: str) -> subprocess.Popen[str]:
+    command = [sys.executable, str(Path(fake_study.__file__)), "run", str(config), "--output", str(output)]
+    return subprocess.Popen(
+        [*command, "--threads", "1", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"MPLBACKEND": "agg"},
+    )
+
+
+def wait_for_solves(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 120
+    while len(solves(folder)) < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def wait_for(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_physics")
+def test_a_run_that_was_killed_and_interrupted_gives_the_bytes_of_one_that_was_not(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {pause: 0.4}}',), count=TARGETS)
+    output = tmp_path / "out"
+
+    killed = start(config, output)
+    wait_for_solves(tmp_path, 2, killed)
+    killed.kill()
+    assert wait_for(killed)[0] == -signal.SIGKILL
+    assert not (output / "table.csv").exists()
+
+    stopped = start(config, output)
+    wait_for_solves(tmp_path, 4, stopped)
+    stopped.send_signal(signal.SIGINT)
+    code, _, err = wait_for(stopped)
+    assert code == 130
+    assert "resume with the same command" in err
+    assert "Traceback" not in err
+
+    code, out, err = wait_for(start(config, output))
+    assert (code, err) == (0, "")
+    assert "psnr" in out.lower()
+    # Every solution was made once, but for the two that were cut short.
+    assert len(solves(tmp_path)) <= TARGETS + 2
+
+    study = load_study(config)
+    grid = plan(study)
+    whole = run(study, grid, tmp_path / "whole", Serial(), Lines(lambda line: None), threads=1)
+    build_report(study, whole.records, tmp_path / "whole", whole.provenance)
+    for name in ("table.csv", "records.csv"):
+        assert (output / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fake_study import write_config
+from test_run import add_other_profile
+
+from holobench_eval.config import Study, load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study.plan import FLOORS, REFERENCE, plan
+
+
+def study_in(folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), **options: object) -> Study:
+    return load_study(write_config(folder, methods, **options))  # type: ignore[arg-type]
+
+
+def test_the_grid_is_methods_by_displays_by_targets_by_repeats(tmp_path: Path) -> None:
+    add_other_profile(tmp_path)
+    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"), profiles="ideal, other.yaml")
+    config.write_text(config.read_text() + "repeats: 4\n")
+    cells = plan(load_study(config)).cells
+    assert len(cells) == 3 * len(FLOORS) + 2 * 2 * 3 * 4
+    assert len({cell.id for cell in cells}) == len(cells)
+
+
+def test_planning_twice_gives_the_same_cells(tmp_path: Path) -> None:
+    assert plan(study_in(tmp_path)) == plan(study_in(tmp_path))
+
+
+def test_a_method_on_some_displays_has_cells_on_those_only(tmp_path: Path) -> None:
+    add_other_profile(tmp_path)
+    entry = '{name: "plugins.py:Toy", profiles: [other.yaml]}'
+    grid = plan(study_in(tmp_path, (entry,), profiles="ideal, other.yaml", count=1))
+    assert [cell.condition for cell in grid.cells] == [REFERENCE] * 5 + ["other"]
+
+
+@pytest.mark.parametrize("method", ["plugins.py:Seeing", "oracle"])
+def test_a_method_that_sees_the_display_is_solved_on_each(tmp_path: Path, method: str) -> None:
+    add_other_profile(tmp_path)
+    grid = plan(study_in(tmp_path, (method,), profiles="ideal, other.yaml", count=1))
+    assert [len(task.cells) for task in grid.tasks if not task.is_floor] == [1, 1]
+
+
+def test_a_blind_method_is_solved_once_for_displays_of_equal_nominal_optics(tmp_path: Path) -> None:
+    add_other_profile(tmp_path)
+    grid = plan(study_in(tmp_path, profiles="ideal, other.yaml", count=1))
+    assert [len(task.cells) for task in grid.tasks if not task.is_floor] == [2]
+    different = (tmp_path / "other.yaml").read_text().replace("distance: 0.1 ", "distance: 0.2 ")
+    (tmp_path / "other.yaml").write_text(different)
+    grid = plan(study_in(tmp_path, profiles="ideal, other.yaml", count=1))
+    assert [len(task.cells) for task in grid.tasks if not task.is_floor] == [1, 1]
+
+
+def test_a_single_target_has_no_wrong_target(tmp_path: Path) -> None:
+    methods = {cell.method for cell in plan(study_in(tmp_path, count=1)).cells}
+    assert set(FLOORS) - methods == {"floor_wrong_target"}
+
+
+def test_the_wrong_target_is_the_next_one(tmp_path: Path) -> None:
+    wrong = {c.target: c.params["target"] for c in plan(study_in(tmp_path)).cells if c.method == "floor_wrong_target"}
+    assert wrong == {"gray 0": "gray 1", "gray 1": "gray 2", "gray 2": "gray 0"}
+
+
+def test_training_images_are_never_targets(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    config.write_text(config.read_text().replace("plugins.py:Gray", "plugins.py:Training"))
+    with pytest.raises(UserError, match="training images"):
+        load_study(config)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("seed: 3", "seed: 4"),
+        ("panel: [128, 160]", "panel: [128, 128]"),
+        ("panel: [128, 160]", "panel: [128, 160], exposure: matched"),
+        ("- plugins.py:Toy", '- {name: "plugins.py:Toy", params: {value: 2}}'),
+    ],
+)
+def test_what_changes_a_number_changes_its_cell(tmp_path: Path, old: str, new: str) -> None:
+    config = write_config(tmp_path)
+    before = {cell.id for cell in plan(load_study(config)).cells if cell.condition != REFERENCE}
+    assert old in config.read_text()
+    config.write_text(config.read_text().replace(old, new))
+    assert before.isdisjoint(cell.id for cell in plan(load_study(config)).cells)
+
+
+@pytest.mark.parametrize(("old", "new"), [('title: "Fake"', 'title: "Other"'), ("seed: 3", "seed: 3\nrepeats: 2")])
+def test_what_changes_no_number_keeps_its_cell(tmp_path: Path, old: str, new: str) -> None:
+    config = write_config(tmp_path)
+    before = {cell.id for cell in plan(load_study(config)).cells}
+    config.write_text(config.read_text().replace(old, new))
+    assert before <= {cell.id for cell in plan(load_study(config)).cells}

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+from fake_study import write_config
+from test_run import compute
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study import provenance
+from holobench_eval.study.plan import plan
+from holobench_eval.study.store import Store
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_run_says_what_it_ran_on(tmp_path: Path) -> None:
+    config = write_config(tmp_path, count=1)
+    known = compute(config, tmp_path / "out").provenance
+    assert known == provenance.read(tmp_path / "out")
+    assert known["config_sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
+    assert known["config"] == "../study.yaml"
+    assert known["profiles"]["ideal"]["version"] == 1
+    assert known["packages"]["torch"]
+    assert (known["threads"], known["workers"]) == (1, 1)
+    assert known["started"] <= known["ended"]
+    assert known["earlier"] == []
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_resumed_run_keeps_the_runs_it_completes(tmp_path: Path) -> None:
+    config = write_config(tmp_path, count=1)
+    first = compute(config, tmp_path / "out").provenance
+    cells = plan(load_study(config)).cells
+    Store(tmp_path / "out").path(cells[0].id).unlink()
+    second = compute(config, tmp_path / "out").provenance
+    first.pop("earlier")
+    assert second["earlier"] == [first]
+    for cell in cells:
+        Store(tmp_path / "out").path(cell.id).unlink()
+    assert compute(config, tmp_path / "out").provenance["earlier"] == []
+
+
+@pytest.mark.parametrize("text", ["{", "[]"])
+def test_a_damaged_provenance_is_named(tmp_path: Path, text: str) -> None:
+    (tmp_path / "provenance.json").write_text(text)
+    with pytest.raises(UserError, match=r"provenance\.json: not"):
+        provenance.read(tmp_path)

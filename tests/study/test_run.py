@@ -1,0 +1,173 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_study import solves, write_config
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study import provenance
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import Outcome, run
+from holobench_eval.study.store import Store, file_name
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+
+def compute(config: Path, output: Path, write: Callable[[str], None] = lambda line: None, **options: Any) -> Outcome:
+    study = load_study(config)
+    return run(study, plan(study), output, Serial(), Lines(write), threads=1, **options)
+
+
+def test_every_cell_of_the_plan_gets_a_record(tmp_path: Path) -> None:
+    outcome = compute(write_config(tmp_path), tmp_path / "out")
+    assert {record["state"] for record in outcome.records} == {"done"}
+    assert outcome.computed == len(outcome.records) == 3 * 6 + 3
+    assert outcome.failed == 0
+
+
+def test_a_done_cell_is_never_computed_again(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    first = compute(config, tmp_path / "out")
+    again = compute(config, tmp_path / "out")
+    assert len(solves(tmp_path)) == 3
+    assert again.computed == 0
+    assert again.records == first.records
+    assert again.provenance == first.provenance
+
+
+def test_only_the_missing_cell_is_computed(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    first = compute(config, tmp_path / "out")
+    gone = plan(load_study(config)).tasks[-1].cells[0]
+    Store(tmp_path / "out").path(gone.id).unlink()
+    again = compute(config, tmp_path / "out")
+    assert again.computed == 1
+    assert len(solves(tmp_path)) == 4
+    assert again.records == first.records
+
+
+def test_a_new_method_adds_its_cells_and_keeps_the_others(tmp_path: Path) -> None:
+    compute(write_config(tmp_path), tmp_path / "out")
+    both = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: other, params: {value: 2}}')
+    outcome = compute(write_config(tmp_path, both), tmp_path / "out")
+    assert outcome.computed == 3
+    assert len(outcome.records) == 3 * 6 + 2 * 3
+
+
+def test_a_new_label_needs_no_new_computation(tmp_path: Path) -> None:
+    compute(write_config(tmp_path), tmp_path / "out")
+    outcome = compute(write_config(tmp_path, ('{name: "plugins.py:Toy", label: renamed}',)), tmp_path / "out")
+    assert outcome.computed == 0
+    assert {record["label"] for record in outcome.records[-3:]} == {"renamed"}
+
+
+def test_an_exception_in_a_method_is_a_failed_cell_and_the_run_goes_on(tmp_path: Path) -> None:
+    lines: list[str] = []
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no\\n light"}}',))
+    outcome = compute(config, tmp_path / "out", lines.append)
+    states = [(record["cell"]["target"], record["state"]) for record in outcome.records[-3:]]
+    assert states == [("gray 0", "done"), ("gray 1", "failed"), ("gray 2", "done")]
+    failed = outcome.records[-2]
+    assert outcome.failed == 1
+    assert failed["reason"] == "ValueError: no light"
+    assert failed["scores"] == {}
+    store = Store(tmp_path / "out")
+    assert "Traceback" in store.log(plan(load_study(config)).cells[-2].id).read_text()
+    assert any("gray 1" in line and "no light" in line for line in lines)
+
+
+def test_failed_cells_run_again_only_when_asked(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no"}}',))
+    compute(config, tmp_path / "out")
+    assert compute(config, tmp_path / "out").computed == 0
+    again = compute(config, tmp_path / "out", retry_failed=True)
+    assert (again.computed, again.failed) == (1, 1)
+    assert len(solves(tmp_path)) == 4
+
+
+def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("holobench_eval.study.cell.score", lambda *_, **__: {"psnr_linear": float("nan")})
+    outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
+    assert {record["state"] for record in outcome.records} == {"failed"}
+    assert outcome.records[0]["reason"] == "CellError: the score psnr_linear is nan"
+
+
+def test_displays_of_equal_nominal_optics_share_one_solution(tmp_path: Path) -> None:
+    add_other_profile(tmp_path)
+    both = ("plugins.py:Toy", "plugins.py:Seeing")
+    outcome = compute(write_config(tmp_path, both, count=1, profiles="ideal, other.yaml"), tmp_path / "out")
+    assert [line.split()[0] for line in solves(tmp_path)] == ["Toy", "Seeing", "Seeing"]
+    shown = [(record["label"], record["cell"]["condition"], record["state"]) for record in outcome.records[-4:]]
+    assert shown == [
+        ("Toy", "ideal", "done"),
+        ("Toy", "other", "done"),
+        ("Seeing", "ideal", "done"),
+        ("Seeing", "other", "done"),
+    ]
+
+
+def add_other_profile(folder: Path) -> None:
+    from importlib.resources import files
+
+    text = files("holobench_eval.display").joinpath("profiles", "ideal.yaml").read_text()
+    (folder / "other.yaml").write_text(text.replace("name: ideal", "name: other"))
+
+
+def test_captures_and_phases_are_saved_on_request(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", label: "a/b"}',), count=1)
+    config.write_text(config.read_text() + "save: {captures: true, phases: true}\n")
+    compute(config, tmp_path / "out")
+    written = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("*/*/*.*"))
+    label, target = file_name("a/b"), file_name("gray 0")
+    assert written == [
+        f"captures/{label}/ideal/{target}.json",
+        f"captures/{label}/ideal/{target}.png",
+        f"phases/{label}/ideal/{target}.png",
+    ]
+
+
+def test_what_a_method_does_to_its_target_does_not_reach_the_score(tmp_path: Path) -> None:
+    honest = compute(write_config(tmp_path), tmp_path / "honest").records[-1]["scores"]
+    (tmp_path / "cheat").mkdir()
+    config = write_config(tmp_path / "cheat", ("plugins.py:Cheat",))
+    cheat = "class Cheat(Toy):\n    def solve(self, target, bench):\n"
+    cheat += "        phase = super().solve(target, bench)\n        target.zero_()\n        return phase\n"
+    plugins = tmp_path / "cheat" / "plugins.py"
+    plugins.write_text(f"{plugins.read_text()}\n\n{cheat}")
+    assert compute(config, tmp_path / "cheated").records[-1]["scores"] == honest
+
+
+def test_a_folder_in_use_by_another_run_is_refused(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    with Store(tmp_path / "out").locked(), pytest.raises(UserError, match="another run is using this folder"):
+        compute(config, tmp_path / "out")
+    assert compute(config, tmp_path / "out").computed == 21
+
+
+def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = write_config(tmp_path)
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Lines, "finished", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            compute(config, tmp_path / "out")
+    assert compute(config, tmp_path / "out").computed == 21 - 6
+    earlier = provenance.read(tmp_path / "out")["earlier"]
+    assert [run["ended"] for run in earlier] == [None]
+
+
+def test_retiming_replaces_the_kept_time(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {pause: 0.05}}',), count=1)
+    first = compute(config, tmp_path / "a").records[-1]["seconds"]
+    assert first >= 0.05
+    assert compute(config, tmp_path / "b").records[-1]["seconds"] == first
+    assert compute(config, tmp_path / "c", retime=True).records[-1]["seconds"] != first

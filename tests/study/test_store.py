@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_study import write_config
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study.plan import Plan, plan
+from holobench_eval.study.store import Record, Store, file_name, write_atomically
+
+
+@pytest.fixture
+def grid(tmp_path: Path) -> Plan:
+    return plan(load_study(write_config(tmp_path, count=1)))
+
+
+def record_of(grid: Plan, **values: Any) -> Record:
+    return Record(grid.cells[-1].description(), "done", "Toy", **values)
+
+
+def test_a_record_is_read_as_it_was_written(tmp_path: Path, grid: Plan) -> None:
+    store = Store(tmp_path / "out")
+    record = record_of(grid, scores={"psnr_linear": 20.123456789012345}, captures=3, seconds=0.1, saturated=1e-9)
+    store.write(record)
+    assert store.read(record.id) == record
+    assert record.id == grid.cells[-1].id
+
+
+def test_a_record_that_is_absent_is_none(tmp_path: Path) -> None:
+    assert Store(tmp_path).read("0" * 64) is None
+
+
+def corrupt(text: str) -> dict[str, str]:
+    content = json.loads(text)
+    return {
+        "truncated": text[: len(text) // 2],
+        "empty": "",
+        "list": "[]",
+        "foreign": '{"a": 1}',
+        "moved": json.dumps({**content, "cell": {**content["cell"], "repeat": 9}}),
+        "state": json.dumps({**content, "state": "fine"}),
+    }
+
+
+@pytest.mark.parametrize("fault", ["truncated", "empty", "list", "foreign", "moved", "state"])
+def test_a_damaged_record_is_named(tmp_path: Path, grid: Plan, fault: str) -> None:
+    store, record = Store(tmp_path / "out"), record_of(grid)
+    store.write(record)
+    path = store.path(record.id)
+    path.write_text(corrupt(path.read_text())[fault])
+    with pytest.raises(UserError, match=rf"{path.name}: .*delete the file"):
+        store.read(record.id)
+
+
+def test_a_planned_cell_without_a_record_is_shown_as_missing(tmp_path: Path, grid: Plan) -> None:
+    store = Store(tmp_path / "out")
+    store.write(record_of(grid))
+    states = [record["state"] for record in store.load(grid)]
+    assert states == ["missing"] * 5 + ["done"]
+
+
+def test_records_of_other_studies_are_left_alone(tmp_path: Path, grid: Plan) -> None:
+    store = Store(tmp_path / "out")
+    store.folder.mkdir(parents=True)
+    (store.folder / "foreign.json").write_text("nothing")
+    assert len(store.missing(grid.cells)) == len(grid.cells)
+
+
+def test_a_score_that_json_cannot_hold_is_not_written(tmp_path: Path, grid: Plan) -> None:
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        Store(tmp_path).write(record_of(grid, scores={"psnr_linear": float("inf")}))
+    assert not list(Store(tmp_path).folder.glob("*.json"))
+
+
+def test_a_file_that_cannot_be_replaced_leaves_no_rest(tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(OSError, match="directory"):
+        write_atomically(tmp_path / "taken", b"x")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def test_rests_of_a_killed_run_are_removed(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.folder.mkdir()
+    (store.folder / ".writing-abc").write_text("half")
+    with store.locked():
+        assert [path.name for path in store.folder.iterdir()] == [".lock"]
+
+
+def test_the_lock_is_free_again_after_its_run(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    with pytest.raises(RuntimeError), store.locked():
+        raise RuntimeError
+    with store.locked(), pytest.raises(UserError, match="another run"), Store(tmp_path).locked():
+        pass
+
+
+def test_names_of_files_stay_in_their_folder() -> None:
+    assert file_name("astronaut-2.png") == "astronaut-2.png"
+    for text in ("../../etc/passwd", "..", ".", "", "/", "a" * 300, "GS (100 steps)"):
+        assert re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]{1,120}", file_name(text))
+
+
+@given(st.text(max_size=12), st.text(max_size=12))
+def test_different_names_get_different_files(one: str, other: str) -> None:
+    assert (file_name(one) == file_name(other)) == (one == other)

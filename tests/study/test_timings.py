@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from fake_study import write_config
+
+from holobench_eval.config import load_study
+from holobench_eval.study import timings
+from holobench_eval.study.plan import Task, plan
+
+
+@pytest.fixture
+def task(tmp_path: Path) -> Task:
+    return plan(load_study(write_config(tmp_path))).tasks[-1]
+
+
+def test_the_first_measurement_is_the_one_reported() -> None:
+    assert timings.keep("a", 2.5) == 2.5
+    assert timings.keep("a", 9.0) == 2.5
+    assert timings.known("a") == 2.5
+
+
+def test_measuring_again_replaces_it() -> None:
+    timings.keep("a", 2.5)
+    assert timings.keep("a", 9.0, again=True) == 9.0
+    assert timings.keep("a", 1.0) == 9.0
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"seconds": "x"}', '{"seconds": -1}', '{"seconds": NaN}', "\xff"])
+def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
+    timings.keep("a", 2.5)
+    (timings.folder() / "a.json").write_text(content, encoding="latin-1")
+    assert timings.known("a") is None
+    assert timings.keep("a", 3.0) == 3.0
+
+
+def test_without_a_folder_to_write_to_the_measured_time_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert timings.keep("a", 2.5) == 2.5
+    assert timings.keep("a", 3.5) == 3.5
+
+
+def test_threads_workers_and_the_method_make_another_solution(task: Task) -> None:
+    other = replace(task, cells=(replace(task.cells[0], method_sha256="changed"),))
+    keys = {timings.key(task, 1, 1), timings.key(task, 2, 1), timings.key(task, 1, 2), timings.key(other, 1, 1)}
+    assert len(keys) == 4
+    assert timings.key(task, 1, 1) == timings.key(replace(task, label="renamed"), 1, 1)
