@@ -73,8 +73,9 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     """An image file as ``(3, H, W)`` linear light in [0, 1], float32, upright as its EXIF orientation says.
 
     content: the file; name: used in errors. gray: take one-channel images too, replicated to three channels.
-    sixteen_bit: take 16-bit PNG and TIFF too, as sRGB levels or as linear light. UserError, one line, for an image
-    that is damaged, of another kind, larger than 64 million pixels, or of another colour space by its ICC profile.
+    sixteen_bit: take 16-bit PNG and TIFF too, as sRGB levels or as linear light; they must be stored upright.
+    UserError, one line, for an image that is damaged, of another kind, larger than 64 million pixels, or of another
+    colour space by its ICC profile.
     """
     image = _open(content, name)
     found = _fault(image, gray)
@@ -86,10 +87,13 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     if found is not None:
         raise UserError(f"{name}: {found}; {RIGHT}")
     _refuse_other_colours(image, name)
-    upright, orientation = _load(image, name)
+    turned, stored_upright = _load(image, name)
     if bits == 8:
-        return from_srgb(np.asarray(upright))
-    deep = _turned(_deep(content, name), orientation)
+        return from_srgb(np.asarray(turned))
+    if not stored_upright:
+        # OpenCV turns a 16-bit TIFF and leaves a PNG as it is, which another release may do otherwise.
+        raise UserError(f"{name}: a 16-bit image with an EXIF orientation; expected one that is stored upright")
+    deep = _deep(content, name)
     return planes((deep / np.float32(65535)).astype(np.float32)) if sixteen_bit == "linear" else from_srgb(deep)
 
 
@@ -150,12 +154,12 @@ def _refuse_other_colours(image: Image.Image, name: str) -> None:
         raise UserError(f"{name}: its ICC colour profile is '{description[:60]}'; convert it: {RIGHT}")
 
 
-def _load(image: Image.Image, name: str) -> tuple[Image.Image, int]:
-    """The decoded image, upright, and the EXIF orientation it had; UserError for a truncated or damaged file."""
+def _load(image: Image.Image, name: str) -> tuple[Image.Image, bool]:
+    """The decoded image, upright, and whether it was stored so; UserError for a truncated or damaged file."""
     try:
-        orientation = image.getexif().get(_ORIENTATION)
+        upright = image.getexif().get(_ORIENTATION, 1) == 1
         image.load()
-        return ImageOps.exif_transpose(image), orientation if orientation in range(1, 9) else 1
+        return ImageOps.exif_transpose(image), upright
     except Exception as error:  # whatever a decoder trips over in a damaged file
         raise UserError(f"{name}: truncated or damaged: {_line(error)}; {RIGHT}") from error
 
@@ -166,17 +170,6 @@ def _deep(content: bytes, name: str) -> NDArray[np.uint16]:
     if pixels is None or pixels.dtype != np.uint16:
         raise UserError(f"{name}: a 16-bit image that OpenCV cannot read; {RIGHT}, or a 16-bit PNG")
     return (pixels if pixels.ndim == 2 else pixels[..., ::-1]).astype(np.uint16)
-
-
-def _turned(pixels: NDArray[np.uint16], orientation: int) -> NDArray[np.uint16]:
-    """Upright pixels from those stored with an EXIF orientation of 1 to 8."""
-    if orientation >= 5:
-        pixels = pixels.swapaxes(0, 1)
-    if orientation in (2, 3, 6, 7):
-        pixels = pixels[:, ::-1]
-    if orientation in (3, 4, 7, 8):
-        pixels = pixels[::-1]
-    return pixels
 
 
 def _line(error: Exception) -> str:

@@ -41,7 +41,8 @@ class Photographs:
 
     count: the first so many of ``FILES``; None for all. names: these instead, in this order (``count`` is then not
     used). From ``camera`` on the photographs are gray and replicated to three channels. All are decoded as sRGB:
-    ``rocket`` carries an Adobe RGB profile, which is ignored, as ``skimage.data`` does.
+    ``rocket`` carries an Adobe RGB profile, which is ignored, as ``skimage.data`` does. Most have 400 to 512 rows,
+    ``chelsea`` 300 and ``text`` 172; a larger region enlarges them.
     """
 
     count: Annotated[int, Interval(ge=1, le=len(FILES))] | None = 8

@@ -97,11 +97,30 @@ def _run(
     folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers)
     with progress.watching(console) as watch:
         outcome = compute(study, grid, folder, chosen, watch, many, retry_failed, retime)
+    _sheets(study, folder, outcome.computed > 0)
     _report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
         console.print(f"reasons: {folder}/report.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
     return outcome.failed
+
+
+def _sheets(study: Study, output: Path, anew: bool) -> None:
+    """Draw the stages of every display of a study beside its report, where they are missing or it was computed anew."""
+    from .display import load_profile
+    from .errors import CellError
+    from .report.sheet import save_sheet
+    from .study.bench import condition, workbench
+
+    for source in study.display.profiles:
+        place = condition(source, study.display.panel, study.folder)
+        path = output / "figures" / f"stages-{place.name}.png"
+        if anew or not path.exists():
+            note = load_profile(source, study.folder).scaling_note(study.display.panel)
+            try:
+                save_sheet(workbench(place, study.seed), note, path)
+            except CellError as error:
+                print(f"holoeval: no stage sheet of {place.name}: {error}", file=sys.stderr)
 
 
 def _report(

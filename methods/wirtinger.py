@@ -68,7 +68,7 @@ class Wirtinger:
     def _adam(self, start: Tensor, objective: Objective) -> Tensor:
         phase, best = start.clone(), Best(start)
         pixels = phase.shape[-2] * phase.shape[-1]
-        optimiser = torch.optim.Adam([phase], lr=self.step)
+        optimiser = torch.optim.Adam([phase], lr=self.step, fused=True)
         for iteration in range(self.iterations):
             loss, gradient = objective.evaluate(phase)
             best.update(loss, phase)
@@ -116,7 +116,7 @@ class Objective:
         """
         at_panel = unit_field(phase)
         at_image = self.region.crop(self.model.forward(at_panel))
-        intensity = at_image.abs().square().requires_grad_()
+        intensity = (at_image.real.square() + at_image.imag.square()).requires_grad_()
         loss = self.loss(intensity, self.target)
         (slope,) = torch.autograd.grad(loss.sum(), intensity)
         returned = self.model.adjoint(self.region.embed(slope * at_image.detach(), self.model.shape))

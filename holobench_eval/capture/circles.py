@@ -83,24 +83,28 @@ def _orient(frame: Frame, points: Array, grid: FiducialGrid) -> Array | None:
     orders = [lattice, lattice[::-1], lattice[:, ::-1], lattice[::-1, ::-1]]
     if grid.rows == grid.columns:
         orders += [order.T for order in orders]
-    sizes = _sizes(frame, points, grid)
+    to_sensor = np.asarray(cv2.findHomography(grid.centres, points, 0)[0])
+    if to_sensor.shape != (3, 3):
+        return None  # points on one line have no homography
+    sizes = _sizes(frame, to_sensor.astype(np.float64), grid)
+    if sizes.std() == 0:
+        return None
     scores = np.array([np.corrcoef(sizes[order.ravel()], grid.marks)[0, 1] for order in orders])
     best, second = np.argsort(scores)[::-1][:2]
     if not scores[best] - scores[second] > MARK_MARGIN:
         return None
-    return points[orders[best].ravel()]
+    return np.asarray(points[orders[best].ravel()])
 
 
-def _sizes(frame: Frame, points: Array, grid: FiducialGrid) -> Array:
+def _sizes(frame: Frame, to_sensor: Array, grid: FiducialGrid) -> Array:
     """Light in the ring that only a mark fills, relative to the light that every circle has in its middle, 0 to 1."""
-    to_sensor, _ = cv2.findHomography(grid.centres, points, 0)
     reach = int(np.ceil(grid.mark_radius)) + 1
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
     ring = (np.hypot(x, y) > grid.radius + 1) & (np.hypot(x, y) < grid.mark_radius)
     middle = np.hypot(x, y) < grid.radius - 1
     around = grid.centres[:, None, None, :] + np.stack([x, y], axis=-1)
     where = cv2.perspectiveTransform(around.reshape(1, -1, 2), to_sensor).astype(np.float32)
-    where = where.reshape(len(points), -1, 2)
+    where = where.reshape(len(grid.centres), -1, 2)
     patches = cv2.remap(frame, where[..., 0], where[..., 1], cv2.INTER_LINEAR)
     light = patches[:, middle.ravel()].mean(axis=1)
-    return np.clip(patches[:, ring.ravel()].mean(axis=1) / np.maximum(light, 1e-12), 0, 1).astype(np.float64)
+    return np.asarray(np.clip(patches[:, ring.ravel()].mean(axis=1) / np.maximum(light, 1e-12), 0, 1), dtype=np.float64)

@@ -78,11 +78,12 @@ def _amplitude(image: Tensor, blur: float) -> Frame:
 def _climb(seen: Frame, wanted: Frame, start: Array) -> Array | None:
     """Gauss-Newton from ``start`` with gain and offset free; None far beyond the bounds or without convergence."""
     height, width = wanted.shape
-    slope_y, slope_x = np.gradient(wanted.astype(np.float64))
+    wide = wanted.astype(np.float64)
+    slope_y, slope_x = np.gradient(wide)
     x, y = np.arange(width) - (width - 1) / 2, np.arange(height)[:, None] - (height - 1) / 2
     turning = slope_x * y - slope_y * x
-    columns = (wanted, np.ones_like(wanted), -slope_x, -slope_y, turning)
-    model = np.stack([_inner(column).ravel() for column in columns], axis=1).astype(np.float64)
+    columns = (wide, np.ones_like(wide), np.negative(slope_x), np.negative(slope_y), turning)
+    model = np.stack([_inner(column).ravel() for column in columns], axis=1)
     normal = model.T @ model
     if np.linalg.matrix_rank(normal) < len(normal):
         return None
@@ -97,7 +98,7 @@ def _climb(seen: Frame, wanted: Frame, start: Array) -> Array | None:
         if not _within(move, 3.0):
             return None
         if np.abs(step * (1, 1, max(height, width) / 2)).max() < STEP:
-            return move
+            return np.asarray(move)
     return None
 
 

@@ -104,7 +104,7 @@ def _register_channel(frame: Frame, grid: FiducialGrid, channel: int) -> tuple[W
     points = find_circles(frame, grid)
     if points is None:
         raise CellError(
-            f"registration of channel {channel}: no grid of {grid.columns}x{grid.rows} circles and its marks in the capture"
+            f"registration of channel {channel}: no grid of {grid.columns}x{grid.rows} circles and its marks is seen"
         )
     start = Warp(grid.shape, _homography(grid.centres, points, 3 * OUTLIER), np.zeros((6, 2)))
     warp = _refined(frame, start, grid)

@@ -59,7 +59,7 @@ def offsets(picture: Frame, grid: FiducialGrid) -> Array:
     normal = model.transpose(0, 2, 1)
     gain, _, x, y = np.linalg.solve(normal @ model, normal @ values)[..., 0].T
     gain = np.maximum(gain, 0.05)
-    return np.clip(np.stack([x / gain, y / gain], axis=1), -FURTHEST, FURTHEST)
+    return np.asarray(np.clip(np.stack([x / gain, y / gain], axis=1), -FURTHEST, FURTHEST))
 
 
 def correlation(picture: Frame, grid: FiducialGrid) -> float:

@@ -29,7 +29,8 @@ def quadratic_terms(points: Array, shape: tuple[int, int]) -> Array:
 
 def quadratic_surface(coefficients: Array, shape: tuple[int, int]) -> Array:
     """The quadratic with six ``coefficients`` at every pixel of the region, ``(h, w)``."""
-    terms = quadratic(np.arange(shape[1])[None, :], np.arange(shape[0])[:, None], shape)
+    x, y = (np.arange(side, dtype=np.float64) for side in reversed(shape))
+    terms = quadratic(x[None, :], y[:, None], shape)
     return np.asarray(sum(c * term for c, term in zip(coefficients, terms, strict=True)))
 
 

@@ -10,11 +10,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import torch
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from torch import Tensor
 
 from ..datasets.charts import Charts
-from ..display import Profile, load_profile, open_bench
+from ..display import load_profile, open_bench
 from ..display.bench import SimulatedBench
 from ..display.workbench import Workbench
 from ..methods.wirtinger import Wirtinger
@@ -28,32 +27,38 @@ GREEN = 1
 
 def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | None = None) -> Path:
     """Draw the stages of a profile on a panel of (rows, columns), 256 x 256 by default; returns the PNG's path."""
-    profile = load_profile(name)
+    profile, shape = load_profile(name), panel or (256, 256)
     path = output or Path(f"stages-{profile.name}.png")
-    figure = stage_figure(profile, panel or (256, 256))
+    return save_sheet(open_bench(profile, shape), profile.scaling_note(shape), path)
+
+
+def save_sheet(workbench: Workbench, note: str, path: Path) -> Path:
+    """Write the sheet of an open bench; ``note`` says how its panel was scaled. A few seconds at 256 x 256."""
+    bench = workbench.bench
+    with plt.rc_context({"font.size": 9, "axes.titlesize": 10}):
+        figure, axes = plt.subplots(4, 4, figsize=(17, 15.5), layout="constrained")
+        _panel_stages(axes.flat[:6], bench)
+        _field_stages(axes.flat[6:12], bench)
+        _chart(axes.flat[12:], workbench)
+    figure.suptitle(f"{bench.profile.name}, version {bench.profile.version}: {bench.profile.description}\n{note}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    figure.savefig(path, dpi=100, metadata={"Software": None})
     plt.close(figure)
     return path
 
 
-def stage_figure(profile: Profile, panel: tuple[int, int]) -> Figure:
-    """The figure itself; solves one chart and photographs it, a few seconds at 256 x 256."""
-    workbench = open_bench(profile, panel)
-    bench = workbench.bench
-    figure, axes = plt.subplots(4, 4, figsize=(17, 15.5), layout="constrained")
-    _panel_stages(axes.flat[:6], bench)
-    _field_stages(axes.flat[6:12], bench)
-    _chart(axes.flat[12:], workbench)
-    figure.suptitle(f"{profile.name}, version {profile.version}: {profile.description}\n{profile.scaling_note(panel)}")
-    return figure
-
-
-def _picture(axis: Axes, image: Tensor, title: str, unit: str, cmap: str = "viridis") -> None:
-    shown = axis.imshow(image.numpy(), cmap=cmap, interpolation="nearest")
-    axis.set_title(title, fontsize=10)
-    axis.set_xlabel("column [px]", fontsize=8)
-    axis.set_ylabel("row [px]", fontsize=8)
+def _picture(
+    axis: Axes,
+    image: Tensor,
+    title: str,
+    unit: str,
+    cmap: str = "viridis",
+    extent: tuple[float, float, float, float] | None = None,
+    axes: tuple[str, str] = ("column [px]", "row [px]"),
+) -> None:
+    shown = axis.imshow(image.numpy(), cmap=cmap, interpolation="nearest", extent=extent)
+    axis.set_title(title)
+    axis.set(xlabel=axes[0], ylabel=axes[1])
     axis.figure.colorbar(shown, ax=axis, label=unit, fraction=0.046)
 
 
@@ -76,7 +81,8 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     )
     _wrap_edge(axes[3], bench)
     active = torch.ones(1, 1) if bench.active is None else bench.active.reshape(bench.samples, bench.samples)
-    _picture(axes[4], active, "active share of the sub-samples of a pixel", "share of area", "gray")
+    sub = ("sub-sample column", "sub-sample row")
+    _picture(axes[4], active, "active share of the sub-samples of a pixel", "share of area", "gray", axes=sub)
     draw = bench.channels[GREEN].geometry.generator("sheet")
     axes[5].plot([profile.flicker.gain(draw) for _ in range(100)])
     axes[5].set(title=f"flicker, {100 * profile.flicker.rms:g} % rms", xlabel="frame", ylabel="relative phase gain")
@@ -112,8 +118,14 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     fy, fx = f[:, None], f[None, :]
     wave = profile.propagation.pupil_phase(fy, fx, maps.geometry, profile.panel.pupil) / (2 * torch.pi)
     inside = iris(fy, fx, bench.spec.pitch, profile.panel.pupil) > 0.5
-    _picture(axes[4], torch.where(inside, wave, torch.nan), "aberration in the iris, green", "waves")
-    axes[4].set(xlabel="horizontal frequency [bins of 1 / (200 px)]", ylabel="vertical frequency [bins]")
+    _picture(
+        axes[4],
+        torch.where(inside, wave, torch.nan),
+        "aberration in the iris, green",
+        "waves",
+        extent=(-0.5, 0.5, 0.5, -0.5),
+        axes=("horizontal [cycles / px]", "vertical [cycles / px]"),
+    )
     response = bench.response
     _picture(axes[5], response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
 
