@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .report import Results
 
 INTERRUPTED = 130
+LARGE_PANEL = 512 * 1024
+"""Pixels."""
 
 app = typer.Typer(
     name="holoeval",
@@ -54,10 +56,17 @@ def _output(study: Study, output: Path | None) -> Path:
     return output or Path("reports") / study.name
 
 
-def _threads(threads: int | None, workers: int) -> int:
+def _threads(threads: int | None, workers: int, study: Study) -> int:
+    """Torch threads of a worker: as asked for, else one, or all for a single worker on large panels.
+
+    Transforms of small panels gain less than twofold from a second thread, and lose tenfold and more (measured) when
+    another program wants the core, since the threads wait for each other after every operation.
+    """
     import torch
 
-    return threads or (1 if workers > 1 else torch.get_num_threads())
+    panel = study.display.panel
+    small = panel is not None and panel[0] * panel[1] < LARGE_PANEL
+    return threads or (1 if workers > 1 or small else torch.get_num_threads())
 
 
 @app.command()
@@ -94,7 +103,7 @@ def _run(
     from .study.run import run as compute
 
     console, study, chosen = _console(), load_study(config), executors.executor(executor, workers)
-    folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers)
+    folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers, study)
     with progress.watching(console) as watch:
         outcome = compute(study, grid, folder, chosen, watch, many, retry_failed, retime)
     _sheets(study, folder, outcome.computed > 0)
@@ -157,7 +166,7 @@ def plan(config: Config, output: Output = None, threads: Threads = None) -> None
 
     console, study = _console(), load_study(config)
     folder = _output(study, output)
-    rows = preview(study, planning.plan(study), Store(folder), _threads(threads, 1), 1)
+    rows = preview(study, planning.plan(study), Store(folder), _threads(threads, 1, study), 1)
     console.print(table(study, rows))
     console.print(f"output folder: {folder}", highlight=False, soft_wrap=True)
 

@@ -81,10 +81,14 @@ class Save:
 
 @dataclass(frozen=True)
 class Reported:
-    """Published figures to print beside the measured ones, by method label, and where they were published."""
+    """Published figures to print beside the measured ones, by method label, and where they were published.
+
+    beside: the profile whose rows they stand beside, as ``display.profiles`` names it; none: every profile's.
+    """
 
     source: Text
     rows: Mapping[str, Mapping[str, float]]
+    beside: Text | None = None
 
 
 @dataclass(frozen=True)
@@ -138,6 +142,10 @@ def load_study(path: Path | str) -> Study:
     _check_labels(study, document)
     _check_twins(study, document)
     _check_headline(study, document)
+    if study.reported and study.reported.beside not in (None, *study.display.profiles):
+        near = suggest(str(study.reported.beside), study.display.profiles)
+        message = f"'{study.reported.beside}' is not in display.profiles; {near}"
+        raise document.error(("reported", "beside"), message)
     if study.baseline and study.baseline not in study.labels:
         message = f"no method has the label '{study.baseline}'; {suggest(study.baseline, study.labels)}"
         raise document.error(("baseline",), message)

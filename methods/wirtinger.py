@@ -95,7 +95,7 @@ class Wirtinger:
             best.update(loss, phase)
             return loss.sum()
 
-        optimiser.step(closure)  # type: ignore[no-untyped-call]
+        optimiser.step(closure)
         return best.phase
 
 

@@ -117,6 +117,7 @@ CHANGES = [
     ("headline: ssim_srgb", "headline: ssim_sgrb", "13:11: unknown metric 'ssim_sgrb'; did you mean 'ssim_srgb'?"),
     ("captures: true", "captures: 1", "14:18: save.captures should be a valid boolean"),
     ("GS: {psnr", "gS: {psnr", "15:38: no method has the label 'gS'"),
+    ("rows: {GS", "beside: idael, rows: {GS", "15:39: 'idael' is not in display.profiles; did you mean 'ideal'?"),
     ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
     ("repeats: 2", "protocol: {version: v2}", "11:21: protocol.version should be 'v1'"),
     ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),

@@ -15,7 +15,7 @@ from .warp import Array, Frame
 
 FURTHEST_SHIFT = 2.0  # region pixels
 FURTHEST_TURN = 0.1  # degrees
-BLURS = (3.0, 1.0)  # region pixels: a wide basin first, then the finest detail that speckle leaves
+BLUR = 1.0  # region pixels: averages over speckle grains; wide enough a basin for the furthest shift
 BORDER = 4  # region pixels that take no part: the furthest shift and the reach of the interpolation
 ITERATIONS = 50
 STEP = 1e-3  # region pixels, at the corners: a smaller step ends the search
@@ -56,27 +56,22 @@ def refine(capture: Tensor, target: Tensor) -> Refined:
 
 def _search(capture: Tensor, target: Tensor) -> Array | None:
     """The move (dx, dy, theta) [px, px, rad] within the bounds, or None."""
-    move: Array = np.zeros(3)
-    for blur in BLURS:
-        seen, wanted = _amplitude(capture, blur), _amplitude(target, blur)
-        found = _climb(seen, wanted, move)
-        if found is None:
-            return None
-        move = found
-    if not _within(move, 1.0):
+    seen, wanted = _amplitude(capture), _amplitude(target)
+    move = _climb(seen, wanted)
+    if move is None or not _within(move, 1.0):
         return None
     before, after = (_moved(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
     return move if _correlation(after, wanted) > _correlation(before, wanted) else None
 
 
-def _amplitude(image: Tensor, blur: float) -> Frame:
+def _amplitude(image: Tensor) -> Frame:
     """Square root of the blurred light: blurred first, as the root of speckled edges would spread into the dark."""
     light = image.detach().to("cpu", torch.float32).sum(0).clamp_min(0.0).numpy()
-    return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), blur)))
+    return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), BLUR)))
 
 
-def _climb(seen: Frame, wanted: Frame, start: Array) -> Array | None:
-    """Gauss-Newton from ``start`` with gain and offset free; None far beyond the bounds or without convergence."""
+def _climb(seen: Frame, wanted: Frame) -> Array | None:
+    """Gauss-Newton from no move, with gain and offset free; None far beyond the bounds or without convergence."""
     height, width = wanted.shape
     wide = wanted.astype(np.float64)
     slope_y, slope_x = np.gradient(wide)
@@ -87,7 +82,7 @@ def _climb(seen: Frame, wanted: Frame, start: Array) -> Array | None:
     normal = model.T @ model
     if np.linalg.matrix_rank(normal) < len(normal):
         return None
-    move = start
+    move: Array = np.zeros(3)
     for _ in range(ITERATIONS):
         now = _inner(_moved(seen, _coordinates((height, width), move))).ravel()
         solved = np.linalg.solve(normal, model.T @ now.astype(np.float64))

@@ -29,6 +29,7 @@ ITERATIONS = 3
 OUTLIER = 1.5  # region pixels from the homography: not speckle but dust, or not a circle at all
 FURTHEST = 2.0  # region pixels that the sub-pixel fit may move a corner from where the detector put it
 SIGNIFICANCE = 0.999
+WORTHWHILE = 0.9  # of the residual: fringes of 10 % alone can look like a distortion that lowers it by 8 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,14 +138,15 @@ def _homography(source: Array, target: Array, outlier: float) -> Array:
 
 
 def _bent(frame: Frame, warp: Warp, grid: FiducialGrid) -> Warp:
-    """The warp with a quadratic distortion, where an F-test says that the circles show one."""
+    """The warp with a quadratic distortion, where the circles show one: by an F-test, and by more than fringes do."""
     terms = quadratic_terms(grid.centres, grid.shape)
     moved = offsets(even_picture(frame, warp, grid), grid)
     coefficients = np.linalg.lstsq(terms, moved, rcond=None)[0]
     without, remaining = float(np.sum(moved**2)), float(np.sum((moved - terms @ coefficients) ** 2))
     extra, free = 4, moved.size - 12  # a quadratic has 12 coefficients, 8 of which the homography already fitted
     ratio = (without - remaining) / extra / max(remaining / free, 1e-12)
-    if ratio < float(f_distribution.ppf(SIGNIFICANCE, extra, free)):
+    significant = ratio >= float(f_distribution.ppf(SIGNIFICANCE, extra, free))
+    if not significant or remaining > WORTHWHILE**2 * without:
         return warp
     bent = replace(warp, quadratic=warp.quadratic + coefficients)
     for _ in range(ITERATIONS - 1):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -15,7 +14,6 @@ from ..seeds import generator
 from .contract import Capture, DisplaySpec
 from .profile import Profile
 from .stages import Geometry, Relay
-from .stages.crosstalk import sample_positions
 from .stages.propagation import sample_weights
 from .stages.quantise import straight_through_level
 from .stages.relay import box_filter, sample, sampling_grid
@@ -37,25 +35,24 @@ class ChannelMaps:
 class SimulatedBench:
     """A display that behaves like hardware. Methods see it through ``session``; only the oracle sees inside.
 
-    profile: already scaled to its panel; seed: the study's, so that another seed is another bench of its kind.
+    profile: already scaled to its panel. Its name and seed draw every fixed pattern, so that another seed is another
+    bench of the same kind.
     """
 
-    def __init__(self, profile: Profile, seed: int = 0) -> None:
+    def __init__(self, profile: Profile) -> None:
         self.profile = profile
         self.spec: DisplaySpec = profile.spec()
         panel = profile.panel
         self.samples = profile.sampling
         self.image_samples = min(profile.sampling, 2)
-        names = ("bench", profile.name, profile.version, profile.seed, seed)
+        names = ("bench", profile.name, profile.seed)
         self.channels = tuple(
             self._channel(Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names))
             for index, wavelength in enumerate(panel.wavelengths)
         )
         geometry = self.channels[0].geometry
         self.ramp = blaze(panel.shape, panel.blaze)
-        self.weights = sample_weights(
-            tuple(self.channels[0].transfer.shape), self.samples, profile.aperture is not None
-        )
+        self.weights = sample_weights(self._padded(), self.samples, panel.blaze, hold=profile.aperture is not None)
         self.crosstalk = profile.crosstalk.weights(self.samples)
         self.active = profile.aperture.active_share(self.samples) if profile.aperture else None
         self.drift_gain = profile.drift.phase_gain(geometry)
@@ -88,13 +85,6 @@ class SimulatedBench:
         """One size for all channels: that of the longest wavelength, whose light spreads furthest."""
         panel = self.profile.panel
         return padded_shape(panel.shape, panel.pitch, max(panel.wavelengths), panel.distance, panel.pupil, None)
-
-    def _carriers(self) -> Tensor:
-        """Phase factors ``(samples^2, 1, 1)`` that take the blaze's carrier off each sub-sample."""
-        positions = torch.tensor(sample_positions(self.samples), dtype=torch.float64)
-        vertical, horizontal = self.profile.panel.blaze
-        turns = vertical * positions[:, None] + horizontal * positions[None, :]
-        return torch.polar(torch.ones_like(turns), -2 * torch.pi * turns).reshape(-1, 1, 1).to(torch.complex64)
 
     def _pose(self, geometry: Geometry) -> Relay:
         moved = self.profile.drift.added_shift(geometry)
@@ -167,12 +157,10 @@ def zoom_spectrum(spectrum: Tensor, factor: int) -> Tensor:
     rows, columns = spectrum.shape[-2:]
     upper, left = (rows + 1) // 2, (columns + 1) // 2
     fine = spectrum.new_zeros((*spectrum.shape[:-2], rows * factor, columns * factor))
-    for target_rows, source_rows in (
-        (slice(0, upper), slice(0, upper)),
-        (slice(-(rows // 2), None), slice(upper, None)),
-    ):
-        fine[..., target_rows, :left] = spectrum[..., source_rows, :left]
-        fine[..., target_rows, -(columns // 2) :] = spectrum[..., source_rows, left:]
+    fine[..., :upper, :left] = spectrum[..., :upper, :left]
+    fine[..., :upper, left - columns :] = spectrum[..., :upper, left:]
+    fine[..., upper - rows :, :left] = spectrum[..., upper:, :left]
+    fine[..., upper - rows :, left - columns :] = spectrum[..., upper:, left:]
     return fine * factor**2
 
 
@@ -193,7 +181,7 @@ class BenchSession:
     @torch.no_grad()
     def capture(self, phase: Tensor) -> Capture:
         """Show ``phase`` ``(C, H, W)`` [rad] and photograph the image plane."""
-        profile: Any = self.bench.profile
+        profile = self.bench.profile
         draw = generator("bench noise", profile.name, profile.seed, *self.names, self.frames)
         self.frames += 1
         return self.bench.photograph(phase, self.exposure, draw)

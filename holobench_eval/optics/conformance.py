@@ -89,7 +89,8 @@ def _sum_error(make: Make, size: int, waist: float, distance: float) -> float:
     draw = generator("conformance", "points", size)
     points = torch.randint(size // 4, 3 * size // 4, (2, 64), generator=draw)
     found = make((size, size), PITCH, WAVELENGTH, distance).forward(field.to(torch.complex64))
-    return _relative(found[points[0], points[1]].to(torch.complex128), direct_sum(field, *points, distance))
+    right = direct_sum(field, points[0], points[1], distance)
+    return _relative(found[points[0], points[1]].to(torch.complex128), right)
 
 
 def _adjointness(make: Make) -> float:

@@ -22,9 +22,9 @@ from .sections import label, leading_scores
 from .tables import DONE
 
 FOLDER = "figures"
-TARGETS_SHOWN = 8
+TARGETS_SHOWN = 4
 TARGETS_A_PAGE = 4
-METHODS_A_PAGE = 7
+METHODS_A_PAGE = 8
 PIXELS = 5e6
 """Pixels of all comparison pages of a condition, at most: full-panel captures are shown for fewer targets."""
 
@@ -51,7 +51,7 @@ class Figures:
 def draw_figures(results: Results, output: Path) -> Figures:
     """Draw everything that the records allow into ``output/figures``; older figures of the same kinds go."""
     folder = output / FOLDER
-    for pattern in ("comparison-*.png", "quality-*.png"):
+    for pattern in ("comparison-*.jpg", "quality-*.png"):
         for old in folder.glob(pattern):
             old.unlink()
     absent: list[str] = []
@@ -123,7 +123,7 @@ def _comparison(results: Results, output: Path, condition: str, stem: str, absen
     for number, (rows, labels) in enumerate(pages, start=1):
         columns = [Column(label(results, name), tuple(tiles[name, row] for row in rows)) for name in labels]
         page = f", page {number} of {len(pages)}" if len(pages) > 1 else ""
-        path = f"{FOLDER}/comparison-{stem}-{number}.png"
+        path = f"{FOLDER}/comparison-{stem}-{number}.jpg"
         title = f"{condition}: targets and matched captures{page}"
         draw_comparison(output / path, title, [(row, targets[row]) for row in rows], columns, scale)
         yield Drawn(path, _caption(results, condition, page, len(shown)))

@@ -23,7 +23,8 @@ class Layout:
     baseline: label that every method is tested against (None: no such tests).
     headline: score key of the headline metric, such as ``psnr_linear``.
     privileged: labels of methods that may differentiate through the bench; they are the ceiling, not competitors.
-    reported: published figures by label, ``{label: {metric: value}}``, and where they were published.
+    reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
+    reported_beside: the condition whose rows they stand beside (None: every one's).
     """
 
     title: str
@@ -35,6 +36,11 @@ class Layout:
     privileged: frozenset[str] = frozenset()
     reported: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     reported_source: str = ""
+    reported_beside: str | None = None
+
+    def published(self, label: str, condition: str) -> Mapping[str, float]:
+        """Published figures of a row, by metric."""
+        return self.reported.get(label, {}) if self.reported_beside in (None, condition) else {}
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -67,4 +73,5 @@ def layout_of(study: Study) -> Layout:
         privileged=frozenset(label for label, method in methods.items() if getattr(method, "privileged", False)),
         reported=reported.rows if reported else {},
         reported_source=reported.source if reported else "",
+        reported_beside=names[reported.beside] if reported and reported.beside else None,
     )

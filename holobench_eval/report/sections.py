@@ -52,10 +52,11 @@ def interval(row: pd.Series, score: Score) -> str:
 
 def headline_rows(results: Results, condition: str) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of a condition's main table; published figures stand in columns of their own."""
-    scores, reported = leading_scores(results), results.layout.reported_metrics
+    scores, layout = leading_scores(results), results.layout
+    reported = layout.reported_metrics if layout.reported_beside in (None, condition) else ()
     rows = []
     for name in results.methods(condition):
-        row, published = results.row(name, condition), results.layout.reported.get(name, {})
+        row, published = results.row(name, condition), layout.published(name, condition)
         rows.append(
             [
                 label(results, name),

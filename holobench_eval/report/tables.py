@@ -131,7 +131,7 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
         estimate = bootstrap_mean(values if values.size == n or not parse(score).domain else [])
         row |= {score: estimate.mean, f"{score}_lo": estimate.low, f"{score}_hi": estimate.high}
     row |= {"captures": done["captures"].mean(), "seconds": done["seconds"].mean()}
-    published = layout.reported.get(label, {})
+    published = layout.published(label, condition)
     return row | {f"reported_{name}": published.get(name, np.nan) for name in layout.reported_metrics}
 
 

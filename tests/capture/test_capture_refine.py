@@ -90,6 +90,17 @@ def test_a_move_beyond_the_bounds_returns_the_capture_itself(move):
     assert (found.dx, found.dy, found.theta) == (0.0, 0.0, 0.0)
 
 
+def test_a_move_that_would_lower_the_correlation_is_not_taken():
+    """On this pair, hardly related, the linearised search ends 0.3 px off with a correlation of 0.494 for 0.495."""
+    draw = random("unrelated", 445)
+    share = 0.5 * draw.random()
+    one, other = (cv2.GaussianBlur(draw.random((48, 48)), (0, 0), 1.5).astype(np.float32) for _ in range(2))
+    capture = torch.from_numpy(one)[None]
+    found = refine(capture, torch.from_numpy(share * one + (1 - share) * other)[None])
+    assert (found.dx, found.dy, found.theta) == (0.0, 0.0, 0.0)
+    assert torch.equal(found.image, capture)
+
+
 def test_pictures_without_structure_or_relation_return_the_capture_itself():
     target = seen(PICTURES["coffee"])
     flat = torch.full_like(target, 0.5)

@@ -41,6 +41,17 @@ def test_full_pixels_roll_off_like_a_sinc(with_stage):
     assert share == pytest.approx(float(torch.sinc(torch.tensor(0.3)) ** 2), rel=0.02)
 
 
+def test_blazed_light_is_that_of_a_square_pixel_at_its_angle(with_stage):
+    """A flat phase with a blaze leaves at the carrier, where a full pixel sends sinc^2 of its light."""
+    flat = torch.zeros(PANEL)
+    panel = replace(with_stage().panel, blaze=(0.0, 0.25), pupil=0.4)
+    straight = SimulatedBench(with_stage(panel=replace(panel, blaze=(0.0, 0.0)))).intensity(flat, 1).mean()
+    for sampling in (1, 3, 5):
+        bench = SimulatedBench(with_stage(panel=panel, sampling=sampling, aperture=PixelAperture()))
+        share = float(bench.intensity(flat, 1).mean() / straight)
+        assert share == pytest.approx(float(torch.sinc(torch.tensor(0.25)) ** 2), rel=0.02)
+
+
 def test_unmodulated_light_is_there_under_any_phase(with_stage, phase):
     bench = SimulatedBench(with_stage(zero_order=ZeroOrder(0.999)))
     assert float(bench.intensity(phase[1], 1).mean()) == pytest.approx(1, abs=0.1)

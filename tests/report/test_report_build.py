@@ -60,8 +60,8 @@ def test_a_report_is_written_with_tables_and_every_figure(records, report):
         "figures/quality-bars.png",
         "figures/quality-by-target.png",
         "figures/quality-time.png",
-        "figures/comparison-leto-aged-1.png",
-        "figures/comparison-ideal-1.png",
+        "figures/comparison-leto-aged-1.jpg",
+        "figures/comparison-ideal-1.jpg",
     ]
     for name in linked:
         picture = imread(folder / name)
@@ -116,7 +116,7 @@ def test_a_hole_is_listed_with_its_reason(report):
 def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
     _, found = records
     kept, layout = minimal(found)
-    stale, sheet = tmp_path / "figures" / "comparison-old-9.png", tmp_path / "figures" / "stages-leto-aged.png"
+    stale, sheet = tmp_path / "figures" / "comparison-old-9.jpg", tmp_path / "figures" / "stages-leto-aged.png"
     for file in (stale, sheet):
         made.save_picture(file, np.full((8, 8, 3), 0.5))
     text = write_report(layout, kept, tmp_path, {}, Description()).read_text()
@@ -139,7 +139,7 @@ def test_missing_thumbnails_are_said_and_stop_nothing(records, tmp_path):
     one = kept[-1]
     made.save_picture(store.folder / f"{made.digest(one['cell'])}.png", np.full((48, 48, 3), 0.4))
     text = write_report(layout, kept, tmp_path, {}, Description()).read_text()
-    assert "(figures/comparison-leto-aged-1.png)" in text
+    assert "(figures/comparison-leto-aged-1.jpg)" in text
     assert "Thumbnails that were expected and are not there (7)" in text
 
 

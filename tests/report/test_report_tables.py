@@ -122,3 +122,10 @@ def test_a_score_named_like_a_column_is_refused():
 def test_records_of_another_version_are_refused():
     with pytest.raises(UserError, match="lacks the columns"):
         read_records("method,target\na,b\n")
+
+
+def test_published_figures_stand_beside_the_display_they_belong_to(records):
+    layout = made.layout(reported_beside=made.layout().conditions[0])
+    table = table_from_records(records_frame(records, layout), layout)
+    beside = table[table["reported_psnr"].notna()]
+    assert set(beside["condition"]) == {layout.conditions[0]}

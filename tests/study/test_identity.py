@@ -61,7 +61,6 @@ def test_a_method_is_another_after_a_change_of_its_code(tmp_path: Path) -> None:
 
 def test_a_method_is_another_after_a_change_of_a_module_beside_it() -> None:
     from holobench_eval.methods import wirtinger
-
     from holobench_eval.study import identity
 
     files = identity._code(Path(wirtinger.__file__), 0)[1]

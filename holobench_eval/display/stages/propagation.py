@@ -56,14 +56,16 @@ class Propagation:
         return wavefront(self.aberration, y / beyond, x / beyond) * (517e-9 / geometry.wavelength)
 
 
-def sample_weights(padded: tuple[int, int], samples: int, hold: bool) -> Tensor:
+def sample_weights(padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool) -> Tensor:
     """Weights ``(samples^2, rows, columns)`` that add the spectra of the sub-samples to that of the panel.
 
-    Each sub-sample sits off its pixel's centre and, with ``hold``, is a small square (a sinc in frequency).
+    Each sub-sample sits off its pixel's centre and, with ``hold``, is a small square (a sinc in frequency). The
+    spectra are those of fields whose carrier ``blaze`` [cycles per pixel] has been taken off pixel by pixel, so the
+    light of frequency f left the panel at f + blaze.
     """
     axes = []
-    for size in padded:
-        f = torch.fft.fftfreq(size, dtype=torch.float64)
+    for size, carrier in zip(padded, blaze, strict=True):
+        f = torch.fft.fftfreq(size, dtype=torch.float64) + carrier
         envelope = torch.sinc(f / samples) if hold else torch.ones_like(f)
         angle = -2 * math.pi * torch.tensor(sample_positions(samples), dtype=torch.float64)[:, None] * f
         axes.append(torch.polar(envelope.expand_as(angle).contiguous(), angle) / samples)
