@@ -24,7 +24,10 @@ class Best:
     def update(self, loss: Tensor, phase: Tensor) -> None:
         """Keep ``phase`` ``(B, H, W)`` where ``loss`` ``(B,)`` is the least so far."""
         better = loss < self.loss
-        self.phase = torch.where(better[:, None, None], phase.detach(), self.phase)
+        if better.all():
+            self.phase.copy_(phase.detach())
+        else:
+            self.phase[better] = phase.detach()[better]
         self.loss = torch.where(better, loss.detach(), self.loss)
 
 

@@ -29,7 +29,7 @@ ITERATIONS = 3
 OUTLIER = 1.5  # region pixels from the homography: not speckle but dust, or not a circle at all
 FURTHEST = 2.0  # region pixels that the sub-pixel fit may move a corner from where the detector put it
 SIGNIFICANCE = 0.999
-WORTHWHILE = 0.9  # of the residual: fringes of 10 % alone can look like a distortion that lowers it by 8 %
+WORTHWHILE = 0.85  # of the residual: fringes of 10 % alone can look like a distortion that lowers it to 0.89
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from ..optics.convolution import multiply
 from ..optics.padding import padded_shape
 from ..optics.phase import blaze
 from ..seeds import generator
@@ -21,7 +22,10 @@ from .stages.relay import box_filter, sample, sampling_grid
 
 @dataclass(frozen=True)
 class ChannelMaps:
-    """What is fixed for one colour channel: every random pattern drawn, every transfer function built."""
+    """What is fixed for one colour channel: every random pattern drawn, every transfer function built.
+
+    lut_gain, incident: ``(H, W)``; transfer, plane (transmission of the dust plane), last_transfer: padded.
+    """
 
     geometry: Geometry
     lut_gain: Tensor
@@ -54,9 +58,15 @@ class SimulatedBench:
         self.ramp = blaze(panel.shape, panel.blaze)
         self.weights = sample_weights(self._padded(), self.samples, panel.blaze, hold=profile.aperture is not None)
         self.crosstalk = profile.crosstalk.weights(self.samples)
-        self.active = profile.aperture.active_share(self.samples) if profile.aperture else None
+        aperture, order = profile.aperture, profile.zero_order
+        active = aperture.active_share(self.samples) if aperture else torch.ones(self.samples**2, 1, 1)
+        dead = aperture.dead_share(self.samples) if aperture else torch.zeros(self.samples**2, 1, 1)
+        self.modulated = order.modulated * active
+        self.unmodulated = order.modulated * dead + order.unmodulated
         self.drift_gain = profile.drift.phase_gain(geometry)
-        self.points = self._pose(geometry).panel_points(panel.shape, panel.pitch, profile.sensor.pitch)
+        self.points = self._pose(geometry).panel_points(
+            panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape
+        )
         self.grid = sampling_grid(self.points, panel.shape)
         self.response = profile.sensor.response((self.points.shape[0], self.points.shape[1]), geometry)
 
@@ -68,7 +78,11 @@ class SimulatedBench:
         ramp = blaze(geometry.shape, profile.panel.blaze)
         demodulation = torch.polar(torch.ones_like(ramp), -ramp)
         incident = light.field(geometry) * profile.coherent_noise.panel(geometry) * demodulation
-        plane = profile.coherent_noise.plane(geometry)
+        dust = profile.coherent_noise.plane(geometry)
+        plane = None
+        if dust is not None:
+            plane = torch.ones(self._padded(), dtype=torch.complex64)
+            plane[: geometry.shape[0], : geometry.shape[1]] = dust
         turning = 1 - profile.coherent_noise.plane_distance if plane is not None else 1.0
         padded, pupil, way = self._padded(), profile.panel.pupil, profile.propagation
         return ChannelMaps(
@@ -97,12 +111,8 @@ class SimulatedBench:
         level = straight_through_level(phase + self.ramp, profile.panel.bits)
         shown = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
         fine = profile.crosstalk.apply(shown, self.crosstalk)
-        if profile.aperture is not None and self.active is not None:
-            field = profile.aperture.field(fine, self.active)
-        else:
-            field = torch.complex(torch.cos(fine), torch.sin(fine))
-        field = profile.zero_order.modulated * field + profile.zero_order.unmodulated
-        return field * maps.incident
+        field = torch.polar(self.modulated.expand_as(fine), fine) + self.unmodulated
+        return multiply(field, maps.incident)
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane, ``image_samples`` a pixel; differentiable in ``phase`` ``(H, W)``.
@@ -111,15 +121,16 @@ class SimulatedBench:
         """
         maps = self.channels[channel]
         height, width = self.spec.shape
-        spectrum = torch.zeros_like(maps.transfer)
-        for samples, weights in zip(self.reflected(phase, channel, flicker), self.weights, strict=True):
-            spectrum = torch.addcmul(spectrum, torch.fft.fft2(samples, s=maps.transfer.shape), weights)
-        spectrum = spectrum * maps.transfer
+        spectra = (
+            torch.fft.fft2(samples, s=maps.transfer.shape) for samples in self.reflected(phase, channel, flicker)
+        )
+        spectrum = multiply(next(spectra), self.weights[0])
+        for other, weights in zip(spectra, self.weights[1:], strict=True):
+            spectrum = spectrum + multiply(other, weights)
+        spectrum = multiply(spectrum, maps.transfer)
         if maps.plane is not None and maps.last_transfer is not None:
-            field = torch.fft.ifft2(spectrum)
-            dirty = torch.cat([field[:height, :width] * maps.plane, field[:height, width:]], 1)
-            field = torch.cat([dirty, field[height:]], 0)
-            spectrum = torch.fft.fft2(field) * maps.last_transfer
+            field = multiply(torch.fft.ifft2(spectrum), maps.plane)
+            spectrum = multiply(torch.fft.fft2(field), maps.last_transfer)
         fine = torch.fft.ifft2(zoom_spectrum(spectrum, self.image_samples))
         fine = fine[: height * self.image_samples, : width * self.image_samples]
         return (fine.real.square() + fine.imag.square()) * maps.laser_power

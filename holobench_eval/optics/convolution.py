@@ -58,14 +58,13 @@ class Convolution:
         if tuple(field.shape[-2:]) != (height, width):
             raise ValueError(f"field is {tuple(field.shape[-2:])}, the propagator was made for {self.shape}")
         spectrum = torch.fft.fft2(field, s=self.padded_shape)
-        # in place where no gradient needs the factors: a new array of this size costs as much as the product
-        product = spectrum * transfer if spectrum.requires_grad else _multiplied(spectrum, transfer)
-        return torch.fft.ifft2(product)[..., :height, :width]
+        spectrum = spectrum.to(torch.promote_types(spectrum.dtype, transfer.dtype))
+        return torch.fft.ifft2(multiply(spectrum, transfer))[..., :height, :width]
 
 
-def _multiplied(spectrum: Tensor, transfer: Tensor) -> Tensor:
-    wide = torch.promote_types(spectrum.dtype, transfer.dtype)
-    return spectrum.to(wide).mul_(transfer)
+def multiply(scratch: Tensor, factor: Tensor) -> Tensor:
+    """``scratch * factor``, in place where no gradient needs ``scratch``: a new array costs as much as the product."""
+    return scratch * factor if scratch.requires_grad else scratch.mul_(factor)
 
 
 def frequencies(shape: tuple[int, int], pitch: float, device: torch.device | str = "cpu") -> tuple[Tensor, Tensor]:

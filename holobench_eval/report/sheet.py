@@ -15,6 +15,7 @@ from torch import Tensor
 from ..datasets.charts import Charts
 from ..display import load_profile, open_bench
 from ..display.bench import SimulatedBench
+from ..display.stages import PixelAperture
 from ..display.workbench import Workbench
 from ..methods.wirtinger import Wirtinger
 from ..metrics import match, score
@@ -80,7 +81,8 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
         title=f"crosstalk, {profile.crosstalk.width:g} px", xlabel="offset [px]", ylabel="share of a pixel's phase"
     )
     _wrap_edge(axes[3], bench)
-    active = torch.ones(1, 1) if bench.active is None else bench.active.reshape(bench.samples, bench.samples)
+    aperture = profile.aperture or PixelAperture()
+    active = aperture.active_share(bench.samples).reshape(bench.samples, bench.samples)
     sub = ("sub-sample column", "sub-sample row")
     _picture(axes[4], active, "active share of the sub-samples of a pixel", "share of area", "gray", axes=sub)
     draw = bench.channels[GREEN].geometry.generator("sheet")
@@ -112,7 +114,7 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
     _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
     clean = torch.ones(bench.spec.shape)
-    plane = clean if maps.plane is None else maps.plane.real
+    plane = clean if maps.plane is None else maps.plane.real[: clean.shape[0], : clean.shape[1]]
     _picture(axes[3], plane, "dust on the plane before the image", "amplitude")
     f = torch.linspace(-0.5, 0.5, 201, dtype=torch.float64) / bench.spec.pitch
     fy, fx = f[:, None], f[None, :]

@@ -9,17 +9,9 @@ from holobench_eval.display import load_profile
 from holobench_eval.display.bench import SimulatedBench
 
 
-@pytest.fixture(autouse=True)
-def two_threads():
-    before = torch.get_num_threads()
-    torch.set_num_threads(2)
-    yield
-    torch.set_num_threads(before)
-
-
 @pytest.fixture(scope="module", params=[1, 3], ids=["1 sub-sample", "3 sub-samples"])
-def bench(request):
-    return SimulatedBench(replace(load_profile("leto-aged"), sampling=request.param))
+def bench(request, panel):
+    return SimulatedBench(replace(load_profile("leto-aged"), sampling=request.param).scaled(panel))
 
 
 @torch.no_grad()

@@ -12,26 +12,18 @@ from holobench_eval.methods.descent import Best
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective
 
-SHAPE = (1080, 1920)
 PUPILS = {"no iris": None, "iris 0.8": 0.8}
 
 
-@pytest.fixture(autouse=True)
-def two_threads():
-    before = torch.get_num_threads()
-    torch.set_num_threads(2)
-    yield
-    torch.set_num_threads(before)
-
-
-def spec(pupil):
-    region = Region(100, 180, 880, 1560)
-    return DisplaySpec("benchmark", SHAPE, 6.4e-6, (517e-9,), 0.1, 8, pupil, region)
+def spec(panel, pupil):
+    height, width = panel
+    region = Region(height // 12, width // 12, height * 5 // 6, width * 5 // 6)
+    return DisplaySpec("benchmark", panel, 6.4e-6, (517e-9,), 0.1 * height / 1080, 8, pupil, region)
 
 
 @pytest.mark.parametrize("pupil", PUPILS.values(), ids=PUPILS.keys())
-def test_four_bare_ffts(benchmark, pupil):
-    shape = spec(pupil).propagator(0).padded_shape
+def test_four_bare_ffts(benchmark, panel, pupil):
+    shape = spec(panel, pupil).propagator(0).padded_shape
     fields = torch.randn(1, *shape, dtype=torch.complex64)
 
     def transforms():
@@ -42,18 +34,18 @@ def test_four_bare_ffts(benchmark, pupil):
 
 
 @pytest.mark.parametrize("pupil", PUPILS.values(), ids=PUPILS.keys())
-def test_ideal_propagation(benchmark, pupil):
-    model = spec(pupil).propagator(0)
-    field = unit_field(torch.rand(1, *SHAPE))
+def test_ideal_propagation(benchmark, panel, pupil):
+    model = spec(panel, pupil).propagator(0)
+    field = unit_field(torch.rand(1, *panel))
     benchmark(model.forward, field)
 
 
 @pytest.mark.parametrize("pupil", PUPILS.values(), ids=PUPILS.keys())
-def test_wirtinger_iteration(benchmark, pupil):
-    optics = spec(pupil)
+def test_wirtinger_iteration(benchmark, panel, pupil):
+    optics = spec(panel, pupil)
     target = torch.rand(1, *optics.region.shape)
     objective = Objective(optics.propagator(0), optics.region, target, LOSSES["intensity_l2"])
-    phase = torch.rand(1, *SHAPE)
+    phase = torch.rand(1, *panel)
     best = Best(phase)
     optimiser = torch.optim.Adam([phase], lr=0.1)
 

@@ -114,8 +114,9 @@ def capture(
     if uneven:
         v, u = (np.linspace(0, 1, side) for side in sensor)
         v, u = v[:, None] - draw.uniform(0.35, 0.65), u[None, :] - draw.uniform(0.35, 0.65)
-        fringes = 1 + 0.1 * np.cos(2 * np.pi * (6 * u * draw.uniform(-1, 1) + 6 * v * draw.uniform(-1, 1)))
-        seen = seen * np.exp(-(u**2 + v**2) / (2 * 0.4**2)) * fringes
+        across, down = draw.uniform(-0.02, 0.02, 2) * (sensor[1], sensor[0])
+        fringes = 1 + 0.1 * np.cos(2 * np.pi * (across * u + down * v))
+        seen = seen * np.exp(-(u**2 + v**2) / (2 * 0.35**2)) * fringes
     bright = float(np.percentile(seen, 99))
     seen = seen + background * bright + noise * bright * draw.standard_normal(sensor)
     return seen.astype(np.float32)

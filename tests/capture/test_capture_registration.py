@@ -87,12 +87,15 @@ def test_a_distortion_is_fitted_where_there_is_one_and_left_out_where_there_is_n
         assert corner_error(found, where) < 0.06
 
 
-def test_uneven_light_is_not_taken_for_a_distortion():
-    shape, sensor = (300, 300), (640, 640)
-    for index in range(5):
-        draw = random("no distortion", index)
-        found = registered(fiducial(shape), pose(draw, shape, sensor), sensor, draw, contrast=0.7)
-        assert not found.warps[0].quadratic.any()
+@pytest.mark.parametrize("index", [26, 31])
+def test_uneven_light_is_not_taken_for_a_distortion(index):
+    """Two of forty draws in which the F-test alone, at one in a thousand, sees a distortion in speckle and fringes."""
+    shape, sensor = (400, 400), (960, 960)
+    draw = random("no distortion", index)
+    where = pose(draw, shape, sensor)
+    found = registered(fiducial(shape), where, sensor, draw, contrast=0.7, background=0.1)
+    assert not found.warps[0].quadratic.any()
+    assert corner_error(found, where) < 0.15
 
 
 def test_every_channel_has_its_own_warp_and_rectify_undoes_it(grid):

@@ -30,9 +30,6 @@ class PixelAperture:
         row = torch.tensor(shares, dtype=torch.float64)
         return torch.outer(row, row).reshape(-1, 1, 1).float()
 
-    def field(self, phase: Tensor, active: Tensor) -> Tensor:
-        """Reflected field of sub-samples with ``phase`` [rad] ``(samples^2, H, W)`` under unit illumination."""
-        return torch.complex(
-            active * torch.cos(phase) + (1 - active) * self.dead_amplitude,
-            active * torch.sin(phase),
-        )
+    def dead_share(self, samples: int) -> Tensor:
+        """Amplitude that each sub-sample reflects without modulation, ``(samples^2, 1, 1)``."""
+        return (1 - self.active_share(samples)) * self.dead_amplitude

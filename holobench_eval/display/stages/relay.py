@@ -26,14 +26,19 @@ class Relay:
     perspective: tuple[float, float] = (0.0, 0.0)
     distortion: Annotated[float, Interval(ge=-0.2, le=0.2)] = 0.0
 
-    def frame_shape(self, shape: tuple[int, int], pitch: float, sensor_pitch: float) -> tuple[int, int]:
-        """Sensor window (rows, columns) that holds the panel's image with a margin of 5 %."""
+    def frame_shape(self, window: tuple[int, int], pitch: float, sensor_pitch: float) -> tuple[int, int]:
+        """Sensor read-out (rows, columns) for a window of the panel [px], with a margin of 12 % for the pose."""
         ratio = self.magnification * pitch / sensor_pitch
-        return math.ceil(shape[0] * ratio * 1.05), math.ceil(shape[1] * ratio * 1.05)
+        return math.ceil(window[0] * ratio * 1.12), math.ceil(window[1] * ratio * 1.12)
 
-    def panel_points(self, shape: tuple[int, int], pitch: float, sensor_pitch: float) -> Tensor:
-        """Panel coordinates (row, column) [px] seen by every sensor pixel, ``(Hs, Ws, 2)`` float64."""
-        rows, columns = self.frame_shape(shape, pitch, sensor_pitch)
+    def panel_points(
+        self, shape: tuple[int, int], pitch: float, sensor_pitch: float, window: tuple[int, int] | None = None
+    ) -> Tensor:
+        """Panel coordinates (row, column) [px] seen by every sensor pixel, ``(Hs, Ws, 2)`` float64.
+
+        window: the part of the panel, in its middle, that is read out (all of it by default).
+        """
+        rows, columns = self.frame_shape(window or shape, pitch, sensor_pitch)
         ratio = self.magnification * pitch / sensor_pitch * shape[0]
         v = ((torch.arange(rows, dtype=torch.float64) - (rows - 1) / 2) / ratio - self.shift[0])[:, None]
         u = ((torch.arange(columns, dtype=torch.float64) - (columns - 1) / 2) / ratio - self.shift[1])[None, :]

@@ -61,8 +61,7 @@ class Sensor:
         charge = light * response * electrons
         if not self.noise:
             return (charge * self.counts_per_electron + self.dark).clamp(max=self.white)
-        shot = charge.clamp_min(0).add(self.read_noise**2).sqrt_()
-        charge = torch.randn(charge.shape, generator=draw).mul_(shot).add_(charge)
-        charge = charge - self.nonlinearity / self.full_well * charge.clamp_min(0).square()
-        counts = charge.mul_(self.counts_per_electron).add_(self.dark).round_()
-        return counts.clamp_(0, self.white)
+        deviation = charge.clamp_min(0).add_(self.read_noise**2).sqrt_()
+        charge = torch.randn(charge.shape, generator=draw).mul_(deviation).add_(charge)
+        charge = torch.addcmul(charge, charge, charge, value=-self.nonlinearity / self.full_well)
+        return charge.mul_(self.counts_per_electron).add_(self.dark).round_().clamp_(0, self.white)
