@@ -54,6 +54,9 @@ _MODES = {
 _BITS_PER_SAMPLE = 258  # TIFF 6.0, section 8
 _ORIENTATION = 274  # Exif 2.32, section 4.6.4
 
+PNG_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"
+"""The last chunk of every PNG (PNG specification, section 11.2.4)."""
+
 
 def read(path: Path) -> bytes:
     """The contents of an image file; UserError when it is missing, no regular file, unreadable or too large."""
@@ -78,6 +81,8 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     colour space by its ICC profile.
     """
     image = _open(content, name)
+    if image.format == "PNG" and PNG_END not in content:  # Pillow is content with all pixels
+        raise UserError(f"{name}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
     found = _fault(image, gray)
     bits = _bits(image, content)
     if found is None and bits == 16 and sixteen_bit == "refuse":

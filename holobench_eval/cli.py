@@ -117,7 +117,6 @@ def _run(
 def _sheets(study: Study, output: Path, anew: bool) -> None:
     """Draw the stages of every display of a study beside its report, where they are missing or it was computed anew."""
     from .display import load_profile
-    from .errors import CellError
     from .report.sheet import save_sheet
     from .study.bench import condition, workbench
 
@@ -128,7 +127,7 @@ def _sheets(study: Study, output: Path, anew: bool) -> None:
             note = load_profile(source, study.folder).scaling_note(study.display.panel)
             try:
                 save_sheet(workbench(place, study.seed), note, path)
-            except CellError as error:
+            except Exception as error:  # a picture must not cost the report
                 print(f"holoeval: no stage sheet of {place.name}: {error}", file=sys.stderr)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import json
 import sys
 from dataclasses import is_dataclass
 from importlib.metadata import EntryPoint, entry_points
@@ -58,7 +59,7 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {type(error).__name__}: {error}") from error
     found = getattr(module, attribute, None)
     if found is None:
@@ -82,9 +83,14 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
         if key not in fields:
             raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, fields)}")
     try:
-        return TypeAdapter(cls).validate_python(params)
+        return TypeAdapter(cls).validate_json(json.dumps(params), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         message = first["msg"][:1].lower() + first["msg"][1:]
         raise UserError(f"{kind[:-1]} '{name}': parameter '{where}': {message}, got {first['input']!r}") from error
+    except UserError:
+        raise
+    except Exception as error:  # whatever a stranger's class does when it is built
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise UserError(f"{kind[:-1]} '{name}' cannot be built: {reason}") from error

@@ -124,8 +124,10 @@ class Workbench:
         per_unit = sensor.full_well / sensor.headroom / concentration(target, self.spec)
         return tuple(per_unit.tolist())
 
-    def for_method(self, method: object, label: str, target: Tensor, item: str, repeat: int) -> MeteredBench:
-        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)``."""
+    def for_method(
+        self, method: object, label: str, target: Tensor, item: str, repeat: int, budget: int | None = None
+    ) -> MeteredBench:
+        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)`` with at most ``budget`` captures."""
         return MeteredBench(
             self,
             label,
@@ -133,6 +135,7 @@ class Workbench:
             (self.seed, item, repeat),
             camera=bool(getattr(method, "camera", False)),
             privileged=bool(getattr(method, "privileged", False)),
+            budget=budget,
         )
 
     def photograph(
@@ -169,56 +172,71 @@ class Workbench:
         return light / concentration(target, self.spec)[: light.shape[0], None, None]
 
 
-@dataclass
 class MeteredBench:
-    """All that a method sees of a display: nominal optics, a metered camera, named random numbers.
+    """All that a method may see of a display: nominal optics, a metered camera, named random numbers.
 
-    budget: captures that may be taken, None for no limit.
+    Everything else is private to the harness, its account of captures included. budget: captures that may be taken,
+    None for no limit.
     """
 
-    workbench: Workbench
-    label: str
-    target: Tensor
-    names: tuple[object, ...]
-    camera: bool = False
-    privileged: bool = False
-    budget: int | None = None
-    captures: int = 0
+    def __init__(
+        self,
+        workbench: Workbench,
+        label: str,
+        target: Tensor,
+        names: tuple[object, ...],
+        camera: bool,
+        privileged: bool,
+        budget: int | None = None,
+    ) -> None:
+        self._workbench = workbench
+        self._label = label
+        self._target = target.clone()  # a method that writes to its target must not reach the scored one
+        self._names = names
+        self._camera = camera
+        self._privileged = privileged
+        self._budget = budget
+        self._captures = 0
 
     @property
     def spec(self) -> DisplaySpec:
         """Nominal optics, public."""
-        return self.workbench.spec
+        return self._workbench.spec
+
+    @property
+    def captures(self) -> int:
+        """Captures taken so far."""
+        return self._captures
 
     @property
     def simulation(self) -> Simulation:
         """The bench itself, for privileged methods alone."""
-        if not self.privileged:
-            raise CellError(f"{self.label}: only a method that declares privileged = True may see the simulated bench")
-        return self.workbench.simulation
+        if not self._privileged:
+            raise CellError(f"{self._label}: only a method that declares privileged = True may see the simulated bench")
+        return self._workbench.simulation
 
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on study seed, target, repeat and ``names``."""
-        return generator("method", *self.names, *names)
+        return generator("method", *self._names, *names)
 
     @cached_property
     def _session(self) -> BenchSession:
-        light = self.workbench.exposure(self.target)
-        return self.workbench.bench.session(*self.names, "solve", exposure=light)
+        light = self._workbench.exposure(self._target)
+        return self._workbench.bench.session(*self._names, "solve", exposure=light)
 
     def capture(self, phase: Tensor) -> Capture:
         """Show ``phase`` ``(C, H, W)`` [rad] and photograph it; counted. CellError if the method declares no camera."""
-        if not self.camera:
-            raise CellError(f"{self.label} took a capture, but declares no camera (camera = True)")
-        if self.budget is not None and self.captures >= self.budget:
-            raise BudgetError(f"{self.label} has used its {self.budget} captures")
-        check_phase(phase, self.spec, self.label)
-        self.captures += 1
+        if not self._camera:
+            raise CellError(f"{self._label} took a capture, but declares no camera (camera = True)")
+        if self._budget is not None and self._captures >= self._budget:
+            raise BudgetError(f"{self._label} has used its {self._budget} captures")
+        check_phase(phase, self.spec, self._label)
+        self._captures += 1
         return self._session.capture(phase)
 
     def rectify(self, capture: Capture) -> Tensor:
         """A capture in the target's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency."""
-        return self.workbench.rectified(capture, self.target)
+        return self._workbench.rectified(capture, self._target)
 
 
 def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:

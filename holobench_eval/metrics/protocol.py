@@ -109,7 +109,10 @@ def score(
 
 def _checked(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
     """Both as float64 tensors on one device; float64, since SSIM subtracts nearly equal squares."""
-    light, wanted = (torch.as_tensor(side).detach().to(torch.float64) for side in (capture, target))
+    light, wanted = (
+        (side if isinstance(side, Tensor) else torch.from_numpy(np.array(side, dtype=np.float64))).detach().double()
+        for side in (capture, target)
+    )
     light = light.to(wanted.device)
     if light.shape != wanted.shape or light.ndim != 3 or light.shape[0] not in (1, 3):
         raise ValueError(

@@ -14,6 +14,9 @@ Padding = int | Literal["reference"] | None
 DEFAULT_ERROR = 0.9e-2
 """Relative rms error on a white complex field that the default padding is chosen for (it states 1e-2)."""
 
+REFERENCE_ERROR = 1.2e-3
+"""The same for the reference padding where light spreads over more than the picture; it states 2e-3."""
+
 IRIS_EDGE = 0.05
 """Half width of the iris's raised-cosine edge, relative to its radius."""
 
@@ -41,21 +44,24 @@ def tail_error(size: int, spread_pixels: float, padded: int) -> float:
 
 
 @lru_cache(maxsize=256)
-def padded_size(size: int, spread_pixels: float, sharp_band: bool, padding: Padding) -> int:
+def padded_size(size: int, spread_pixels: float, soft_edge: int | None, padding: Padding) -> int:
     """Samples per axis of the transform that propagates ``size`` pixels, rounded up to a fast FFT size.
 
-    None: the smallest size whose tail error is below the stated one (both axes together). With an iris inside
-    the band (``sharp_band`` False) the soft edge leaves no tails and ``N + K + 32`` errs below 5e-3.
+    None: the smallest size whose tail error is below the stated one (both axes together). With an iris inside the
+    band its soft edge leaves short tails, and ``N + K + soft_edge`` is enough (``soft_edge`` None: no such iris).
     ``"reference"``: four times the size, more when the light spreads further. An integer: samples added.
     """
     if padding == "reference":
-        return max(4 * size, int(next_fast_len(size + math.ceil(4 * spread_pixels))))
+        padded = 4 * size
+        while spread_pixels > size and tail_error(size, spread_pixels, padded) > REFERENCE_ERROR / math.sqrt(2):
+            padded = int(next_fast_len(padded + size // 2))
+        return padded
     if padding is not None:
         if isinstance(padding, bool) or not isinstance(padding, int) or padding < 0:
             raise ValueError(f"padding must be None, 'reference' or a whole number of samples >= 0, got {padding!r}")
         return int(next_fast_len(size + padding))
-    padded = int(next_fast_len(size + math.ceil(spread_pixels) + (16 if sharp_band else 32)))
-    while sharp_band and tail_error(size, spread_pixels, padded) > DEFAULT_ERROR / math.sqrt(2):
+    padded = int(next_fast_len(size + math.ceil(spread_pixels) + (soft_edge or 16)))
+    while soft_edge is None and tail_error(size, spread_pixels, padded) > DEFAULT_ERROR / math.sqrt(2):
         padded = int(next_fast_len(padded + 1))
     return padded
 
@@ -65,5 +71,7 @@ def padded_shape(
 ) -> tuple[int, int]:
     """(rows, columns) of the transform that propagates a field of ``shape``; lengths in metres."""
     reach = spread(pitch, wavelength, distance, pupil)
-    sharp = pupil is None or pupil * (1 + IRIS_EDGE) > 1
-    return padded_size(shape[0], reach, sharp, padding), padded_size(shape[1], reach, sharp, padding)
+    inside = pupil is not None and pupil * (1 + IRIS_EDGE) <= 1
+    # the edge's width in frequency shrinks with the iris, and its tails in the image grow with the inverse
+    edge = math.ceil(25.6 / pupil) if inside and pupil is not None else None
+    return padded_size(shape[0], reach, edge, padding), padded_size(shape[1], reach, edge, padding)

@@ -17,6 +17,7 @@ from ..display import load_profile, open_bench
 from ..display.bench import SimulatedBench
 from ..display.stages import PixelAperture
 from ..display.workbench import Workbench
+from ..errors import UserError
 from ..methods.wirtinger import Wirtinger
 from ..metrics import match, score
 from ..optics import srgb_encode
@@ -30,6 +31,8 @@ def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | N
     """Draw the stages of a profile on a panel of (rows, columns), 256 x 256 by default; returns the PNG's path."""
     profile, shape = load_profile(name), panel or (256, 256)
     path = output or Path(f"stages-{profile.name}.png")
+    if path.suffix not in (".png", ".pdf", ".svg"):
+        raise UserError(f"--output {path}: a picture is written as .png, .pdf or .svg")
     return save_sheet(open_bench(profile, shape), profile.scaling_note(shape), path)
 
 
@@ -43,7 +46,7 @@ def save_sheet(workbench: Workbench, note: str, path: Path) -> Path:
         _chart(axes.flat[12:], workbench)
     figure.suptitle(f"{bench.profile.name}, version {bench.profile.version}: {bench.profile.description}\n{note}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=100, metadata={"Software": None})
+    figure.savefig(path, dpi=100, metadata={"Software": None} if path.suffix == ".png" else None)
     plt.close(figure)
     return path
 

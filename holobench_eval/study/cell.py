@@ -17,6 +17,7 @@ from .. import registry
 from ..config import Save
 from ..errors import CellError
 from ..metrics import floor_captures, match, score
+from ..seeds import seed
 from . import timings
 from .bench import Condition, workbench
 from .images import write_capture, write_phase, write_thumbnail
@@ -73,7 +74,7 @@ def work(job: Job) -> list[Record]:
     with _repeatable(job.setting.threads):
         try:
             measure = _floor(job) if job.task.is_floor else _solution(job)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             return [_note_failure(job, cell, error) for cell, _ in job.cells]
         return [_recorded(job, cell, place, measure) for cell, place in job.cells]
 
@@ -92,7 +93,7 @@ def _recorded(job: Job, cell: Cell, place: Condition, measure: Measure) -> Recor
     return record
 
 
-def _note_failure(job: Job, cell: Cell, error: Exception) -> Record:
+def _note_failure(job: Job, cell: Cell, error: BaseException) -> Record:
     store, record = Store(job.setting.output), job.failed(cell, error)
     store.write(record)
     write_atomically(store.log(cell.id), "".join(traceback.format_exception(error)).encode())
@@ -109,8 +110,12 @@ def _solution(job: Job) -> Measure:
     handle = bench.for_method(method, task.label, target, item=first.target, repeat=first.repeat)
     given = target[None].clone()  # what a method does to its target must not reach the score
     started = time.perf_counter()
-    phase = method.solve(given, handle).detach().cpu()[0]
+    solved = method.solve(given, handle)
     elapsed = time.perf_counter() - started
+    if not isinstance(solved, Tensor) or tuple(solved.shape[:2]) != tuple(given.shape[:2]):
+        found = tuple(solved.shape) if isinstance(solved, Tensor) else type(solved).__name__
+        raise CellError(f"{task.label}: solve returned {found}, not a phase ({given.shape[0]}, {given.shape[1]}, H, W)")
+    phase = solved.detach().cpu()[0]
     seconds = timings.keep(timings.key(task, setting.threads, setting.workers), elapsed, setting.retime)
 
     def show(cell: Cell, place: Condition) -> Record:
@@ -174,6 +179,9 @@ def _save(job: Job, cell: Cell, image: Tensor, phase: Tensor) -> None:
 def _repeatable(threads: int) -> Iterator[None]:
     """The same numbers for the same input: threads as asked for, operations without a deterministic form refused."""
     before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    torch.set_default_dtype(torch.float32)  # a method's file may have changed these two for everybody
+    torch.set_grad_enabled(True)
+    torch.manual_seed(seed("global random numbers"))
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
     # Filling fresh memory guards against reading it too early; it would be timed with the methods.

@@ -113,4 +113,9 @@ def executor(name: str, workers: int | None) -> Executor:
         if workers not in (None, 1):
             raise UserError(f"--workers {workers} needs --executor local; the serial executor has one")
         return Serial()
-    return Local(workers or len(os.sched_getaffinity(0)))
+    return Local(workers or _cores())
+
+
+def _cores() -> int:
+    """Cores that this process may use; macOS does not tell and gives all of them."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

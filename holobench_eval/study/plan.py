@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from .. import registry
 from ..errors import UserError
 from .bench import Condition, condition
-from .identity import code_digest, digest
+from .identity import code_digest, digest, harness_digest
 
 if TYPE_CHECKING:
     from ..config import MethodEntry, Study
@@ -38,7 +38,8 @@ class Cell:
     method: registered name or ``file.py:Class``; method_sha256: its code (``identity.code_digest``); params:
     all of them; target_sha256: digest of the source image; profile_version, profile_sha256: of the display;
     panel: rows and columns in pixels; condition: name of the display, or ``reference`` for the floor;
-    repeat, seed: names of the noise; metrics: name and version of every metric that can be computed here.
+    repeat, seed: names of the noise; harness_sha256: code of optics, bench, registration and metrics
+    (``identity.harness_digest``); metrics: name and version of every metric that can be computed here.
     """
 
     method: str
@@ -56,6 +57,7 @@ class Cell:
     repeat: int
     seed: int
     protocol: str
+    harness_sha256: str
     metrics: tuple[str, ...]
     exposure: Literal["equal", "matched"]
 
@@ -110,6 +112,14 @@ def scored_dataset(study: Study) -> Any:
     """The dataset whose images are scored. UserError for one that methods may train on."""
     targets = study.targets
     dataset = registry.build("datasets", targets.dataset, dict(targets.params), study.folder)
+    try:
+        dataset.items()
+    except UserError:
+        raise
+    except Exception as error:  # a stranger's dataset
+        raise UserError(
+            f"dataset '{targets.dataset}' cannot list its items: {type(error).__name__}: {error}"
+        ) from error
     if getattr(dataset, "training", False):
         raise UserError(
             f"dataset '{targets.dataset}' holds training images, which are never scored; choose another one"
@@ -157,6 +167,7 @@ class _Ground:
             repeat=repeat,
             seed=study.seed,
             protocol=study.protocol.version,
+            harness_sha256=harness_digest(),
             metrics=self.metrics,
             exposure=study.display.exposure,
         )

@@ -166,4 +166,6 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
         raise UserError(f"{path}: holds another cell than its name says; delete the file and run the study again")
     if record.state not in get_args(State) or not isinstance(record.scores, dict):
         raise UserError(f"{path}: unknown state '{record.state}'; delete the file and run the study again")
+    if not all(isinstance(value, int | float) for value in record.scores.values()):
+        raise UserError(f"{path}: a score is not a number; delete the file and run the study again")
     return record

@@ -35,8 +35,7 @@ def test_method_without_camera_may_not_capture(bench, target):
 
 
 def test_captures_are_counted_and_stop_at_the_budget(bench, target):
-    handle = bench.for_method(Camera(), "camera", target, "t", 0)
-    handle.budget = 2
+    handle = bench.for_method(Camera(), "camera", target, "t", 0, budget=2)
     image = handle.rectify(handle.capture(torch.zeros(3, *PANEL)))
     assert image.shape == target.shape
     handle.capture(torch.zeros(3, *PANEL))
@@ -62,6 +61,15 @@ def test_only_privileged_methods_see_the_simulation(bench, target):
 def test_phase_that_no_display_can_show_is_refused_by_name(bench, target, phase, message):
     with pytest.raises(CellError, match=message):
         bench.photograph(phase, target, "t", 0, label="mine")
+
+
+def test_method_cannot_reach_the_scored_target_or_its_own_account(bench, target):
+    handle = bench.for_method(Camera(), "m", target, "t", 0)
+    handle._target.zero_()
+    assert float(target.max()) > 0.5
+    for name in ("captures", "spec", "simulation"):
+        with pytest.raises(AttributeError):
+            setattr(handle, name, 0)
 
 
 def test_random_numbers_depend_on_target_repeat_and_name(bench, target):

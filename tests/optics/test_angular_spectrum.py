@@ -64,6 +64,23 @@ def test_wide_spread_keeps_the_stated_accuracy_against_a_much_larger_transform()
     )
 
 
+@pytest.mark.parametrize(("size", "distance"), [(64, 0.02), (128, 0.05)])
+def test_reference_is_near_a_far_larger_transform_where_light_spreads_far(size, distance):
+    reference = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, padding="reference")
+    larger = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, padding=40 * size, dtype=torch.complex128)
+    assert relative(reference.forward(white((size, size))), larger.forward(white((size, size)))) < 2e-3
+
+
+@pytest.mark.parametrize("pupil", [0.1, 0.2, 0.5])
+def test_small_iris_keeps_the_stated_accuracy(pupil):
+    size, distance = 128, 0.0118
+    model = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, pupil=pupil)
+    larger = AngularSpectrum(
+        (size, size), PITCH, WAVELENGTH, distance, pupil=pupil, padding=2800, dtype=torch.complex128
+    )
+    assert relative(model.forward(white((size, size)).to(torch.complex64)), larger.forward(white((size, size)))) < 1e-2
+
+
 def test_soft_iris_needs_little_padding():
     size, distance = 256, 0.0237
     model = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, pupil=0.8)
@@ -128,9 +145,9 @@ def test_transfer_functions_are_cached():
 
 
 def test_padding_price_falls_with_what_is_asked():
-    assert padded_size(256, 100.0, True, None) > padded_size(256, 100.0, False, None) >= 256 + 100
-    assert padded_size(256, 100.0, True, "reference") == 1024
-    assert padded_size(256, 100.0, True, 0) == 256
+    assert padded_size(256, 100.0, None, None) > padded_size(256, 100.0, 32, None) >= 256 + 100
+    assert padded_size(256, 100.0, None, "reference") == 1024
+    assert padded_size(256, 100.0, None, 0) == 256
     assert tail_error(256, 100.0, 1000) < tail_error(256, 100.0, 400)
 
 
