@@ -33,7 +33,8 @@ Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as
 Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
 Workers = Annotated[int | None, typer.Option(help="Worker processes of the local executor.")]
-Where = Annotated[str, typer.Option(help="Where to compute: serial or local.")]
+Where = Annotated[str, typer.Option(help="Where to compute: serial, local (worker processes), or auto.")]
+Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
 
 
 def main() -> None:
@@ -56,6 +57,11 @@ def _output(study: Study, output: Path | None) -> Path:
     return output or Path("reports") / study.name
 
 
+def _small(study: Study) -> bool:
+    panel = study.display.panel
+    return panel is not None and panel[0] * panel[1] < LARGE_PANEL
+
+
 def _threads(threads: int | None, workers: int, study: Study) -> int:
     """Torch threads of a worker: as asked for, else one, or all for a single worker on large panels.
 
@@ -64,24 +70,25 @@ def _threads(threads: int | None, workers: int, study: Study) -> int:
     """
     import torch
 
-    panel = study.display.panel
-    small = panel is not None and panel[0] * panel[1] < LARGE_PANEL
-    return threads or (1 if workers > 1 or small else torch.get_num_threads())
+    return threads or (1 if workers > 1 or _small(study) else torch.get_num_threads())
 
 
 @app.command()
 def run(
     config: Config,
     output: Output = None,
-    executor: Where = "serial",
+    executor: Where = "auto",
     workers: Workers = None,
     threads: Threads = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
     retime: Annotated[bool, typer.Option("--retime", help="Measure solving times again.")] = False,
+    retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
+    artifacts: Learned = Path("artifacts"),
 ) -> None:
     """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
+    again = {"retry_failed": retry_failed, "retime": retime, "retrain": retrain}
     try:
-        failed = _run(config, output, executor, workers, threads, retry_failed, retime)
+        failed = _run(config, output, executor, workers, threads, artifacts, again)
     except KeyboardInterrupt:
         print("holoeval: stopped; what was computed is kept, resume with the same command", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
@@ -94,18 +101,22 @@ def _run(
     executor: str,
     workers: int | None,
     threads: int | None,
-    retry_failed: bool,
-    retime: bool,
+    artifacts: Path,
+    again: dict[str, bool],
 ) -> int:
     """Run, report, and give the number of failed cells."""
     from .config import load_study
     from .study import executors, plan, progress
+    from .study.artifacts import Artifacts
     from .study.run import run as compute
+    from .study.training_record import keep_training_records
 
-    console, study, chosen = _console(), load_study(config), executors.executor(executor, workers)
+    console, study = _console(), load_study(config)
+    chosen = executors.executor(executor, workers, _small(study))
     folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers, study)
     with progress.watching(console) as watch:
-        outcome = compute(study, grid, folder, chosen, watch, many, retry_failed, retime)
+        outcome = compute(study, grid, folder, chosen, watch, many, artifacts, **again)
+    keep_training_records(grid, Artifacts(artifacts), folder)
     _sheets(study, folder, outcome.computed > 0)
     _report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
@@ -120,7 +131,7 @@ def _sheets(study: Study, output: Path, anew: bool) -> None:
     from .report.sheet import save_sheet
     from .study.bench import condition, workbench
 
-    for source in study.display.profiles:
+    for source in study.display.profiles:  # a learned display has no stages
         place = condition(source, study.display.panel, study.folder)
         path = output / "figures" / f"stages-{place.name}.png"
         if anew or not path.exists():
@@ -156,17 +167,24 @@ def _print_headline(console: Console, results: Results) -> None:
 
 
 @app.command()
-def plan(config: Config, output: Output = None, threads: Threads = None) -> None:
+def plan(
+    config: Config, output: Output = None, threads: Threads = None, artifacts: Learned = Path("artifacts")
+) -> None:
     """Show what a study would compute, and what of it is done; compute nothing."""
     from .config import load_study
+    from .study import executors
     from .study import plan as planning
-    from .study.preview import preview, table
+    from .study.artifacts import Artifacts
+    from .study.preview import preview, table, training_table, trainings
     from .study.store import Store
 
     console, study = _console(), load_study(config)
-    folder = _output(study, output)
-    rows = preview(study, planning.plan(study), Store(folder), _threads(threads, 1, study), 1)
+    folder, workers = _output(study, output), executors.executor("auto", None, _small(study)).workers
+    grid = planning.plan(study)
+    rows = preview(study, grid, Store(folder), _threads(threads, workers, study), workers)
     console.print(table(study, rows))
+    if needed := trainings(grid, Artifacts(artifacts)):
+        console.print(training_table(needed))
     console.print(f"output folder: {folder}", highlight=False, soft_wrap=True)
 
 

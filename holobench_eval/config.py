@@ -17,7 +17,7 @@ from annotated_types import Interval, MinLen
 
 from . import registry
 from .errors import UserError, suggest
-from .study.bench import condition
+from .study.bench import LEARNED, condition
 from .study.identity import params_of
 from .study.plan import FLOORS, REFERENCE, scored_dataset
 from .typed_yaml import check_keys, typed
@@ -28,17 +28,32 @@ Text = Annotated[str, MinLen(1)]
 
 
 @dataclass(frozen=True)
+class Learned:
+    """A display that is the frozen network of a trained method (paper 6.3), trained on captures of ``profile``."""
+
+    method: Text
+    profile: Text
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class DisplayGrid:
     """The displays of a study.
 
-    profiles: names of profiles or paths of profile files; panel: rows and columns in pixels (None: the
-    profile's full panel); exposure: ``equal`` (the same light for every method) or ``matched`` (equal
-    brightness of the pictures).
+    profiles: names of profiles or paths of profile files; learned: a trained network in their place; panel: rows and
+    columns in pixels (None: the profile's full panel); exposure: ``equal`` (the same light for every method) or
+    ``matched`` (equal brightness of the pictures).
     """
 
-    profiles: Annotated[tuple[Text, ...], MinLen(1)]
+    profiles: tuple[Text, ...] = ()
+    learned: Learned | None = None
     panel: tuple[PanelSide, PanelSide] | None = None
     exposure: Literal["equal", "matched"] = "equal"
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The displays by the names they have in a config."""
+        return (LEARNED,) if self.learned else self.profiles
 
 
 @dataclass(frozen=True)
@@ -46,6 +61,28 @@ class Targets:
     """The images that are scored: a registered dataset and its parameters."""
 
     dataset: Text
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Training:
+    """The images that methods may train on, never scored; equal for all methods of a study.
+
+    held_out: how many of the last images are kept back to watch the training; captures: the most captures that a
+    method may take for its training, those of held-out images included (None: no limit).
+    """
+
+    dataset: Text = "dead_leaves"
+    params: Mapping[str, Any] = field(default_factory=dict)
+    held_out: Annotated[int, Interval(ge=1, le=1000)] = 4
+    captures: Annotated[int, Interval(ge=1)] | None = None
+
+
+@dataclass(frozen=True)
+class Probe:
+    """The method whose holograms are shown when predictions of captures are scored (paper Table 1)."""
+
+    name: Text = "wirtinger"
     params: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -95,6 +132,8 @@ class Reported:
 class Study:
     """A grid of cells and the tables drawn from it; see ``load_study``.
 
+    measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
+    captures of ``holograms`` against those captures. note: a paragraph that the report prints beside its tables.
     repeats: how often every cell is measured, with new noise; baseline: label that paired tests compare
     against (the first method when the config names none); headline: the column the report leads with.
     file, text: the config file as the user named it, and what is in it.
@@ -104,6 +143,10 @@ class Study:
     display: DisplayGrid
     targets: Targets
     methods: Annotated[tuple[MethodEntry, ...], MinLen(1)]
+    measure: Literal["picture", "prediction"] = "picture"
+    holograms: Probe = Probe()
+    training: Training = Training()
+    note: str = ""
     seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
     repeats: Annotated[int, Interval(ge=1, le=1000)] = 1
     protocol: Protocol = Protocol()
@@ -136,14 +179,16 @@ def load_study(path: Path | str) -> Study:
     check_keys(document, Study, document.data)
     study = replace(typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text)
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
+    study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
+    study = replace(study, display=_display(study, document))
     _check_profiles(study, document)
     entries = tuple(_entry(study, document, index) for index in range(len(study.methods)))
     study = replace(study, methods=entries)
     _check_labels(study, document)
     _check_twins(study, document)
     _check_headline(study, document)
-    if study.reported and study.reported.beside not in (None, *study.display.profiles):
-        near = suggest(str(study.reported.beside), study.display.profiles)
+    if study.reported and study.reported.beside not in (None, *study.display.sources):
+        near = suggest(str(study.reported.beside), study.display.sources)
         message = f"'{study.reported.beside}' is not in display.profiles; {near}"
         raise document.error(("reported", "beside"), message)
     if study.baseline and study.baseline not in study.labels:
@@ -179,6 +224,42 @@ def _targets(study: Study, document: Document) -> Targets:
     return replace(study.targets, params=params_of(dataset))
 
 
+def _training(study: Study, document: Document) -> Training:
+    chosen = study.training
+    with _placed(document, ("training", "dataset"), ("training", "params")):
+        dataset = registry.build("datasets", chosen.dataset, dict(chosen.params), study.folder)
+        count = len(dataset.items())
+        if chosen.held_out >= count:
+            raise UserError(f"training.held_out {chosen.held_out} leaves nothing of {count} images to train on")
+    return replace(chosen, params=params_of(dataset))
+
+
+def _holograms(study: Study, document: Document) -> Probe:
+    chosen = study.holograms
+    with _placed(document, ("holograms", "name"), ("holograms", "params")):
+        method = registry.build("methods", chosen.name, dict(chosen.params), study.folder)
+        if getattr(method, "trains", False):
+            raise UserError(f"method '{chosen.name}' has to be trained; holograms should be of one that learns nothing")
+    return replace(chosen, params=params_of(method))
+
+
+def _display(study: Study, document: Document) -> DisplayGrid:
+    display = study.display
+    if bool(display.profiles) == bool(display.learned):
+        where: Keys = ("display", "profiles" if display.learned is None else "learned")
+        raise document.error(where, "display.profiles or display.learned: name displays in one of the two")
+    if display.learned is None:
+        return display
+    if study.measure == "prediction":
+        raise document.error(("measure",), "a learned display is a prediction already; measure its pictures")
+    where = ("display", "learned")
+    with _placed(document, (*where, "method"), (*where, "params")):
+        method = registry.build("methods", display.learned.method, dict(display.learned.params), study.folder)
+        if not (getattr(method, "trains", False) and hasattr(method, "predict")):
+            raise UserError(f"method '{display.learned.method}' learns no display; name one that predicts captures")
+    return replace(display, learned=replace(display.learned, params=params_of(method)))
+
+
 def _protocol(study: Study, document: Document) -> Protocol:
     from .metrics.lpips import find_weights
 
@@ -197,8 +278,9 @@ def _check_profiles(study: Study, document: Document) -> None:
     from .capture.grid import SMALLEST_REGION
 
     seen: dict[str, str] = {}
-    for index, profile in enumerate(study.display.profiles):
-        where: Keys = ("display", "profiles", index)
+    learned = study.display.learned
+    for index, profile in enumerate([learned.profile] if learned else study.display.profiles):
+        where: Keys = ("display", "learned", "profile") if learned else ("display", "profiles", index)
         with _placed(document, where, where):
             place = condition(profile, study.display.panel, study.folder)
         name, region = place.name, place.spec.region.shape
@@ -217,12 +299,15 @@ def _check_profiles(study: Study, document: Document) -> None:
 def _entry(study: Study, document: Document, index: int) -> MethodEntry:
     entry, where = study.methods[index], ("methods", index)
     with _placed(document, (*where, "name"), (*where, "params")):
-        params = params_of(registry.build("methods", entry.name, dict(entry.params), study.folder))
+        method = registry.build("methods", entry.name, dict(entry.params), study.folder)
+        if study.measure == "prediction" and not hasattr(method, "predict"):
+            raise UserError(f"method '{entry.name}' predicts no captures; measure: prediction needs methods that do")
     for number, profile in enumerate(entry.profiles):
-        if profile not in study.display.profiles:
-            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.profiles)}"
+        if profile not in study.display.sources:
+            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
             raise document.error((*where, "profiles", number), message)
-    profiles = tuple(p for p in study.display.profiles if p in entry.profiles or not entry.profiles)
+    params = params_of(method)
+    profiles = tuple(p for p in study.display.sources if p in entry.profiles or not entry.profiles)
     label = entry.label or entry.name.rpartition(":")[2]
     return MethodEntry(entry.name, label, params, profiles)
 

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from ..optics import AngularSpectrum
 from ..optics.phase import TAU, wrap
+from ..optics.phasor import phasor
 
 if TYPE_CHECKING:
     from ..display.contract import DisplaySpec
@@ -45,7 +46,7 @@ def nominal_model(bench: Bench, channel: int, like: Tensor) -> AngularSpectrum:
 
 def unit_field(phase: Tensor) -> Tensor:
     """``exp(i phase)`` of a phase [rad]."""
-    return torch.polar(torch.ones_like(phase), phase)
+    return phasor(phase.new_ones(()), phase)
 
 
 def intensity_scale(intensity: Tensor, target: Tensor) -> Tensor:

@@ -31,6 +31,6 @@ class Best:
         self.loss = torch.where(better, loss.detach(), self.loss)
 
 
-def cosine_decay(step: float, iteration: int, iterations: int) -> float:
-    """A step that falls from ``step`` to zero along half a cosine."""
-    return step * (1 + math.cos(math.pi * iteration / iterations)) / 2
+def cosine_decay(step: float, progress: float) -> float:
+    """A step that falls from ``step`` to zero along half a cosine, of which the share ``progress`` is done."""
+    return step * (1 + math.cos(math.pi * progress)) / 2

@@ -51,6 +51,6 @@ class Oracle:
             best.update(loss, phase)
             # the factor keeps the gradient far above Adam's epsilon
             (phase.grad,) = torch.autograd.grad(pixels * loss.sum(), phase)
-            optimiser.param_groups[0]["lr"] = cosine_decay(self.step, iteration, self.iterations)
+            optimiser.param_groups[0]["lr"] = cosine_decay(self.step, iteration / self.iterations)
             optimiser.step()
         return best.phase

@@ -74,7 +74,7 @@ class Wirtinger:
             best.update(loss, phase)
             phase.grad = gradient * pixels  # far above Adam's epsilon, whatever the size of the panel
             if self.schedule == "cosine":
-                optimiser.param_groups[0]["lr"] = cosine_decay(self.step, iteration, self.iterations)
+                optimiser.param_groups[0]["lr"] = cosine_decay(self.step, iteration / self.iterations)
             optimiser.step()
         return best.phase
 

@@ -76,7 +76,7 @@ def test_a_study_from_run_to_check(
     assert not Path("reports").exists()
     assert "missing" in capsys.readouterr().out
 
-    assert holoeval(monkeypatch, "run", config, "--threads", 1) == 1
+    assert holoeval(monkeypatch, "run", config, "--executor", "serial", "--threads", 1) == 1
     shown = capsys.readouterr().out
     assert "1 cell failed" in shown
     assert "Flat" in shown
@@ -101,7 +101,7 @@ def test_a_study_from_run_to_check(
     [
         (("run", "absent.yaml"), "absent.yaml: cannot be read"),
         (("run", "toy.yaml", "--executor", "lokal"), "unknown executor 'lokal'; did you mean 'local'?"),
-        (("run", "toy.yaml", "--workers", "3"), "--workers 3 needs --executor local"),
+        (("run", "toy.yaml", "--executor", "serial", "--workers", "3"), "--workers 3 needs --executor local"),
         (("report", "toy.yaml"), "no records in this folder"),
         (("list", "metods"), "unknown kind 'metods'; did you mean 'methods'?"),
         (("new-method", "Class"), "'Class' is no name for a method"),

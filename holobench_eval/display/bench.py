@@ -11,6 +11,7 @@ from torch import Tensor
 from ..optics.convolution import multiply
 from ..optics.padding import padded_shape
 from ..optics.phase import blaze
+from ..optics.phasor import phasor, squared_modulus
 from ..seeds import generator
 from .contract import Capture, DisplaySpec
 from .profile import Profile
@@ -24,12 +25,15 @@ from .stages.relay import box_filter, sample, sampling_grid
 class ChannelMaps:
     """What is fixed for one colour channel: every random pattern drawn, every transfer function built.
 
-    lut_gain, incident: ``(H, W)``; transfer, plane (transmission of the dust plane), last_transfer: padded.
+    lut_gain, amplitude and angle [rad] of the incident light: ``(H, W)``; still (spectrum of the light that no phase
+    changes), transfer, plane (transmission of the dust plane), last_transfer: padded.
     """
 
     geometry: Geometry
     lut_gain: Tensor
-    incident: Tensor
+    amplitude: Tensor
+    angle: Tensor
+    still: Tensor
     transfer: Tensor
     plane: Tensor | None
     last_transfer: Tensor | None
@@ -50,19 +54,20 @@ class SimulatedBench:
         self.samples = profile.sampling
         self.image_samples = min(profile.sampling, 2)
         names = ("bench", profile.name, profile.seed)
-        self.channels = tuple(
-            self._channel(Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names))
-            for index, wavelength in enumerate(panel.wavelengths)
-        )
-        geometry = self.channels[0].geometry
         self.ramp = blaze(panel.shape, panel.blaze)
         self.weights = sample_weights(self._padded(), self.samples, panel.blaze, hold=profile.aperture is not None)
         self.crosstalk = profile.crosstalk.weights(self.samples)
         aperture, order = profile.aperture, profile.zero_order
         active = aperture.active_share(self.samples) if aperture else torch.ones(self.samples**2, 1, 1)
         dead = aperture.dead_share(self.samples) if aperture else torch.zeros(self.samples**2, 1, 1)
-        self.modulated = order.modulated * active
-        self.unmodulated = order.modulated * dead + order.unmodulated
+        grid = (self.samples, self.samples, 1, 1)
+        self.modulated = (order.modulated * active).view(grid)
+        self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid)
+        self.channels = tuple(
+            self._channel(Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names))
+            for index, wavelength in enumerate(panel.wavelengths)
+        )
+        geometry = self.channels[0].geometry
         self.drift_gain = profile.drift.phase_gain(geometry)
         self.points = self._pose(geometry).panel_points(
             panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape
@@ -88,7 +93,9 @@ class SimulatedBench:
         return ChannelMaps(
             geometry=geometry,
             lut_gain=profile.lut.gain_map(geometry),
-            incident=incident,
+            amplitude=incident.abs(),
+            angle=incident.angle(),
+            still=self._spectrum(self.unmodulated * incident),
             transfer=way.transfer(geometry, padded, pupil, (0.0, turning)),
             plane=plane,
             last_transfer=None if plane is None else way.transfer(geometry, padded, pupil, (turning, 1.0)),
@@ -105,14 +112,30 @@ class SimulatedBench:
         shift = self.profile.relay.shift
         return replace(self.profile.relay, shift=(shift[0] + moved[0], shift[1] + moved[1]))
 
-    def reflected(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
-        """Field of the sub-samples ``(samples^2, H, W)`` after the panel, carrier off; phase ``(H, W)`` [rad]."""
+    def modulated_field(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
+        """Field ``(samples, samples, H, W)`` of the sub-samples' light that follows ``phase`` ``(H, W)`` [rad].
+
+        The carrier is off. The light that follows no phase is ``ChannelMaps.still``.
+        """
         profile, maps = self.profile, self.channels[channel]
         level = straight_through_level(phase + self.ramp, profile.panel.bits)
         shown = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
-        fine = profile.crosstalk.apply(shown, self.crosstalk)
-        field = torch.polar(self.modulated.expand_as(fine), fine) + self.unmodulated
-        return multiply(field, maps.incident)
+        fine = profile.crosstalk.apply(shown, self.crosstalk).view(self.samples, self.samples, *shown.shape)
+        return phasor(self.modulated * maps.amplitude, fine + maps.angle)
+
+    def _spectrum(self, field: Tensor) -> Tensor:
+        """Spectrum of the panel on the padded grid, from the field ``(samples, samples, H, W)`` of its sub-samples.
+
+        Axis by axis, so that the sub-samples of a row are one array before the columns are transformed.
+        """
+        rows, columns = self.weights
+        total = torch.zeros(())
+        for line, row in zip(field, rows, strict=True):
+            joined = torch.zeros(())
+            for samples, column in zip(line, columns, strict=True):
+                joined = joined + multiply(torch.fft.fft(samples, n=len(column)), column)
+            total = total + multiply(torch.fft.fft(joined, n=len(row), dim=-2), row[:, None])
+        return total
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane, ``image_samples`` a pixel; differentiable in ``phase`` ``(H, W)``.
@@ -120,20 +143,13 @@ class SimulatedBench:
         Unit: the mean incident intensity on the panel.
         """
         maps = self.channels[channel]
-        height, width = self.spec.shape
-        spectra = (
-            torch.fft.fft2(samples, s=maps.transfer.shape) for samples in self.reflected(phase, channel, flicker)
-        )
-        spectrum = multiply(next(spectra), self.weights[0])
-        for other, weights in zip(spectra, self.weights[1:], strict=True):
-            spectrum = spectrum + multiply(other, weights)
+        spectrum = self._spectrum(self.modulated_field(phase, channel, flicker)) + maps.still
         spectrum = multiply(spectrum, maps.transfer)
         if maps.plane is not None and maps.last_transfer is not None:
             field = multiply(torch.fft.ifft2(spectrum), maps.plane)
             spectrum = multiply(torch.fft.fft2(field), maps.last_transfer)
-        fine = torch.fft.ifft2(zoom_spectrum(spectrum, self.image_samples))
-        fine = fine[: height * self.image_samples, : width * self.image_samples]
-        return (fine.real.square() + fine.imag.square()) * maps.laser_power
+        fine = finer_field(spectrum, self.image_samples, self.spec.shape)
+        return squared_modulus(fine) * maps.laser_power
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Intensity as in ``intensity``, averaged over the area of a sensor pixel."""
@@ -161,18 +177,20 @@ class SimulatedBench:
         return Capture(torch.stack(frames), sensor.dark, sensor.white, gain[: len(frames)])
 
 
-def zoom_spectrum(spectrum: Tensor, factor: int) -> Tensor:
-    """The spectrum of the same field sampled ``factor`` times as finely (zeros around it, amplitude kept)."""
-    if factor == 1:
-        return spectrum
-    rows, columns = spectrum.shape[-2:]
-    upper, left = (rows + 1) // 2, (columns + 1) // 2
-    fine = spectrum.new_zeros((*spectrum.shape[:-2], rows * factor, columns * factor))
-    fine[..., :upper, :left] = spectrum[..., :upper, :left]
-    fine[..., :upper, left - columns :] = spectrum[..., :upper, left:]
-    fine[..., upper - rows :, :left] = spectrum[..., upper:, :left]
-    fine[..., upper - rows :, left - columns :] = spectrum[..., upper:, left:]
-    return fine * factor**2
+def finer_field(spectrum: Tensor, factor: int, shape: tuple[int, int]) -> Tensor:
+    """The first ``shape`` pixels of the field of a spectrum, with ``factor`` samples a pixel and axis.
+
+    Each axis is transformed with zeros between its positive and negative frequencies, and cropped before the next.
+    """
+    spectrum = spectrum * factor**2
+    for dim in (-1, -2):
+        size = spectrum.shape[dim]
+        low, high = spectrum.split([(size + 1) // 2, size // 2], dim)
+        gap = list(spectrum.shape)
+        gap[dim] *= factor - 1
+        padded = torch.cat([low, spectrum.new_zeros(gap), high], dim)
+        spectrum = torch.fft.ifft(padded, dim=dim).narrow(dim, 0, shape[dim] * factor)
+    return spectrum
 
 
 @dataclass

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal, Protocol
 
 import cv2
 import numpy as np
@@ -125,18 +126,24 @@ class Workbench:
         return tuple(per_unit.tolist())
 
     def for_method(
-        self, method: object, label: str, target: Tensor, item: str, repeat: int, budget: int | None = None
+        self,
+        method: object,
+        label: str,
+        target: Tensor,
+        item: str,
+        repeat: int,
+        budget: int | None = None,
+        learned: Mapping[str, Any] | None = None,
     ) -> MeteredBench:
-        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)`` with at most ``budget`` captures."""
-        return MeteredBench(
-            self,
-            label,
-            target,
-            (self.seed, item, repeat),
-            camera=bool(getattr(method, "camera", False)),
-            privileged=bool(getattr(method, "privileged", False)),
-            budget=budget,
-        )
+        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)`` with at most ``budget`` captures.
+
+        learned: what the method's ``prepare`` returned.
+        """
+        return MeteredBench(self, label, target, (self.seed, item, repeat), method, budget, learned)
+
+    def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
+        """The bench under noise that depends on ``names``, exposed for ``target``."""
+        return self.bench.session(*names, exposure=self.exposure(target))
 
     def photograph(
         self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
@@ -172,30 +179,54 @@ class Workbench:
         return light / concentration(target, self.spec)[: light.shape[0], None, None]
 
 
-class MeteredBench:
-    """All that a method may see of a display: nominal optics, a metered camera, named random numbers.
+class Source(Protocol):
+    """What is behind the handle of a method: a simulated bench or a learned display."""
 
-    Everything else is private to the harness, its account of captures included. budget: captures that may be taken,
-    None for no limit.
+    @property
+    def spec(self) -> DisplaySpec:
+        """Nominal optics."""
+        ...
+
+    @property
+    def simulation(self) -> Simulation:
+        """The bench itself. CellError where there is none."""
+        ...
+
+    def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
+        """The camera, under noise that depends on ``names``."""
+        ...
+
+    def rectified(self, capture: Capture, target: Tensor) -> Tensor:
+        """A capture in the target's frame."""
+        ...
+
+
+class MeteredBench:
+    """All that a method may see of a display: nominal optics, a metered camera, what it learned, named random numbers.
+
+    Everything else is private to the harness, its account of captures included. method: who gets the handle, which
+    decides on camera and privilege; budget: captures that may be taken, None for no limit; learned: what the method's
+    ``prepare`` returned.
     """
 
     def __init__(
         self,
-        workbench: Workbench,
+        workbench: Source,
         label: str,
         target: Tensor,
         names: tuple[object, ...],
-        camera: bool,
-        privileged: bool,
+        method: object = None,
         budget: int | None = None,
+        learned: Mapping[str, Any] | None = None,
     ) -> None:
         self._workbench = workbench
         self._label = label
         self._target = target.clone()  # a method that writes to its target must not reach the scored one
         self._names = names
-        self._camera = camera
-        self._privileged = privileged
+        self._camera = bool(getattr(method, "camera", False))
+        self._privileged = bool(getattr(method, "privileged", False))
         self._budget = budget
+        self._learned = learned
         self._captures = 0
 
     @property
@@ -207,6 +238,18 @@ class MeteredBench:
     def captures(self) -> int:
         """Captures taken so far."""
         return self._captures
+
+    @property
+    def learned(self) -> Mapping[str, Any]:
+        """What the method's ``prepare`` returned. CellError for a method that declares no training."""
+        if self._learned is None:
+            raise CellError(f"{self._label} was not trained; a method that learns declares trains = True")
+        return self._learned
+
+    @property
+    def light(self) -> Tensor:
+        """Light at a white pixel, ``(C,)``, if all of the panel's went into the target; incident light is 1."""
+        return concentration(self._target, self.spec)
 
     @property
     def simulation(self) -> Simulation:
@@ -221,8 +264,7 @@ class MeteredBench:
 
     @cached_property
     def _session(self) -> BenchSession:
-        light = self._workbench.exposure(self._target)
-        return self._workbench.bench.session(*self._names, "solve", exposure=light)
+        return self._workbench.session((*self._names, "solve"), self._target)
 
     def capture(self, phase: Tensor) -> Capture:
         """Show ``phase`` ``(C, H, W)`` [rad] and photograph it; counted. CellError if the method declares no camera."""

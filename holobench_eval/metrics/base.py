@@ -12,6 +12,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from ..shifts import correlate
+
 Domain = Literal["linear", "amplitude", "srgb"]
 Function = Callable[[Tensor, Tensor], Tensor]
 
@@ -107,19 +109,9 @@ def _gaussian_taps(sigma: float, radius: int) -> tuple[float, ...]:
 
 
 def gaussian_valid(image: Tensor, sigma: float, radius: int) -> Tensor:
-    """Gaussian filter of 2 radius + 1 taps where it fits wholly: (..., H, W) to (..., H - 2 radius, W - 2 radius).
-
-    Sums of shifted images, which on a CPU take a quarter of the time of ``conv2d`` with one channel.
-    """
+    """Gaussian filter of 2 radius + 1 taps where it fits wholly: (..., H, W) to (..., H - 2 radius, W - 2 radius)."""
     taps = _gaussian_taps(sigma, radius)
-    for dim in (-2, -1):
-        size = image.shape[dim] - 2 * radius
-        total = image.narrow(dim, radius, size) * taps[radius]
-        for k in range(radius):
-            pair = image.narrow(dim, k, size) + image.narrow(dim, 2 * radius - k, size)
-            total = total.add(pair, alpha=taps[k])
-        image = total
-    return image
+    return correlate(correlate(image, taps, dim=-1), taps, dim=-2)
 
 
 def gaussian_blur(image: Tensor, sigma: float) -> Tensor:

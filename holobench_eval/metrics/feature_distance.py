@@ -9,10 +9,13 @@ by local energy (D. J. Heeger, Visual Neuroscience 9, 1992). It has not been fit
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import torch
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
 from .base import Metric, gaussian_blur, mix, paired
@@ -54,24 +57,88 @@ def _opponent(image: Tensor, scale: int) -> Tensor:
     return mix(image, OPPONENT if scale else OPPONENT[:1])
 
 
-def _features(opponent: Tensor) -> Tensor:
-    """Rectified responses of (B, K, H, W), positive and negative parts as channels of their own, (B, 16 K, H, W)."""
+def _responses(opponent: Tensor) -> Tensor:
+    """Responses of (B, K, H, W) to the bank, (B, 8 K, H, W)."""
     batch, _, height, width = opponent.shape
     padded = functional.pad(opponent.reshape(-1, 1, height, width), (RADIUS,) * 4, mode="reflect")
-    response = functional.conv2d(padded, _bank(opponent.dtype, opponent.device))
-    response = response.reshape(batch, -1, height, width)
-    return torch.cat([response.clamp_min(0), (-response).clamp_min(0)], dim=1)
+    response: Tensor = _Filtered.apply(padded, _bank(opponent.dtype, opponent.device))  # type: ignore[no-untyped-call]
+    return response.reshape(batch, -1, height, width)
 
 
-def _structure_distance(x: Tensor, y: Tensor) -> Tensor:
-    """Feature difference over feature energy, both pooled over a neighbourhood, and its mean: (B, K, H, W) to (B,)."""
-    a, b = _features(x), _features(y)
-    difference = (a - b).square().sum(1)
-    energy = (a.square() + b.square()).sum(1)
-    difference, energy = gaussian_blur(torch.stack([difference, energy]), POOLING_SIGMA).unbind()
-    floor = 2 * ORIENTATIONS * CONTRAST_THRESHOLD**2
-    local: Tensor = difference / (energy + floor)
-    return local.mean(dim=(1, 2))
+class _Filtered(torch.autograd.Function):
+    """``conv2d`` of one channel with an adjoint that takes a fourth of the time of autograd's on a CPU.
+
+    The adjoint is computed row by row of the filters: their rows as output channels of one ``conv2d``, then shifted
+    and summed.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, image: Tensor, bank: Tensor) -> Tensor:
+        ctx.save_for_backward(bank)
+        return functional.conv2d(image, bank)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
+        (bank,) = ctx.saved_tensors
+        by_row = functional.conv2d(grad, bank.permute(2, 0, 1, 3).flip(-1), padding=(0, 2 * RADIUS))
+        height = grad.shape[-2]
+        total = grad.new_zeros(grad.shape[0], 1, height + 2 * RADIUS, by_row.shape[-1])
+        for row, part in enumerate(by_row.split(1, dim=1)):
+            total[:, :, row : row + height] += part
+        return total, None
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """A target at one scale: negative responses (B, 8 K, H, W), their pooled energy (B, H, W)."""
+
+    negative: Tensor
+    energy: Tensor
+
+    def distance(self, opponent: Tensor) -> Tensor:
+        """Feature difference over feature energy, both pooled over a neighbourhood, and its mean: to (B,).
+
+        Features are the responses' positive and negative parts; where two responses r and s have opposite signs the
+        squared difference is r^2 + s^2, else (r - s)^2.
+        """
+        responses = _responses(opponent)
+        opposed = torch.relu(responses * self.negative).sum(1)
+        difference = (responses + self.negative).square().sum(1) - 2 * opposed
+        pooled = gaussian_blur(torch.stack([difference, responses.square().sum(1)]), POOLING_SIGMA)
+        floor = 2 * ORIENTATIONS * CONTRAST_THRESHOLD**2
+        local: Tensor = pooled[0] / (pooled[1] + self.energy + floor)
+        return local.mean(dim=(1, 2))
+
+
+class FixedMofd:
+    """``mofd`` against a target that stays, (C, H, W) or (B, C, H, W): its features are computed once."""
+
+    def __init__(self, target: Tensor) -> None:
+        self.target = target
+        _, side = paired(target, target, smallest=SMALLEST)
+        self._scales = []
+        for scale in range(SCALES):
+            responses = _responses(_opponent(side, scale))
+            energy = gaussian_blur(responses.square().sum(1)[None], POOLING_SIGMA)[0]
+            self._scales.append(_Scale(-responses, energy))
+            side = _halved(side)
+        self._low_pass = side
+
+    def __call__(self, image: Tensor) -> Tensor:
+        """The distance of an image of the target's shape, as ``mofd`` gives it."""
+        x, _ = paired(image, self.target, smallest=SMALLEST)
+        parts = []
+        for scale, fixed in enumerate(self._scales):
+            parts.append(fixed.distance(_opponent(x, scale)))
+            x = _halved(x)
+        colour = (x - self._low_pass).square().mean(1)
+        parts.append((colour / (colour + COLOUR_THRESHOLD**2)).mean(dim=(1, 2)))
+        return torch.stack(parts).mean(0).reshape(image.shape[:-3])
+
+
+def _halved(image: Tensor) -> Tensor:
+    return gaussian_blur(image, 1.0)[:, :, ::2, ::2]
 
 
 def mofd(image: Tensor, target: Tensor) -> Tensor:
@@ -85,14 +152,8 @@ def mofd(image: Tensor, target: Tensor) -> Tensor:
     image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded, sides of at least 72 px.
     Returns a scalar or (B,) in [0, 1]; lower is better, identical images give 0. Raises ValueError (see ``paired``).
     """
-    x, y = paired(image, target, smallest=SMALLEST)
-    parts = []
-    for scale in range(SCALES):
-        parts.append(_structure_distance(_opponent(x, scale), _opponent(y, scale)))
-        x, y = (gaussian_blur(side, 1.0)[:, :, ::2, ::2] for side in (x, y))
-    colour = (x - y).square().mean(1)
-    parts.append((colour / (colour + COLOUR_THRESHOLD**2)).mean(dim=(1, 2)))
-    return torch.stack(parts).mean(0).reshape(image.shape[:-3])
+    paired(image, target, smallest=SMALLEST)
+    return FixedMofd(target)(image)
 
 
 MOFD = Metric("mofd", "1", "lower", 0.0, ("srgb",), mofd, smallest=SMALLEST)

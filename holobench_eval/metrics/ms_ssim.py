@@ -11,10 +11,39 @@ from torch import Tensor
 from torch.nn import functional
 
 from .base import Metric, paired
-from .ssim import RADIUS, ssim_maps
+from .ssim import RADIUS, LocalStatistics
 
 EXPONENTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 SMALLEST = 161
+_IS_LAST = (False, False, False, False, True)
+
+
+class FixedMsSsim:
+    """``ms_ssim`` against a target that stays, (C, H, W) or (B, C, H, W): its own statistics are computed once."""
+
+    def __init__(self, target: Tensor) -> None:
+        self.target = target
+        _, side = paired(target, target, smallest=SMALLEST)
+        self.scales = []
+        for last in _IS_LAST:
+            self.scales.append(LocalStatistics(_mirrored(side) if last else side))
+            side = functional.avg_pool2d(side, 2)
+
+    def __call__(self, image: Tensor) -> Tensor:
+        """The value of an image of the target's shape, as ``ms_ssim`` gives it."""
+        x, _ = paired(image, self.target, smallest=SMALLEST)
+        value = x.new_ones(x.shape[0])
+        for last, scale, exponent in zip(_IS_LAST, self.scales, EXPONENTS, strict=True):
+            luminance, structure = scale.maps(_mirrored(x) if last else x)
+            mean = (luminance * structure if last else structure).mean(dim=(1, 2, 3))
+            # The power of zero has an infinite gradient, so zero is a branch of its own.
+            value = value * torch.where(mean > 0, torch.where(mean > 0, mean, 1.0).pow(exponent), 0.0)
+            x = functional.avg_pool2d(x, 2)
+        return value.reshape(image.shape[:-3])
+
+
+def _mirrored(image: Tensor) -> Tensor:
+    return functional.pad(image, (RADIUS,) * 4, mode="reflect")
 
 
 def ms_ssim(image: Tensor, target: Tensor) -> Tensor:
@@ -26,18 +55,8 @@ def ms_ssim(image: Tensor, target: Tensor) -> Tensor:
     image, target: (C, H, W) or (B, C, H, W) in [0, 1], sides of at least 161 px.
     Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
     """
-    x, y = paired(image, target, smallest=SMALLEST)
-    means = []
-    for _ in EXPONENTS[:-1]:
-        means.append(ssim_maps(x, y)[1].mean(dim=(1, 2, 3)))
-        x, y = functional.avg_pool2d(x, 2), functional.avg_pool2d(y, 2)
-    x, y = (functional.pad(side, (RADIUS,) * 4, mode="reflect") for side in (x, y))
-    means.append(ssim_maps(x, y)[0].mean(dim=(1, 2, 3)))
-    value = x.new_ones(x.shape[0])
-    for mean, exponent in zip(means, EXPONENTS, strict=True):
-        # The power of zero has an infinite gradient, so zero is a branch of its own.
-        value = value * torch.where(mean > 0, torch.where(mean > 0, mean, 1.0).pow(exponent), 0.0)
-    return value.reshape(image.shape[:-3])
+    paired(image, target, smallest=SMALLEST)
+    return FixedMsSsim(target)(image)
 
 
 MS_SSIM = Metric("ms_ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ms_ssim, smallest=SMALLEST)

@@ -17,17 +17,26 @@ C1 = 0.01**2
 C2 = 0.03**2
 
 
-def ssim_maps(x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-    """Local SSIM (Eq. 13 of the paper) and its contrast-structure factor, (..., H, W) to two (..., H - 10, W - 10).
+class LocalStatistics:
+    """Local mean and variance of an image (..., H, W), to compare others with: its windows are filtered once.
 
-    Only pixels whose whole window lies in the image are kept.
+    Maps are (..., H - 10, W - 10): only pixels whose whole window lies in the image are kept.
     """
-    moments = gaussian_valid(torch.stack([x, y, x.square() + y.square(), x * y]), SIGMA, RADIUS)
-    mean_x, mean_y, squares, product = moments.unbind()
-    mean_squares, mean_product = mean_x.square() + mean_y.square(), mean_x * mean_y
-    structure = (2 * (product - mean_product) + C2) / (squares - mean_squares + C2)
-    luminance = (2 * mean_product + C1) / (mean_squares + C1)
-    return luminance * structure, structure
+
+    def __init__(self, image: Tensor) -> None:
+        self.image = image
+        self.mean, squares = gaussian_valid(torch.stack([image, image.square()]), SIGMA, RADIUS).unbind()
+        self.mean_squared = self.mean.square()
+        self.variance = squares - self.mean_squared
+
+    def maps(self, other: Tensor) -> tuple[Tensor, Tensor]:
+        """Luminance and contrast-structure factor of the SSIM (Eq. 6, and 9 with 10, of the paper) of another image."""
+        moments = gaussian_valid(torch.stack([other, other.square(), other * self.image]), SIGMA, RADIUS)
+        mean, squares, product = moments.unbind()
+        mean_squared, mean_product = mean.square(), mean * self.mean
+        structure = (2 * (product - mean_product) + C2) / (squares - mean_squared + self.variance + C2)
+        luminance = (2 * mean_product + C1) / (mean_squared + self.mean_squared + C1)
+        return luminance, structure
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
@@ -39,7 +48,8 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
     Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
     """
     x, y = paired(image, target, smallest=2 * RADIUS + 1)
-    return ssim_maps(x, y)[0].mean(dim=(1, 2, 3)).reshape(image.shape[:-3])
+    luminance, structure = LocalStatistics(y).maps(x)
+    return (luminance * structure).mean(dim=(1, 2, 3)).reshape(image.shape[:-3])
 
 
 SSIM = Metric("ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ssim, smallest=2 * RADIUS + 1)

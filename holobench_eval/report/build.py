@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from ..study.store import write_atomically
-from . import sections
+from . import section_training, sections
 from .description import Description, counts, describe, environment, method_parameters, rules, setup
 from .figures import Figures, draw_figures
 from .findings import findings
 from .layout import Layout, layout_of
 from .markdown import render
 from .results import Results
+from .section_training import Trained
 from .statistics import RESAMPLES
 from .tables import csv_text, read_records, records_frame
 
@@ -47,8 +48,9 @@ def write_report(
     results = Results(records_frame(records, layout), layout)
     write_atomically(output / "records.csv", csv_text(results.frame).encode())
     write_atomically(output / "table.csv", csv_text(results.table).encode())
-    context = _numbers(results) | _words(results, records, provenance, description)
-    figures = draw_figures(results, output)
+    trained = section_training.trainings(layout, records, output)
+    context = _numbers(results) | _words(results, records, provenance, description) | _training(layout, trained)
+    figures = draw_figures(results, trained, output)
     text = render(TEMPLATE, context | _pictures(figures))
     write_atomically(output / "report.md", text.encode())
     return output / "report.md"
@@ -105,6 +107,10 @@ def _words(
     layout = results.layout
     return rules(results) | {
         "title": layout.title,
+        "note": layout.note,
+        "said": layout.wording,
+        "on_a_network": layout.learned_display is not None,
+        "efficiency": "efficiency" in results.frame,
         "setup": setup(results, records),
         "profiles": description.displays,
         "parameters": sections.parameters(method_parameters(results, records)),
@@ -117,10 +123,22 @@ def _words(
     }
 
 
+def _training(layout: Layout, trained: Sequence[Trained]) -> dict[str, Any]:
+    """The section on training, empty for a study in which nothing is trained."""
+    return {
+        "trained": bool(trained),
+        "training_paragraph": section_training.paragraph(layout, trained),
+        "training_table": section_training.summary(layout, trained),
+        "training_rounds": section_training.rounds(trained),
+        "training_doubts": section_training.doubts(trained),
+    }
+
+
 def _pictures(figures: Figures) -> dict[str, Any]:
     return {
         "charts": figures.charts,
         "comparisons": figures.comparisons,
         "stages": figures.stages,
+        "training_figures": figures.trainings,
         "absent": figures.absent,
     }

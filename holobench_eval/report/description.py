@@ -10,13 +10,27 @@ import pandas as pd
 
 from ..display.profile import Panel, Profile, load_profile
 from ..study.plan import REFERENCE
+from ..study.plan import displays as conditions
+from .layout import TrainingSet
 from .results import Results
 from .tables import DONE
+from .wording import plain
 
 if TYPE_CHECKING:
     from ..config import Study
+    from ..study.bench import Condition
 
 TARGETS_NAMED = 40
+EXPOSURES_PREDICTED = {
+    "equal": "Equal light: the exposure of a capture follows from the target alone.",
+    "matched": "Matched brightness: after a metering capture the laser power is set so that the region has the "
+    "target's mean brightness.",
+}
+ON_A_NETWORK = {
+    "registration": "None: the network predicts in the frame of the target, and nothing is captured.",
+    "saturation": "None: there is no sensor.",
+    "exposure": "Without effect: there is no noise, so that the unit of light changes no score.",
+}
 
 EXPOSURES = {
     "equal": "Equal light: the exposure follows from the target alone and is the same for every method, so a method "
@@ -49,9 +63,22 @@ class Description:
 
 def describe(study: Study) -> Description:
     """The description of a checked study; reads its profiles."""
-    profiles = [load_profile(source, study.folder) for source in study.display.profiles]
-    displays = tuple(_display(profile, study.display.panel) for profile in profiles)
+    if study.display.learned is None:
+        profiles = [load_profile(source, study.folder) for source in study.display.profiles]
+        displays = tuple(_display(profile, study.display.panel) for profile in profiles)
+    else:
+        displays = tuple(_learned(place, study.display.learned.profile) for place in conditions(study).values())
     return Description(displays, study.file.name if study.file.is_absolute() else study.file.as_posix(), study.text)
+
+
+def _learned(place: Condition, profile: str) -> Display:
+    needed = place.learned
+    assert needed is not None
+    return Display(
+        name=place.name,
+        heading=f"The frozen network of {needed.method}, trained on captures of {profile}; no noise, no camera.",
+        lines=(f"artifact: {needed.name}", f"parameters: {plain(dict(needed.params))}"),
+    )
 
 
 def _display(profile: Profile, panel: tuple[int, int] | None) -> Display:
@@ -80,21 +107,6 @@ def _stages(profile: Profile) -> list[str]:
     return lines
 
 
-def plain(values: Mapping[str, Any]) -> str:
-    """``a = 1, b = [2, 3]``: parameters as text on one line."""
-    return ", ".join(f"{key} = {_value(value)}" for key, value in values.items()) or "none"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:g}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, Mapping):
-        return f"({plain(value)})"
-    return "none" if value is None else str(value)
-
-
 def counts(results: Results) -> str:
     """How large the study is, in one sentence."""
     cells = results.frame[results.frame["condition"] != REFERENCE]
@@ -117,9 +129,12 @@ def setup(results: Results, records: Sequence[Mapping[str, Any]]) -> list[tuple[
     sets = dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)
     panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
     layout = results.layout
+    measured = [("measured", f"predictions of the captures of holograms by {layout.holograms}")]
     return [
+        *(measured if layout.measure == "prediction" else []),
         ("targets", f"{len(results.targets)}: {named}{f' and {more} more' if more > 0 else ''}"),
         ("dataset", "; ".join(sets)),
+        *([("training images", training_images(layout.training))] if layout.training else []),
         ("panel", "; ".join(panels)),
         ("exposure", _distinct(results.frame, "exposure")),
         ("metric protocol", _distinct(results.frame, "protocol")),
@@ -128,6 +143,12 @@ def setup(results: Results, records: Sequence[Mapping[str, Any]]) -> list[tuple[
         ("headline metric", results.headline.axis),
         ("baseline", layout.baseline or "none"),
     ]
+
+
+def training_images(given: TrainingSet) -> str:
+    """What methods may train on, in a line."""
+    limit = "no limit on captures" if given.captures is None else f"at most {given.captures} captures"
+    return f"{given.images} of {given.dataset}, of which {given.held_out} only watch the training; {limit}"
 
 
 def _distinct(frame: pd.DataFrame, column: str) -> str:
@@ -147,6 +168,8 @@ def method_parameters(results: Results, records: Sequence[Mapping[str, Any]]) ->
 
 def rules(results: Results) -> dict[str, str]:
     """Sentences on registration, exposure and saturation, with this study's figures."""
+    if results.layout.learned_display is not None:
+        return ON_A_NETWORK
     done = results.frame[(results.frame["state"] == DONE) & (results.frame["condition"] != REFERENCE)]
     saturated = done["saturated"].dropna()
     residuals = [
@@ -160,13 +183,13 @@ def rules(results: Results) -> dict[str, str]:
         if residuals
         else "No residual was recorded."
     )
+    refused = "; above 0.1 % a capture is refused" if results.layout.measure == "picture" else ""
     saturation = (
-        f"At most {100 * saturated.max():.3g} % of a capture's samples; above 0.1 % a capture is refused."
-        if len(saturated)
-        else "Not recorded."
+        f"At most {100 * saturated.max():.3g} % of a capture's samples{refused}." if len(saturated) else "Not recorded."
     )
+    known = EXPOSURES if results.layout.measure == "picture" else EXPOSURES_PREDICTED
     policies = sorted(set(results.frame["exposure"]) - {""})
-    exposure = " ".join(EXPOSURES.get(policy, policy) for policy in policies) or "Not recorded."
+    exposure = " ".join(known.get(policy, policy) for policy in policies) or "Not recorded."
     return {"registration": registration, "saturation": saturation, "exposure": exposure}
 
 

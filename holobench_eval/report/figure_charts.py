@@ -28,13 +28,19 @@ class Chart:
     """What all charts share.
 
     score: the headline metric; methods: labels in order; privileged: those that are the
-    ceiling; floors: what the floor scores, by its description.
+    ceiling; floors: what the floor scores, by its description; of: added to the metric's name on an axis.
     """
 
     score: Score
     methods: tuple[str, ...]
     privileged: frozenset[str]
     floors: Mapping[str, float]
+    of: str = ""
+
+    @property
+    def axis(self) -> str:
+        """The metric's title, domain and unit, for an axis."""
+        return f"{self.score.axis}{self.of}"
 
     def _place(self, label: str) -> int:
         """Index among the methods of the same kind, ceilings or not."""
@@ -89,7 +95,7 @@ def quality_bars(path: Path, table: pd.DataFrame, chart: Chart) -> None:
             for (_, value), dash in zip(chart.floors.items(), ("--", ":"), strict=False):
                 axes.axvline(value, color="black", linestyle=dash, linewidth=1.2)
             axes.set_xlim(0, limit)
-        panels[-1].set_xlabel(f"{chart.score.axis}; mean over targets, 95 % interval")
+        panels[-1].set_xlabel(f"{chart.axis}; mean over targets, 95 % interval")
         for (name, value), dash in zip(chart.floors.items(), ("--", ":"), strict=False):
             panels[-1].plot(
                 [], [], color="black", linestyle=dash, label=f"floor: {name}, {chart.score.with_unit(value)}"
@@ -142,7 +148,7 @@ def quality_against_time(path: Path, table: pd.DataFrame, chart: Chart) -> None:
                     label=chart.name(label),
                 )
             axes.set_xscale("log")
-            axes.set_ylabel(chart.score.axis)
+            axes.set_ylabel(chart.axis.replace(", of ", "\nof "))
             axes.grid(color="#E5E5E5", linewidth=0.6)
             axes.set_axisbelow(True)
             axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
@@ -175,7 +181,7 @@ def _dots(axes: Axes, frame: pd.DataFrame, chart: Chart) -> None:
             axes.hlines(column.mean(), place - 0.22, place + 0.22, color="black", linewidth=2.2, zorder=3)
     names = [textwrap.fill(chart.name(str(label)), 16, break_long_words=False) for label in frame.columns]
     axes.set_xticks(places, names, parse_math=False)
-    axes.set_ylabel(chart.score.axis)
+    axes.set_ylabel(chart.axis.replace(", of ", "\nof "))
     axes.grid(axis="y", color="#E5E5E5", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.set_xlim(-0.5, len(places) - 0.5)

@@ -15,9 +15,10 @@ from ..study.store import Store
 from .figure_charts import Chart, quality_against_time, quality_bars, target_dots
 from .figure_comparison import draw_comparison, tile_size
 from .figure_style import slugs
-from .findings import FLOOR_NAMES
+from .figure_training import draw_trainings
 from .gallery import Column, Picture, Tile, chunks, error_ceiling, error_map, load_picture, spread
 from .results import Results
+from .section_training import Trained
 from .sections import label, leading_scores
 from .tables import DONE
 
@@ -45,13 +46,14 @@ class Figures:
     charts: list[Drawn]
     comparisons: list[Drawn]
     stages: list[Drawn]
+    trainings: list[Drawn]
     absent: list[str]
 
 
-def draw_figures(results: Results, output: Path) -> Figures:
+def draw_figures(results: Results, trained: Sequence[Trained], output: Path) -> Figures:
     """Draw everything that the records allow into ``output/figures``; older figures of the same kinds go."""
     folder = output / FOLDER
-    for pattern in ("comparison-*.jpg", "quality-*.png"):
+    for pattern in ("comparison-*.jpg", "quality-*.png", "training-*.png"):
         for old in folder.glob(pattern):
             old.unlink()
     absent: list[str] = []
@@ -61,11 +63,11 @@ def draw_figures(results: Results, output: Path) -> Figures:
         for drawn in _comparison(results, output, condition, stem, absent)
     ]
     number = itertools.count(1)
-    charts, captures, stages = (
+    charts, captures, stages, trainings = (
         [replace(drawn, number=next(number)) for drawn in kind]
-        for kind in (_charts(results, folder), comparisons, _stages(results, folder))
+        for kind in (_charts(results, folder), comparisons, _stages(results, folder), _trainings(trained, folder))
     )
-    return Figures(charts, captures, stages, sorted(set(absent)))
+    return Figures(charts, captures, stages, trainings, sorted(set(absent)))
 
 
 def _charts(results: Results, folder: Path) -> list[Drawn]:
@@ -74,15 +76,17 @@ def _charts(results: Results, folder: Path) -> list[Drawn]:
     if score.key not in table or not np.isfinite(table[score.key]).any():
         return []
     methods = tuple(dict.fromkeys(table["method"]))
+    said, shown = results.layout.wording, results.conditions
     floors = {
-        FLOOR_NAMES[name]: float(results.row(name, REFERENCE)[score.key])
+        said.floor_name(name): float(results.row(name, REFERENCE)[score.key])
         for name in ("floor_constant", "floor_speckle")
-        if name in results.floors
+        if name in results.floors and all(map(results.has_floor, shown))
     }
-    chart = Chart(score, methods, results.layout.privileged, floors)
+    chart = Chart(score, methods, results.layout.privileged, floors, said.axis)
     quality_bars(folder / "quality-bars.png", table, chart)
-    bars = "Mean over targets with its 95 % interval. Vertical lines: the floor. Hatched: the ceiling."
-    drawn = [Drawn(f"{FOLDER}/quality-bars.png", f"{score.axis} by method and display. {bars}")]
+    lines = f"{' Vertical lines: the floor.' * bool(floors)}{' Hatched: the ceiling.' * bool(chart.privileged)}"
+    bars = f"{chart.axis}, by method and display. Mean over targets with its 95 % interval.{lines}"
+    drawn = [Drawn(f"{FOLDER}/quality-bars.png", bars)]
     values = {
         condition: pd.DataFrame(
             {name: results.values(name, condition) for name in results.methods(condition)}, index=results.targets
@@ -92,21 +96,33 @@ def _charts(results: Results, folder: Path) -> list[Drawn]:
     values = {condition: frame for condition, frame in values.items() if not frame.empty}
     target_dots(folder / "quality-by-target.png", values, chart)
     dots = "A dot is a target, a line joins the same target across methods (a gap is a hole), a bar is the mean."
-    drawn.append(Drawn(f"{FOLDER}/quality-by-target.png", f"{score.axis} of every target. {dots}"))
+    drawn.append(Drawn(f"{FOLDER}/quality-by-target.png", f"{chart.axis}, of every target. {dots}"))
     timed = table[(table["seconds"] > 0) & np.isfinite(table[score.key])]
     if timed["method"].nunique() > 3:
         quality_against_time(folder / "quality-time.png", table, chart)
-        time = f"{score.axis} against computing time per target, mean and 95 % interval."
+        time = f"{chart.axis}, against computing time per target, mean and 95 % interval."
         drawn.append(Drawn(f"{FOLDER}/quality-time.png", time))
     return drawn
 
 
+def _trainings(trained: Sequence[Trained], folder: Path) -> list[Drawn]:
+    found = [(one.name, one.record.rounds) for one in trained if one.record]
+    drawn = []
+    for path, curves in draw_trainings(folder / "training", found):
+        what = "Training: PSNR on held-out images of the predicted and of the captured picture against the target, and "
+        how = "against the captures taken, a mark per round." if curves else "after the last round, a row per training."
+        drawn.append(Drawn(f"{FOLDER}/{path.name}", f"{what}of the prediction against the capture (fidelity), {how}"))
+    return drawn
+
+
 def _comparison(results: Results, output: Path, condition: str, stem: str, absent: list[str]) -> Iterator[Drawn]:
+    if not results.has_pictures(condition):
+        return
     store = Store(output)
     pictures = {target: load_picture(store.target_thumbnail(target)) for target in results.targets}
     absent += [store.target_thumbnail(target).name for target, picture in pictures.items() if picture is None]
     targets = {target: picture for target, picture in pictures.items() if picture is not None}
-    methods = results.methods(condition)
+    methods, said = results.methods(condition), results.layout.wording
     if not targets or not methods:
         return
     shown = _selection(results, condition, targets)
@@ -124,17 +140,17 @@ def _comparison(results: Results, output: Path, condition: str, stem: str, absen
         columns = [Column(label(results, name), tuple(tiles[name, row] for row in rows)) for name in labels]
         page = f", page {number} of {len(pages)}" if len(pages) > 1 else ""
         path = f"{FOLDER}/comparison-{stem}-{number}.jpg"
-        title = f"{condition}: targets and matched captures{page}"
-        draw_comparison(output / path, title, [(row, targets[row]) for row in rows], columns, scale)
+        title = f"{condition}: {said.truth}s and matched {said.scored}s{page}"
+        draw_comparison(output / path, title, [(row, targets[row]) for row in rows], columns, scale, said.truth)
         yield Drawn(path, _caption(results, condition, page, len(shown)))
 
 
 def _caption(results: Results, condition: str, page: str, shown: int) -> str:
-    total = len(results.targets)
+    total, said = len(results.targets), results.layout.wording
     chosen = "every target" if shown == total else f"{shown} of {total} targets, evenly spaced from worst to best"
     return (
-        f"Captures on {condition}{page}: {chosen}. Each capture is registered, matched in intensity and sRGB-encoded; "
-        "below it, the most detailed window of the target enlarged twice as much, and the absolute error in sRGB."
+        f"{said.scored.capitalize()}s on {condition}{page}: {chosen}. {said.picture}; below, the most detailed window "
+        f"of the {said.truth} enlarged twice as much, and the absolute error against the {said.truth} in sRGB."
     )
 
 

@@ -8,27 +8,14 @@ from ..study.plan import REFERENCE
 from .results import Results
 from .scores import DOMAIN_NAMES, Score
 from .statistics import FEWEST, PairedTest
+from .wording import words
 
 SIGNIFICANCE = 0.05
-
-FLOOR_NAMES = {
-    "floor_constant": "a constant image",
-    "floor_black": "a black image",
-    "floor_speckle": "pure speckle",
-    "floor_wrong_target": "the wrong target",
-    "floor_mirrored": "the mirrored target",
-    "floor_shift_1px": "the target shifted by 1 px",
-}
 
 
 def p_value(p: float) -> str:
     """``p = 0.031`` or ``p < 0.001``."""
     return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
-
-
-def words(names: list[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def findings(results: Results) -> list[tuple[str, list[str]]]:
@@ -70,7 +57,8 @@ def _best(results: Results, condition: str) -> list[str]:
     best = ranking[0]
     row = results.row(best, condition)
     value = score.interval(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
-    among = f"Best of the {len(ranking)} ranked methods" if len(ranking) > 1 else "The only ranked method"
+    said = results.layout.wording
+    among = said.best.format(count=len(ranking)) if len(ranking) > 1 else said.only
     sentence = f"{among}: {best}, {score.title} {value}{f' {score.unit}' if score.unit else ''} over {row['n']} targets"
     if best == baseline:
         compared, intro = ranking[1:2], "; it is the baseline, and from it the next,"
@@ -100,7 +88,8 @@ def _other_metrics(results: Results, condition: str) -> list[str]:
             ranking = results.ranking(condition, score.key)
             if len(ranking) > 1 and best and ranking[0] != best[0]:
                 others.setdefault(ranking[0], []).append(f"{score.title} ({DOMAIN_NAMES[score.domain]})")
-    return [f"By {words(names)} the best is {label}, not {best[0]}." for label, names in others.items()]
+    other = results.layout.wording.other
+    return [other.format(metrics=words(names), label=label, best=best[0]) for label, names in others.items()]
 
 
 def _ceiling(results: Results, condition: str) -> list[str]:
@@ -140,7 +129,7 @@ def _significant(results: Results, condition: str) -> list[str]:
 
 
 def _floor(results: Results, condition: str, floor: str) -> list[str]:
-    if floor not in results.floors:
+    if floor not in results.floors or not results.has_floor(condition):
         return []
     score, row = results.headline, results.row(floor, REFERENCE)
     differences = {label: results.floor_difference(label, condition, floor) for label in results.methods(condition)}
@@ -153,7 +142,8 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
         if below
         else f"all of the {len(known)} with a score are better on average"
     )
-    return [f"Floor: {FLOOR_NAMES[floor]} scores {score.with_unit(row[score.key])}; {verdict}."]
+    named = results.layout.wording.floor_name(floor)
+    return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]
 
 
 def blur_keys(results: Results) -> list[Score]:

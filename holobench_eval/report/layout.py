@@ -7,11 +7,25 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from .. import registry
-from ..study.bench import condition
-from ..study.plan import scored_dataset
+from ..study.plan import displays, scored_dataset
+from .wording import Wording, plain, wording
 
 if TYPE_CHECKING:
     from ..config import Study
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """What all methods of a study may train on.
+
+    dataset: its name and parameters; images: how many there are; held_out: how many of them only watch the training;
+    captures: the most that a method may take (None: no limit).
+    """
+
+    dataset: str
+    images: int
+    held_out: int
+    captures: int | None
 
 
 @dataclass(frozen=True)
@@ -25,6 +39,9 @@ class Layout:
     privileged: labels of methods that may differentiate through the bench; they are the ceiling, not competitors.
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
+    note: a paragraph that the study wants beside its tables. measure: ``picture`` or ``prediction``; holograms: whose
+    captures are predicted, with parameters. learned_display: the condition that is a trained network (None: benches).
+    trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
     """
 
     title: str
@@ -37,6 +54,17 @@ class Layout:
     reported: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     reported_source: str = ""
     reported_beside: str | None = None
+    note: str = ""
+    measure: str = "picture"
+    holograms: str = ""
+    learned_display: str | None = None
+    trained: frozenset[str] = frozenset()
+    training: TrainingSet | None = None
+
+    @property
+    def wording(self) -> Wording:
+        """What is compared, in words."""
+        return wording(self.measure, self.holograms.partition(" (")[0], self.learned_display is not None)
 
     def published(self, label: str, condition: str) -> Mapping[str, float]:
         """Published figures of a row, by metric."""
@@ -60,9 +88,11 @@ class Layout:
 
 def layout_of(study: Study) -> Layout:
     """The layout of a checked study. Reads its profiles and lists its dataset; computes nothing."""
-    display, reported = study.display, study.reported
-    names = {source: condition(source, display.panel, study.folder).name for source in display.profiles}
+    reported = study.reported
+    names = {source: place.name for source, place in displays(study).items()}
     methods = {entry.label: registry.find("methods", entry.name, study.folder) for entry in study.methods}
+    trained = frozenset(label for label, method in methods.items() if getattr(method, "trains", False))
+    probe = study.holograms
     return Layout(
         title=study.title,
         pairs=tuple((entry.label, names[source]) for entry in study.methods for source in entry.profiles),
@@ -74,4 +104,17 @@ def layout_of(study: Study) -> Layout:
         reported=reported.rows if reported else {},
         reported_source=reported.source if reported else "",
         reported_beside=names[reported.beside] if reported and reported.beside else None,
+        note=study.note,
+        measure=study.measure,
+        holograms=f"{probe.name} ({plain(probe.params)})" if study.measure == "prediction" else "",
+        learned_display=next(iter(names.values())) if study.display.learned else None,
+        trained=trained,
+        training=_training_set(study) if trained or study.display.learned else None,
     )
+
+
+def _training_set(study: Study) -> TrainingSet:
+    chosen = study.training
+    dataset = registry.build("datasets", chosen.dataset, dict(chosen.params), study.folder)
+    named = f"{chosen.dataset} ({plain(chosen.params)})"
+    return TrainingSet(named, len(dataset.items()), chosen.held_out, chosen.captures)

@@ -96,6 +96,21 @@ class Results:
         rows = (name for name in FLOORS if name in self.methods(REFERENCE))
         return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.key])]
 
+    def has_floor(self, condition: str) -> bool:
+        """Whether the reference rows were scored against the same images as the methods under ``condition``.
+
+        Pictures are compared with targets, equal for all displays; predictions with the captures of one display.
+        """
+        return bool(self.floors) and self.has_pictures(condition)
+
+    def has_pictures(self, condition: str) -> bool:
+        """Whether the pictures that stand for the targets are what the methods under ``condition`` are scored against.
+
+        The reference rows make them: for predictions, captures of one display.
+        """
+        made_for = self.frame.loc[self.frame["condition"] == REFERENCE, "profile"]
+        return self.layout.measure == "picture" or condition in set(made_for)
+
     @cached_property
     def holes(self) -> pd.DataFrame:
         """The records without a score."""

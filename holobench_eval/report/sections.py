@@ -9,7 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from ..study.plan import REFERENCE
-from .findings import FLOOR_NAMES, blur_keys
+from .findings import blur_keys
 from .markdown import code, table
 from .results import Results
 from .scores import DOMAINS, Score
@@ -50,10 +50,24 @@ def interval(row: pd.Series, score: Score) -> str:
     return score.interval(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
 
 
+def _effort(results: Results, each: str = "") -> dict[str, str]:
+    """Columns of the table that say what the scores took, with their headings.
+
+    Captures for training and those while solving stay apart: the former are taken once. each: added to the latter.
+    """
+    trained = "training_captures" in results.table
+    training = {"training_captures": "captures for training", "training_seconds": "seconds of training"}
+    solving = {"captures": f"captures{each}{' while solving' * trained}", "seconds": f"seconds{each}"}
+    if results.layout.measure == "prediction":
+        del solving["captures"]
+    return training | solving if trained else solving
+
+
 def headline_rows(results: Results, condition: str) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of a condition's main table; published figures stand in columns of their own."""
     scores, layout = leading_scores(results), results.layout
     reported = layout.reported_metrics if layout.reported_beside in (None, condition) else ()
+    effort = _effort(results)
     rows = []
     for name in results.methods(condition):
         row, published = results.row(name, condition), layout.published(name, condition)
@@ -62,12 +76,11 @@ def headline_rows(results: Results, condition: str) -> tuple[list[str], list[lis
                 label(results, name),
                 f"{row['n']:.0f} of {len(results.targets)}",
                 *(interval(row, score) for score in scores),
-                number(row["captures"]),
-                number(row["seconds"]),
+                *(number(row[key]) for key in effort),
                 *(number(published.get(metric, float("nan"))) for metric in reported),
             ]
         )
-    columns = ["method", "n", *map(heading, scores), "captures", "seconds"]
+    columns = ["method", "n", *map(heading, scores), *effort.values()]
     return [*columns, *(f"reported {Score(metric, metric).axis}" for metric in reported)], rows
 
 
@@ -78,12 +91,12 @@ def headline(results: Results, condition: str) -> Markup:
 
 def floors(results: Results) -> Markup:
     """What images that no method made score."""
-    scores = leading_scores(results)
+    scores, said = leading_scores(results), results.layout.wording
     rows = []
     for name in results.floors:
         row = results.row(name, REFERENCE)
-        rows.append([FLOOR_NAMES[name], f"{row['n']:.0f}", *(interval(row, score) for score in scores)])
-    return table(["shown instead of a capture", "n", *map(heading, scores)], rows)
+        rows.append([said.floor_name(name), f"{row['n']:.0f}", *(interval(row, score) for score in scores)])
+    return table([said.instead, "n", *map(heading, scores)], rows)
 
 
 def tests(results: Results, found: Sequence[PairedTest]) -> Markup:
@@ -158,6 +171,7 @@ def geometry(results: Results, condition: str) -> Markup:
 def light_and_time(results: Results, condition: str) -> Markup:
     """Captures, computing time and the figures that describe a capture and are no image metric."""
     figures = [score for score in results.scores if not score.domain and not score.key.startswith("refine_")]
+    effort, sensor = _effort(results, " per target"), results.layout.learned_display is None
     rows = []
     for name in results.methods(condition):
         row, cells = results.row(name, condition), results.cells(name, condition)
@@ -166,13 +180,12 @@ def light_and_time(results: Results, condition: str) -> Markup:
         rows.append(
             [
                 label(results, name),
-                number(row["captures"]),
-                number(row["seconds"]),
-                number(saturated),
+                *(number(row[key]) for key in effort),
+                *([number(saturated)] if sensor else []),
                 *(number(row[score.key]) for score in figures),
             ]
         )
-    columns = ["method", "captures per target", "seconds per target", "most saturated samples [%]"]
+    columns = ["method", *effort.values(), *(["most saturated samples [%]"] if sensor else [])]
     return table([*columns, *(score.title for score in figures)], rows)
 
 

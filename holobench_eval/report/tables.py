@@ -22,11 +22,15 @@ from .scores import order_scores, parse
 from .statistics import bootstrap_mean
 
 TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
+LEARNED_COLUMN = "learned_sha256"
+TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)
+"""Of studies with a method that was trained; others have no such columns."""
 MEASURED_COLUMNS = ("captures", "seconds", "registration_residual_px", "saturated")
 IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol")
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
-_NOT_SCORES = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
+_REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
+_NOT_SCORES = _REQUIRED | set(TRAINING_COLUMNS)
 DONE = "done"
 
 
@@ -60,7 +64,17 @@ def _row(record: Mapping[str, Any], identity: str) -> dict[str, Any]:
     clash = set(scores) & _NOT_SCORES
     if clash:
         raise UserError(f"record {identity}: score named like a column of records.csv: {', '.join(sorted(clash))}")
-    return {key: str(value) for key, value in text.items()} | {key: _rounded(value) for key, value in numbers.items()}
+    row = {key: str(value) for key, value in text.items()} | {key: _rounded(value) for key, value in numbers.items()}
+    return row | _training(record)
+
+
+def _training(record: Mapping[str, Any]) -> dict[str, Any]:
+    """What the training behind a score took: nothing for a method that is not trained, unknown without a score."""
+    if record["state"] != DONE:
+        return {"training_captures": float("nan"), "training_seconds": float("nan"), LEARNED_COLUMN: ""}
+    learned = record.get("learned") or {}
+    counts = {f"training_{key}": _rounded(learned.get(key, 0)) for key in ("captures", "seconds")}
+    return counts | {LEARNED_COLUMN: str(learned.get("sha256", ""))}
 
 
 def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.DataFrame:
@@ -73,7 +87,8 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(column for column in frame.columns if column not in _NOT_SCORES) or [layout.headline]
     columns = ["method", "name", "condition", "target", "repeat", "state", "reason"]
-    frame = frame.reindex(columns=[*columns, *scores, *MEASURED_COLUMNS, *IDENTITY_COLUMNS])
+    training = TRAINING_COLUMNS if layout.trained else ()
+    frame = frame.reindex(columns=[*columns, *scores, *MEASURED_COLUMNS, *training, *IDENTITY_COLUMNS])
     return _sorted(frame, layout)
 
 
@@ -131,6 +146,9 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
         estimate = bootstrap_mean(values if values.size == n or not parse(score).domain else [])
         row |= {score: estimate.mean, f"{score}_lo": estimate.low, f"{score}_hi": estimate.high}
     row |= {"captures": done["captures"].mean(), "seconds": done["seconds"].mean()}
+    if LEARNED_COLUMN in done:
+        row |= {key: done[key].mean() for key in TRAINING_COLUMNS if key != LEARNED_COLUMN}
+        row[LEARNED_COLUMN] = " ".join(sorted(set(done[LEARNED_COLUMN]) - {""}))
     published = layout.published(label, condition)
     return row | {f"reported_{name}": published.get(name, np.nan) for name in layout.reported_metrics}
 
@@ -148,12 +166,12 @@ def csv_text(frame: pd.DataFrame) -> str:
 def read_records(text: str) -> pd.DataFrame:
     """The records frame from the text of records.csv; inverse of :func:`csv_text` on such a frame."""
     frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
-    lacking = _NOT_SCORES - set(frame.columns)
+    lacking = _REQUIRED - set(frame.columns)
     if lacking:
         raise UserError(
             f"records.csv lacks the columns {', '.join(sorted(lacking))}; it was written by another version"
         )
-    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS}
+    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN}
     for column in frame.columns:
         if column not in text_columns:
             frame[column] = [float(value) if value else np.nan for value in frame[column]]

@@ -12,8 +12,11 @@ from ..errors import CellError, UserError
 if TYPE_CHECKING:
     from ..display import Workbench
     from ..display.contract import DisplaySpec
+    from .preparation import Preparation
 
 Panel = tuple[int, int]
+LEARNED = "learned"
+"""How a config names the display that is a trained network."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,9 @@ class Condition:
     """A display that a study shows its methods on.
 
     source: the profile's name or path as the config gives it; folder: where a relative path starts; name,
-    version, digest: those of the profile; spec: its nominal optics at the study's panel size.
+    version, digest: those of the profile; spec: its nominal optics at the study's panel size; learned: what has to be
+    prepared for a display that is a trained network (the other fields are those of the display it was trained on,
+    except for its name).
     """
 
     source: str
@@ -30,6 +35,7 @@ class Condition:
     version: int
     digest: str
     spec: DisplaySpec
+    learned: Preparation | None = None
 
 
 def condition(source: str, panel: Panel | None, folder: Path) -> Condition:

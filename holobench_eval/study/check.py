@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..config import load_study
 from ..errors import UserError
 from . import provenance
-from .bench import condition
+from .plan import displays
 
 if TYPE_CHECKING:
     from ..config import Study
@@ -40,8 +40,7 @@ def _problems(report: Path) -> Iterator[str]:
 def _study_problems(study: Study, known: dict[str, Any]) -> Iterator[str]:
     if hashlib.sha256(study.text.encode()).hexdigest() != known["config_sha256"]:
         yield "the config has changed since the report was made; run the study again"
-    for source in study.display.profiles:
-        place = condition(source, study.display.panel, study.folder)
+    for place in displays(study).values():
         now = {"version": place.version, "sha256": place.digest}
         then = dict(known["profiles"]).get(place.name)
         if then != now:

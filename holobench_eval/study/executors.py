@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
@@ -68,7 +70,7 @@ class Local:
             ) as cluster,
             Client(cluster) as client,  # type: ignore[no-untyped-call]
         ):
-            client.register_plugin(_interrupts_for_the_parent())
+            client.register_plugin(_bound_to_the_parent())
             waiting = iter(jobs)
             running: dict[Any, J] = {}
             completed = as_completed()  # type: ignore[no-untyped-call]
@@ -89,22 +91,34 @@ class Local:
                 start()
 
 
-def _interrupts_for_the_parent() -> Any:
-    """A plugin by which every worker, a restarted one too, leaves Ctrl-C to the process that started it."""
+def _bound_to_the_parent() -> Any:
+    """A plugin by which every worker, a restarted one too, leaves Ctrl-C to the process that started it and dies with
+    it: a killed run must not go on training in the background."""
     from distributed import WorkerPlugin
 
-    class IgnoreInterrupts(WorkerPlugin):
+    class BoundToParent(WorkerPlugin):
         def setup(self, worker: object) -> None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
+            threading.Thread(target=_die_with, args=(os.getppid(),), daemon=True).start()
 
-    return IgnoreInterrupts()
-
-
-NAMES = ("serial", "local")
+    return BoundToParent()
 
 
-def executor(name: str, workers: int | None) -> Executor:
-    """The executor of a name; ``workers`` defaults to the number of processors."""
+def _die_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)
+
+
+NAMES = ("auto", "serial", "local")
+
+
+def executor(name: str, workers: int | None, small: bool = True) -> Executor:
+    """The executor of a name; ``workers`` defaults to the number of processors.
+
+    "auto" is local where the study's panel is small and there is more than one worker to have, else serial: a small
+    panel does not keep several threads busy, a large one fills the memory.
+    """
     if name not in NAMES:
         raise UserError(f"unknown executor '{name}'; {suggest(name, NAMES)}")
     if workers is not None and workers < 1:
@@ -112,6 +126,8 @@ def executor(name: str, workers: int | None) -> Executor:
     if name == "serial":
         if workers not in (None, 1):
             raise UserError(f"--workers {workers} needs --executor local; the serial executor has one")
+        return Serial()
+    if name == "auto" and ((workers or _cores()) == 1 or (not small and workers is None)):
         return Serial()
     return Local(workers or _cores())
 

@@ -38,34 +38,53 @@ def params_of(plugin: Any) -> dict[str, Any]:
 def code_digest(cls: type[Any]) -> str:
     """sha256 of the code that defines a class, without comments and docstrings.
 
-    It covers the files of the class and its bases, and the modules beside them that they import
-    (``from .losses import ...``); other imports are not followed. As part of a cell's identity it has cells
-    computed again after a change of the method, but not after a change of its documentation.
+    It covers the files of the class and its bases, and the modules of their own folders that they import relatively
+    (``from .losses import ...``, in this package's methods ``from ..wirtinger import ...`` too); other imports are
+    not followed. As part of a cell's identity it has cells computed again after a change of the method, but not
+    after a change of its documentation.
     """
+    return digest(sorted(code_of(cls).values()))
+
+
+def code_of(cls: type[Any]) -> dict[Path, str]:
+    """The files that define a class, as ``code_digest`` covers them, each in one normal form."""
     members = [member for base in cls.__mro__ for member in vars(base).values()]
     functions = [inspect.unwrap(member) for member in members if inspect.isfunction(member)]
-    waiting = {Path(function.__code__.co_filename) for function in functions}
+    files = {Path(function.__code__.co_filename).resolve() for function in functions}
+    waiting = {(file, _own_folder(file)) for file in files}
     code: dict[Path, str] = {}
     while waiting:
-        file = waiting.pop()
+        file, folder = waiting.pop()
         if file not in code and file.is_file():
-            code[file], beside = _code(file, file.stat().st_mtime_ns)
-            waiting |= beside
-    return digest(sorted(code.values()))
+            code[file], imported = _code(file, file.stat().st_mtime_ns)
+            waiting |= {(other, folder) for other in imported if other.is_relative_to(folder)}
+    return code
 
 
-@lru_cache(maxsize=64)
+def _own_folder(file: Path) -> Path:
+    """The folder whose modules count as a file's own: its own, or that of all the methods that come with the package.
+
+    It holds the same files in every kind of installation, which is not so of the folders above.
+    """
+    from .. import methods
+
+    shipped = Path(methods.__file__).resolve().parent
+    return shipped if file.is_relative_to(shipped) else file.parent
+
+
+@lru_cache(maxsize=256)
 def _code(file: Path, _modified: int) -> tuple[str, frozenset[Path]]:
-    """A file's code in one normal form, and the files beside it that it imports; cached until it is modified."""
+    """A file's code in one normal form, and the files it may import relatively; cached until it is modified."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
-    beside = set()
+    imported: set[Path] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
             node.body = node.body[1:] or [ast.Pass()]
-        if isinstance(node, ast.ImportFrom) and node.level == 1:
-            modules = [node.module] if node.module else [alias.name for alias in node.names]
-            beside |= {file.parent.joinpath(*module.split(".")).with_suffix(".py") for module in modules}
-    return ast.unparse(tree), frozenset(beside)
+        if isinstance(node, ast.ImportFrom) and 0 < node.level <= len(file.parents):
+            place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            for module in (place, *(place / alias.name for alias in node.names)):
+                imported |= {module.parent / f"{module.name}.py", module / "__init__.py"}
+    return ast.unparse(tree), frozenset(imported)
 
 
 @lru_cache(maxsize=1)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import registry
 from ..errors import UserError
-from .bench import Condition, condition
+from .bench import LEARNED, Condition, condition
 from .identity import code_digest, digest, harness_digest
+from .preparation import Preparation, check_unseen, preparation
 
 if TYPE_CHECKING:
     from ..config import MethodEntry, Study
@@ -39,7 +40,9 @@ class Cell:
     all of them; target_sha256: digest of the source image; profile_version, profile_sha256: of the display;
     panel: rows and columns in pixels; condition: name of the display, or ``reference`` for the floor;
     repeat, seed: names of the noise; harness_sha256: code of optics, bench, registration and metrics
-    (``identity.harness_digest``); metrics: name and version of every metric that can be computed here.
+    (``identity.harness_digest``); metrics: name and version of every metric that can be computed here; measure: what
+    is scored, ``picture`` or ``prediction``; holograms: whose captures are predicted (empty for pictures); prepared:
+    what the method and the display had to learn first (``Preparation.id``, empty for nothing).
     """
 
     method: str
@@ -60,10 +63,14 @@ class Cell:
     harness_sha256: str
     metrics: tuple[str, ...]
     exposure: Literal["equal", "matched"]
+    measure: Literal["picture", "prediction"] = "picture"
+    holograms: Mapping[str, Any] = field(default_factory=dict)
+    prepared: tuple[str, ...] = ()
 
     def description(self) -> dict[str, Any]:
         """The cell as plain JSON values."""
-        return {**asdict(self), "panel": list(self.panel), "metrics": list(self.metrics)}
+        lists = {name: list(getattr(self, name)) for name in ("panel", "metrics", "prepared")}
+        return {**asdict(self), **lists}
 
     @cached_property
     def id(self) -> str:
@@ -77,12 +84,13 @@ class Task:
     displays.
 
     conditions: the display of each cell; the method meets the first one while it solves. A floor task has no
-    solution and one display, which gives the size of the scored region.
+    solution and one display, which gives the size of the scored region. preparation: what the method learns first.
     """
 
     label: str
     cells: tuple[Cell, ...]
     conditions: tuple[Condition, ...]
+    preparation: Preparation | None = None
 
     @property
     def is_floor(self) -> bool:
@@ -106,6 +114,12 @@ class Plan:
     def cells(self) -> tuple[Cell, ...]:
         """Every cell."""
         return tuple(cell for task in self.tasks for cell in task.cells)
+
+    def preparations(self) -> dict[str, Preparation]:
+        """What has to be learned before the cells can be computed, by its id, each once."""
+        needed = [task.preparation for task in self.tasks]
+        needed += [place.learned for task in self.tasks for place in task.conditions]
+        return {one.id: one for one in needed if one is not None}
 
 
 def scored_dataset(study: Study) -> Any:
@@ -131,13 +145,26 @@ def plan(study: Study) -> Plan:
     """The grid of a study. Reads profiles and the digests of target images, and nothing else."""
     dataset = scored_dataset(study)
     targets = [(item, dataset.digest(item)) for item in dataset.items()]
-    shown = {source: condition(source, study.display.panel, study.folder) for source in study.display.profiles}
+    shown = displays(study)
     ground = _Ground(study, _metrics(study))
     first = next(iter(shown.values()))
     tasks = [ground.floor(first, target, targets[(i + 1) % len(targets)]) for i, target in enumerate(targets)]
     for entry in study.methods:
         tasks += ground.solutions(entry, [shown[source] for source in entry.profiles], targets)
-    return Plan(tuple(tasks))
+    made = Plan(tuple(tasks))
+    check_unseen(made.preparations(), targets)
+    return made
+
+
+def displays(study: Study) -> dict[str, Condition]:
+    """The displays of a study by the names they have in its config."""
+    grid, learned = study.display, study.display.learned
+    if learned is None:
+        return {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
+    place = condition(learned.profile, grid.panel, study.folder)
+    needed = preparation(study, learned.method, learned.params, place)
+    name = f"{learned.method.rpartition(':')[2]} trained on {place.name}"
+    return {LEARNED: replace(place, name=name, learned=needed)}
 
 
 @dataclass(frozen=True)
@@ -147,10 +174,25 @@ class _Ground:
     study: Study
     metrics: tuple[str, ...]
 
-    def cell(self, target: tuple[str, str], place: Condition, condition: str, repeat: int, made: Made) -> Cell:
+    @cached_property
+    def probe_sha256(self) -> str:
+        """The code of the method whose captures are predicted."""
+        return code_digest(registry.find("methods", self.study.holograms.name, self.study.folder))
+
+    def cell(
+        self,
+        target: tuple[str, str],
+        place: Condition,
+        condition: str,
+        repeat: int,
+        made: Made,
+        prepared: tuple[str, ...] = (),
+    ) -> Cell:
         """A cell; ``target`` is a name and its digest, ``made`` says by what the picture is made."""
         study = self.study
         method, code, params = made
+        holograms = study.holograms
+        probe = {"name": holograms.name, "params": holograms.params, "sha256": self.probe_sha256}
         return Cell(
             method=method,
             method_sha256=code,
@@ -170,17 +212,23 @@ class _Ground:
             harness_sha256=harness_digest(),
             metrics=self.metrics,
             exposure=study.display.exposure,
+            measure=study.measure,
+            holograms=probe if study.measure == "prediction" else {},
+            prepared=prepared,
         )
 
     def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[tuple[str, str]]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
         cls = registry.find("methods", entry.name, self.study.folder)
         made = (entry.name, code_digest(cls), entry.params)
-        for group in _sharing(cls, shown):
+        for group in [(place,) for place in shown] if self.study.measure == "prediction" else _sharing(cls, shown):
+            own = preparation(self.study, entry.name, entry.params, group[0])
             for target in targets:
                 for repeat in range(self.study.repeats):
-                    cells = (self.cell(target, place, place.name, repeat, made) for place in group)
-                    yield Task(entry.label, tuple(cells), group)
+                    cells = (
+                        self.cell(target, place, place.name, repeat, made, _ids(own, place.learned)) for place in group
+                    )
+                    yield Task(entry.label, tuple(cells), group, own)
 
     def floor(self, place: Condition, target: tuple[str, str], wrong: tuple[str, str]) -> Task:
         """The references of a target; ``wrong`` is the target that is shown in its place."""
@@ -188,8 +236,15 @@ class _Ground:
         params = {name: shown if name == "floor_wrong_target" else {} for name in FLOORS}
         if wrong == target:
             del params["floor_wrong_target"]
-        cells = tuple(self.cell(target, place, REFERENCE, 0, (name, "", given)) for name, given in params.items())
+        cells = tuple(
+            self.cell(target, place, REFERENCE, 0, (name, "", given), _ids(place.learned))
+            for name, given in params.items()
+        )
         return Task("floor", cells, (place,) * len(cells))
+
+
+def _ids(*needed: Preparation | None) -> tuple[str, ...]:
+    return tuple(one.id for one in needed if one is not None)
 
 
 def _metrics(study: Study) -> tuple[str, ...]:
@@ -204,10 +259,10 @@ def _metrics(study: Study) -> tuple[str, ...]:
 def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ...]]:
     """Displays grouped so that one solution serves a group.
 
-    A method that neither captures nor looks into the bench knows only the nominal optics, so displays with equal
-    nominal optics get the same phase from it.
+    A method that neither captures nor trains nor looks into the bench knows only the nominal optics, so displays with
+    equal nominal optics get the same phase from it.
     """
-    if getattr(cls, "camera", False) or getattr(cls, "privileged", False):
+    if any(getattr(cls, property, False) for property in ("camera", "privileged", "trains")):
         return [(place,) for place in shown]
     groups: dict[Any, list[Condition]] = {}
     for place in shown:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from rich.markup import escape
 from rich.table import Table
 
 from . import timings
+from .artifacts import FAILURE, UNFINISHED, Artifacts
 from .plan import Plan, Task
+from .preparation import Preparation
 from .store import Store
+from .training_record import known, progress
 
 if TYPE_CHECKING:
     from ..config import Study
@@ -34,6 +38,63 @@ class Row:
     failed: int
     missing: int
     seconds: float | None
+
+
+@dataclass(frozen=True)
+class TrainingRow:
+    """Something that a study's methods or its display must learn.
+
+    name: of its artifact; needed_by: labels, or the display; state: ``unfinished`` and ``failed`` ones go on with the
+    next run; captures, seconds: what it took, or has taken so far (NaN: not known); reason: why it failed.
+    """
+
+    name: str
+    needed_by: tuple[str, ...]
+    state: Literal["done", "unfinished", "failed", "missing"]
+    captures: float
+    seconds: float
+    reason: str = ""
+
+
+def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
+    """A row per artifact that a plan needs; nothing of it is loaded."""
+    rows = []
+    for identity, needed in plan.preparations().items():
+        own = {task.label for task in plan.tasks if task.preparation and task.preparation.id == identity}
+        shown = {
+            place.name
+            for task in plan.tasks
+            for place in task.conditions
+            if place.learned and place.learned.id == identity
+        }
+        rows.append(_training(needed, (*sorted(own), *(f"display {name}" for name in sorted(shown))), artifacts))
+    return rows
+
+
+def _training(needed: Preparation, needed_by: tuple[str, ...], artifacts: Artifacts) -> TrainingRow:
+    place = artifacts.place(needed)
+    if artifacts.has(needed):
+        facts = known(place) or {}
+        captures, seconds = (float(facts.get(key, math.nan)) for key in ("captures", "seconds"))
+        return TrainingRow(needed.name, needed_by, "done", captures, seconds)
+    if (place / FAILURE).is_file():
+        return TrainingRow(needed.name, needed_by, "failed", *progress(place), artifacts.failure(needed))
+    state: Literal["unfinished", "missing"] = "unfinished" if (place / UNFINISHED).is_dir() else "missing"
+    return TrainingRow(needed.name, needed_by, state, *progress(place))
+
+
+def training_table(rows: list[TrainingRow]) -> Table:
+    """What has to be learned, as a table."""
+    result = Table(title="training", title_justify="left")
+    for name in ("artifact", "needed by", "state"):
+        result.add_column(name, overflow="fold")
+    result.add_column("captures", justify="right")
+    result.add_column(escape("training [s]"), justify="right")
+    for row in rows:
+        figures = ("" if math.isnan(value) else f"{value:.4g}" for value in (row.captures, row.seconds))
+        state = f"{row.state}: {row.reason}" if row.reason else row.state
+        result.add_row(*map(escape, (row.name, ", ".join(row.needed_by), state)), *figures)
+    return result
 
 
 def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int) -> list[Row]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from .artifacts import read_log
 from .plan import Task
 from .run import Watch
 from .store import Record
@@ -27,6 +30,47 @@ def _failure(record: Record) -> str:
     return f"failed: {record.label} · {cell['condition']} · {cell['target']}: {record.reason}"
 
 
+def _untrained(name: str, reason: str) -> str:
+    return f"failed: training {name}: {reason}"
+
+
+@dataclass
+class Follower:
+    """Tells what the newest line of each growing ``training.csv`` says, every so many seconds, from a thread.
+
+    Workers of any kind write that file, so that it is followed in the same way wherever they run.
+    """
+
+    seconds: float
+    places: dict[str, Path] = field(default_factory=dict)
+    told: dict[str, str] = field(default_factory=dict)
+    done: threading.Event = field(default_factory=threading.Event)
+
+    def start(self, names: list[tuple[str, Path]], tell: Callable[[str], object]) -> None:
+        """Follow the logs in these folders until each has ``ended``."""
+        self.places = dict(names)
+        self.done.clear()
+        threading.Thread(target=self._follow, args=(tell,), daemon=True).start()
+
+    def ended(self, name: str) -> bool:
+        """Follow this one no more; whether it was the last."""
+        self.places.pop(name, None)
+        if not self.places:
+            self.done.set()
+        return not self.places
+
+    def _follow(self, tell: Callable[[str], object]) -> None:
+        while not self.done.wait(self.seconds):
+            for name, place in list(self.places.items()):
+                rows = read_log(place)
+                line = (
+                    f"{name}: {', '.join(f'{key} {value}' for key, value in rows[-1].items() if value)}" if rows else ""
+                )
+                if line and self.told.get(name) != line:
+                    self.told[name] = line
+                    tell(line)
+
+
 @dataclass
 class Bar:
     """A bar with the task in work, the cells done, the time left and the number of failures."""
@@ -34,10 +78,26 @@ class Bar:
     progress: Progress
     bar: TaskID
     failures: int = 0
+    cells: tuple[int, int] = (0, 0)
+    follower: Follower = field(default_factory=lambda: Follower(0.5))
 
     def planned(self, cells: int, missing: int) -> None:
         """Start at the cells that have a record already."""
+        self.cells = (cells, missing)
         self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
+
+    def training(self, names: list[tuple[str, Path]]) -> None:
+        """Show what is trained, and follow its log."""
+        self.progress.reset(self.bar, total=len(names), description="training")
+        self.follower.start(names, lambda line: self.progress.update(self.bar, description=escape(line)))
+
+    def trained(self, name: str, failure: str) -> None:
+        """Advance, and print a failure above the bar."""
+        if failure:
+            self.progress.console.print(escape(_untrained(name, failure)), style="red", highlight=False, soft_wrap=True)
+        self.progress.update(self.bar, advance=1)
+        if self.follower.ended(name):
+            self.planned(*self.cells)
 
     def started(self, task: Task) -> None:
         """Name the task in work."""
@@ -61,6 +121,7 @@ class Lines:
     total: int = 0
     done: int = 0
     failures: int = 0
+    follower: Follower = field(default_factory=lambda: Follower(15.0))
     begun: float = field(init=False)
     last: float = field(init=False)
 
@@ -71,6 +132,17 @@ class Lines:
         """Say what there is to do."""
         self.total = missing
         self.write(f"{missing} of {cells} cells to compute")
+
+    def training(self, names: list[tuple[str, Path]]) -> None:
+        """Say what is trained, and follow its log."""
+        self.write(f"{len(names)} to train: {', '.join(name for name, _ in names)}")
+        self.follower.start(names, self.write)
+
+    def trained(self, name: str, failure: str) -> None:
+        """A line for every training that ended."""
+        self.write(_untrained(name, failure) if failure else f"trained: {name}")
+        if self.follower.ended(name):
+            self.begun = self.last = self.clock()
 
     def started(self, task: Task) -> None:
         """Name the task in work, if the last line is old enough."""

@@ -20,7 +20,8 @@ from .plan import Cell, Plan
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
 """``missing`` is the state of a planned cell that has no record; ``Store.load`` gives it and no file holds it."""
 
-_TEMPORARY = ".writing-"
+TEMPORARY = ".writing-"
+"""How the name of a file begins that is not whole yet."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Record:
     cell: its description; state: ``done``, or why there is no score in ``reason``; scores: flat metric names
     to numbers; captures: camera captures the method used; seconds: wall time of the solution; label: the
     method's name in tables; registration_residual_px: rms error of the registration, in pixels of the scored
-    region; saturated: fraction of saturated samples. None: does not apply, as to a floor cell.
+    region; saturated: fraction of saturated samples; learned: sha256, captures and seconds of the training that the
+    method needed first. None: does not apply, as to a floor cell.
     """
 
     cell: dict[str, Any]
@@ -42,6 +44,7 @@ class Record:
     seconds: float | None = None
     registration_residual_px: float | None = None
     saturated: float | None = None
+    learned: dict[str, Any] | None = None
 
     @property
     def id(self) -> str:
@@ -52,7 +55,7 @@ class Record:
 def write_atomically(path: Path, content: bytes) -> None:
     """Write a file under a temporary name in the same folder, then rename it: readers see all of it or nothing."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=_TEMPORARY, dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=TEMPORARY, dir=path.parent)
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -151,7 +154,7 @@ class Store:
                 raise UserError(
                     f"{self.output}: another run is using this folder; wait for it or give --output"
                 ) from None
-            for left in self.folder.glob(f"{_TEMPORARY}*"):
+            for left in self.folder.glob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
 

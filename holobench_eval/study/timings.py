@@ -50,6 +50,8 @@ def key(task: Task, threads: int, workers: int) -> str:
             "target": [cell.target_sha256, dict(cell.dataset_params)],
             "display": [repr(place.spec), place.digest, cell.exposure],
             "noise": [cell.seed, cell.repeat],
+            "learned": [cell.measure, *cell.prepared],
+            "measure": cell.measure,
             "machine": [cpu_model(), platform.machine(), threads, workers],
             "versions": [version("torch"), __version__],
         }

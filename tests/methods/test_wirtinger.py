@@ -136,7 +136,7 @@ def test_ms_ssim_refuses_a_region_too_small_for_its_scales(bench, scene):
 
 
 def test_a_cosine_step_starts_whole_and_falls_to_nothing():
-    steps = [cosine_decay(0.2, i, 10) for i in range(11)]
+    steps = [cosine_decay(0.2, i / 10) for i in range(11)]
     assert steps[0] == pytest.approx(0.2)
     assert steps[5] == pytest.approx(0.1)
     assert steps[10] == pytest.approx(0.0)

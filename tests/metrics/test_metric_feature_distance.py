@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from holobench_eval.metrics.base import gaussian_blur
-from holobench_eval.metrics.feature_distance import mofd
+from holobench_eval.metrics.feature_distance import FixedMofd, mofd
+from holobench_eval.metrics.ms_ssim import FixedMsSsim, ms_ssim
 from holobench_eval.optics.colour import srgb_decode, srgb_encode
 
 Photograph = Callable[..., Tensor]
@@ -56,3 +57,15 @@ def test_unrelated_pictures_are_further_apart_than_any_half_speckled_one(photogr
     target, other = photograph("chelsea", 128), photograph("rocket", 128)
     speckled = SERIES["speckle"][2](target)
     assert float(mofd(other, target)) > 2 * float(mofd(speckled, target))
+
+
+@pytest.mark.parametrize(("fixed", "plain"), [(FixedMofd, mofd), (FixedMsSsim, ms_ssim)])
+def test_a_fixed_target_serves_many_images_with_the_plain_values(
+    photograph: Photograph, fixed: type[FixedMofd] | type[FixedMsSsim], plain: Callable[[Tensor, Tensor], Tensor]
+) -> None:
+    target = photograph("coffee")
+    measure = fixed(target)
+    for distort in SERIES["noise"][:2]:
+        assert torch.equal(measure(distort(target)), plain(distort(target), target))
+    with pytest.raises(ValueError, match="differ in shape"):
+        measure(target[:, 1:])

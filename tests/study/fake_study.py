@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 import sys
 import types
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
+from torch import Tensor
 
-from holobench_eval.display import load_profile
-from holobench_eval.study import cell
+from holobench_eval.display import MeteredBench, Workbench, load_profile
+from holobench_eval.seeds import generator
+from holobench_eval.study import cell, job, measures, training
 from holobench_eval.study.store import Record
 
 PLUGINS = '''
@@ -106,53 +109,79 @@ def solves(folder: Path) -> list[str]:
     return log.read_text().splitlines() if log.exists() else []
 
 
-class FakeHandle:
-    """What a method gets."""
-
-    def __init__(self, spec: Any) -> None:
-        self.spec, self.captures = spec, 0
-
-    def generator(self, *names: object) -> torch.Generator:
-        return torch.Generator().manual_seed(len(names))
-
-
 class FakeBench:
     """A display whose picture is the target, darkened by the phase."""
 
     def __init__(self, spec: Any) -> None:
-        self.spec = spec
+        self.spec, self.bench = spec, self
 
-    def for_method(self, method: Any, label: str, target: torch.Tensor, **_: Any) -> FakeHandle:
-        return FakeHandle(self.spec)
+    def for_method(
+        self, method: Any, label: str, target: Tensor, item: str, repeat: int, learned: Any = None
+    ) -> MeteredBench:
+        return MeteredBench(cast(Workbench, self), label, target, (item, repeat), method, learned=learned)
 
-    def photograph(self, phase: torch.Tensor, target: torch.Tensor, **names: Any) -> Any:
+    def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
         shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000
         image = target * shade * torch.linspace(0.5, 1, target.shape[-1])
         return types.SimpleNamespace(image=image, saturated=0.0, efficiency=0.5, residual=0.05)
 
+    def exposure(self, target: Tensor) -> tuple[float, ...]:
+        return (1.0,) * len(target)
 
-def fake_score(image: torch.Tensor, target: torch.Tensor, **_: Any) -> dict[str, float]:
+    def session(self, *names: object, exposure: tuple[float, ...]) -> FakeSession:
+        return FakeSession(self.spec, names)
+
+    def rectified(self, capture: Tensor, target: Tensor) -> Tensor:
+        return capture
+
+
+@dataclass(frozen=True)
+class FakeSession:
+    """A camera that sees noise around the mean of the phase."""
+
+    spec: Any
+    names: tuple[object, ...]
+
+    def capture(self, phase: Tensor) -> Tensor:
+        noise = torch.rand((len(phase), *self.spec.region.shape), generator=generator(*self.names))
+        return phase.mean((1, 2))[:, None, None] + noise
+
+
+def fake_workbench(place: Any, seed: int) -> FakeBench:
+    return FakeBench(load_profile("ideal").spec(place.spec.shape))
+
+
+def fake_score(image: Tensor, target: Tensor, **_: Any) -> dict[str, float]:
     error = float((image - target).square().mean())
     return {"psnr_linear": -10 * float(torch.tensor(error + 1e-6).log10()), "ssim_linear": 1 - error}
 
 
+FAKES: tuple[tuple[types.ModuleType, str, Any], ...] = (
+    (job, "workbench", fake_workbench),
+    (measures, "workbench", fake_workbench),
+    (training, "workbench", fake_workbench),
+    (measures, "score", fake_score),
+)
+"""Where the machinery calls the physics, and what stands there instead."""
+
+
 def install() -> None:
     """Put the fakes where a task calls the physics."""
-    setattr(cell, "workbench", lambda place, seed: FakeBench(load_profile("ideal").spec(place.spec.shape)))  # noqa: B010
-    setattr(cell, "score", fake_score)  # noqa: B010
+    for module, name, fake in FAKES:
+        setattr(module, name, fake)
 
 
-def fake_work(job: cell.Job) -> list[Record]:
+def fake_work(task: job.Job) -> list[Record]:
     """``cell.work`` with the fakes, for worker processes that are started fresh."""
     install()
-    return cell.work(job)
+    return cell.work(task)
 
 
-def lose_a_worker(job: cell.Job) -> list[Record]:
+def lose_a_worker(task: job.Job) -> list[Record]:
     """Work that kills its process on one target."""
-    if job.task.cells[0].target == "gray 1" and not job.task.is_floor:
+    if task.task.cells[0].target == "gray 1" and not task.task.is_floor:
         os.kill(os.getpid(), 9)
-    return fake_work(job)
+    return fake_work(task)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,8 @@ from holobench_eval.study.progress import Lines
 
 def compute(config: Path, output: Path, chosen: Executor) -> list[dict[str, Any]]:
     study = load_study(config)
-    return running.run(study, plan(study), output, chosen, Lines(lambda line: None), threads=1).records
+    watch, artifacts = Lines(lambda line: None), output.parent / "artifacts"
+    return running.run(study, plan(study), output, chosen, watch, threads=1, artifacts=artifacts).records
 
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:

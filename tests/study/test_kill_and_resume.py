@@ -24,7 +24,7 @@ TARGETS = 5
 def start(config: Path, output: Path, *options: str) -> subprocess.Popen[str]:
     command = [sys.executable, str(Path(fake_study.__file__)), "run", str(config), "--output", str(output)]
     return subprocess.Popen(
-        [*command, "--threads", "1", *options],
+        [*command, "--executor", "serial", "--threads", "1", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -73,7 +73,8 @@ def test_a_run_that_was_killed_and_interrupted_gives_the_bytes_of_one_that_was_n
 
     study = load_study(config)
     grid = plan(study)
-    whole = run(study, grid, tmp_path / "whole", Serial(), Lines(lambda line: None), threads=1)
+    watch, artifacts = Lines(lambda line: None), tmp_path / "artifacts"
+    whole = run(study, grid, tmp_path / "whole", Serial(), watch, threads=1, artifacts=artifacts)
     build_report(study, whole.records, tmp_path / "whole", whole.provenance)
     for name in ("table.csv", "records.csv"):
         assert (output / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

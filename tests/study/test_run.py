@@ -21,7 +21,8 @@ pytestmark = pytest.mark.usefixtures("no_physics")
 
 def compute(config: Path, output: Path, write: Callable[[str], None] = lambda line: None, **options: Any) -> Outcome:
     study = load_study(config)
-    return run(study, plan(study), output, Serial(), Lines(write), threads=1, **options)
+    artifacts = output.parent / "artifacts"
+    return run(study, plan(study), output, Serial(), Lines(write), threads=1, artifacts=artifacts, **options)
 
 
 def test_every_cell_of_the_plan_gets_a_record(tmp_path: Path) -> None:
@@ -92,7 +93,7 @@ def test_failed_cells_run_again_only_when_asked(tmp_path: Path) -> None:
 
 
 def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("holobench_eval.study.cell.score", lambda *_, **__: {"psnr_linear": float("nan")})
+    monkeypatch.setattr("holobench_eval.study.measures.score", lambda *_, **__: {"psnr_linear": float("nan")})
     outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"failed"}
     assert outcome.records[0]["reason"] == "CellError: the score psnr_linear is nan"

@@ -56,8 +56,10 @@ class Propagation:
         return wavefront(self.aberration, y / beyond, x / beyond) * (517e-9 / geometry.wavelength)
 
 
-def sample_weights(padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool) -> Tensor:
-    """Weights ``(samples^2, rows, columns)`` that add the spectra of the sub-samples to that of the panel.
+def sample_weights(
+    padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool
+) -> tuple[Tensor, Tensor]:
+    """Weights that add the spectra of the sub-samples to that of the panel, ``(samples, padded)`` for each axis.
 
     Each sub-sample sits off its pixel's centre and, with ``hold``, is a small square (a sinc in frequency). The
     spectra are those of fields whose carrier ``blaze`` [cycles per pixel] has been taken off pixel by pixel, so the
@@ -68,6 +70,6 @@ def sample_weights(padded: tuple[int, int], samples: int, blaze: tuple[float, fl
         f = torch.fft.fftfreq(size, dtype=torch.float64) + carrier
         envelope = torch.sinc(f / samples) if hold else torch.ones_like(f)
         angle = -2 * math.pi * torch.tensor(sample_positions(samples), dtype=torch.float64)[:, None] * f
-        axes.append(torch.polar(envelope.expand_as(angle).contiguous(), angle) / samples)
-    weights = torch.einsum("ia,jb->ijab", axes[0], axes[1])
-    return weights.reshape(samples**2, *padded).to(torch.complex64)
+        weights = torch.polar(envelope.expand_as(angle).contiguous(), angle) / samples
+        axes.append(weights.to(torch.complex64))
+    return axes[0], axes[1]

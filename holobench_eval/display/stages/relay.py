@@ -11,6 +11,8 @@ import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
 from torch import Tensor
 
+from ...shifts import correlate
+
 
 @dataclass(frozen=True)
 class Relay:
@@ -58,12 +60,10 @@ def box_filter(image: Tensor, width: float) -> Tensor:
     if width <= 1:
         return image
     reach = math.ceil((width - 1) / 2)
-    taps = torch.ones(2 * reach + 1, dtype=image.dtype, device=image.device)
-    taps[0] = taps[-1] = (width - (2 * reach - 1)) / 2
-    taps /= taps.sum()
+    edge = (width - (2 * reach - 1)) / 2
+    taps = [share / width for share in (edge, *[1.0] * (2 * reach - 1), edge)]
     flat = F.pad(image.reshape(-1, 1, *image.shape[-2:]), (reach, reach, reach, reach), mode="replicate")
-    smooth = F.conv2d(F.conv2d(flat, taps.view(1, 1, -1, 1)), taps.view(1, 1, 1, -1))
-    return smooth.reshape(image.shape)
+    return correlate(correlate(flat, taps, dim=-2), taps, dim=-1).reshape(image.shape)
 
 
 def sampling_grid(points: Tensor, shape: tuple[int, int]) -> Tensor:

@@ -1,0 +1,72 @@
+"""A frozen network as a display (paper 6.3): what it predicts of a phase is its capture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from ..errors import CellError
+from .bench import BenchSession
+from .contract import Capture, DisplaySpec
+from .workbench import DARKEST_MEAN, Exposure, MeteredBench, Shot, Simulation, check_phase, concentration
+
+
+class Predictor(Protocol):
+    """A trained method that predicts captures."""
+
+    def predict(self, phase: Tensor, bench: MeteredBench) -> Tensor:
+        """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light in the unit of ``Shot.image``."""
+        ...
+
+
+@dataclass(frozen=True)
+class LearnedBench:
+    """A display without noise, camera or registration; ``method`` predicts with what it ``learned``."""
+
+    spec: DisplaySpec
+    method: Predictor
+    learned: Mapping[str, Any]
+    names: tuple[object, ...]
+
+    @property
+    def simulation(self) -> Simulation:
+        """There is none: only a simulated bench can be looked into."""
+        raise CellError("a learned display has no simulated bench to look into")
+
+    def for_method(
+        self,
+        method: object,
+        label: str,
+        target: Tensor,
+        item: str,
+        repeat: int,
+        budget: int | None = None,
+        learned: Mapping[str, Any] | None = None,
+    ) -> MeteredBench:
+        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)``."""
+        return MeteredBench(self, label, target, (*self.names, item, repeat), method, budget, learned)
+
+    @torch.no_grad()
+    def photograph(
+        self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
+    ) -> Shot:
+        """The predicted capture of ``phase`` ``(C, H, W)`` [rad]; the exposure does not matter without noise."""
+        check_phase(phase, self.spec, label)
+        handle = MeteredBench(self, label, target, (*self.names, item, repeat), learned=self.learned)
+        image = self.method.predict(phase[None], handle)[0].detach()
+        share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
+        light = tuple(concentration(target, self.spec).tolist())
+        capture = Capture(image, dark=0.0, white=float("inf"), gain=(1.0,) * len(image))
+        return Shot(image, capture, saturated=0.0, efficiency=float(share.mean()), residual=0.0, exposure=light)
+
+    def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
+        """There is none: a learned display has no camera."""
+        raise CellError("a learned display has no camera")
+
+    def rectified(self, capture: Capture, target: Tensor) -> Tensor:
+        """A predicted capture is in the target's frame already."""
+        return capture.linear()

@@ -1,0 +1,135 @@
+"""What a method may see of a display while it is trained: a metered camera, training images, a memory of its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from ..errors import BudgetError
+from ..seeds import generator
+from .contract import DisplaySpec
+from .workbench import Workbench, check_phase, concentration
+
+Value = dict[str, Any]
+"""Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
+
+
+@dataclass(frozen=True)
+class TrainingImage:
+    """An image to train with: its name and its linear light ``(C, h, w)`` in [0, 1]."""
+
+    item: str
+    target: Tensor
+
+
+class Memory(Protocol):
+    """Keeps values by name, whole or not at all, so that training can be killed at any moment."""
+
+    def load(self, name: str) -> Value | None:
+        """The value of a name; None if there is none."""
+        ...
+
+    def save(self, name: str, value: Value) -> None:
+        """Keep a value, in the place of an older one of that name."""
+        ...
+
+    def log(self, row: Mapping[str, float | int | str]) -> None:
+        """Append to the record of the training that people watch; a row again (after a resume) replaces the first."""
+        ...
+
+
+class TrainingBench:
+    """A display for training: nominal optics, the images, a metered camera, and a memory that survives a kill.
+
+    images: to train with; held_out: captured only to watch how well the captures of unseen images are predicted.
+    budget: captures that may be taken, None for no limit. seed: the study's.
+    """
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        label: str,
+        images: Sequence[TrainingImage],
+        held_out: Sequence[TrainingImage],
+        memory: Memory,
+        budget: int | None,
+        seed: int,
+    ) -> None:
+        self.images = tuple(images)
+        self.held_out = tuple(held_out)
+        self._workbench = workbench
+        self._label = label
+        self._memory = memory
+        self._budget = budget
+        self._seed = seed
+        self._captures = 0
+        self._spent = 0.0
+        self._started = time.perf_counter()
+
+    @property
+    def spec(self) -> DisplaySpec:
+        """Nominal optics, public."""
+        return self._workbench.spec
+
+    @property
+    def captures(self) -> int:
+        """Captures taken so far, those before an interruption included."""
+        return self._captures
+
+    @property
+    def seconds(self) -> float:
+        """Time spent so far [s], that before an interruption included up to the last value kept."""
+        return self._spent + time.perf_counter() - self._started
+
+    def light(self, image: TrainingImage) -> Tensor:
+        """Light at a white pixel, ``(C,)``, if all of the panel's went into the target; incident light is 1."""
+        return concentration(image.target, self.spec)
+
+    def generator(self, *names: object) -> torch.Generator:
+        """Random numbers that depend on the study's seed and ``names``."""
+        return generator("training", self._seed, *names)
+
+    def photograph(self, phase: Tensor, image: TrainingImage, *names: object) -> Tensor:
+        """Show ``phase`` ``(C, H, W)`` [rad] and photograph it; counted.
+
+        Returns the capture in the image's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency.
+        The noise depends on the study's seed, the image and ``names``. BudgetError when no capture is left.
+        """
+        if self._budget is not None and self._captures >= self._budget:
+            raise BudgetError(f"{self._label} has used its {self._budget} captures for training")
+        check_phase(phase, self.spec, self._label)
+        self._captures += 1
+        light = self._workbench.exposure(image.target)
+        session = self._workbench.bench.session(self._seed, "training", image.item, *names, exposure=light)
+        return self._workbench.rectified(session.capture(phase.detach()), image.target)
+
+    def kept(self, name: str, make: Callable[[], Value]) -> Value:
+        """The value kept under ``name``; made and kept if there is none. What it took is counted once."""
+        if (known := self.load(name)) is not None:
+            return known
+        value = make()
+        self.save(name, value)
+        return value
+
+    def load(self, name: str) -> Value | None:
+        """The value kept under ``name``, None if there is none."""
+        known = self._memory.load(name)
+        if known is None:
+            return None
+        self._captures = max(self._captures, int(known["captures"]))
+        if known["seconds"] > self.seconds:
+            self._spent += known["seconds"] - self.seconds
+        return dict(known["value"])
+
+    def save(self, name: str, value: Value) -> None:
+        """Keep a value under ``name``, in the place of an older one."""
+        self._memory.save(name, {"value": value, "captures": self._captures, "seconds": self.seconds})
+
+    def log(self, **row: float | int | str) -> None:
+        """A row for those who watch: numbers by name, such as round, step, losses and fidelity."""
+        self._memory.log({**row, "captures": self._captures, "seconds": round(self.seconds, 1)})

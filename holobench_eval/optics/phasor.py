@@ -1,0 +1,51 @@
+"""From a phase to a field and from a field to its intensity, with gradients written out for speed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+
+def phasor(amplitude: Tensor, phase: Tensor) -> Tensor:
+    """``amplitude * exp(i phase)``, as ``torch.polar`` but several times as fast on a CPU.
+
+    amplitude: real, broadcast to the shape of phase [rad]; it gets no gradient. Differentiable once in the phase.
+    """
+    field: Tensor = _Phasor.apply(amplitude.detach(), phase)  # type: ignore[no-untyped-call]
+    return field
+
+
+def squared_modulus(field: Tensor) -> Tensor:
+    """``|field|^2`` of a complex field; differentiable once."""
+    intensity: Tensor = _SquaredModulus.apply(field)  # type: ignore[no-untyped-call]
+    return intensity
+
+
+class _Phasor(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, amplitude: Tensor, phase: Tensor) -> Tensor:
+        field = torch.complex(phase.cos().mul_(amplitude), phase.sin().mul_(amplitude))
+        ctx.save_for_backward(field)
+        return field
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[None, Tensor]:
+        (field,) = ctx.saved_tensors
+        return None, (grad.imag * field.real).sub_(grad.real * field.imag)
+
+
+class _SquaredModulus(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, field: Tensor) -> Tensor:
+        ctx.save_for_backward(field)
+        return field.real.square() + field.imag.square()
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> Tensor:
+        (field,) = ctx.saved_tensors
+        return field * (2 * grad)

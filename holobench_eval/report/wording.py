@@ -1,0 +1,164 @@
+"""What a study compares, in words: pictures with targets, or predictions with captures; on a bench or on a network.
+
+A report has one frame for all of them. A number that says how well a capture was predicted must never read as if it
+said how good a picture is, so everything that differs is here, side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+
+def plain(values: Mapping[str, Any]) -> str:
+    """``a = 1, b = [2, 3]``: parameters as text on one line."""
+    return ", ".join(f"{key} = {_value(value)}" for key, value in values.items()) or "none"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, Mapping):
+        return f"({plain(value)})"
+    return "none" if value is None else str(value)
+
+
+def words(names: list[str]) -> str:
+    """``a``, ``a and b``, ``a, b and c``."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+@dataclass(frozen=True)
+class Wording:
+    """The words of one kind of study.
+
+    scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
+    figures. best, only: how the first of several, or the only, ranked method is introduced; other: the same for
+    another metric. procedure: what is done; caution: what the figures do not say; displays: what the displays are;
+    floor, instead: the reference images and the heading of their column. looked_at: heading of the pictures; picture:
+    what a tile of the comparison is. geometry, blur, effort: first sentences of these sections. seeds: what is random.
+    """
+
+    scored: str = "capture"
+    truth: str = "target"
+    axis: str = ""
+    best: str = "Best of the {count} ranked methods"
+    only: str = "The only ranked method"
+    other: str = "By {metrics} the best is {label}, not {best}."
+    procedure: str = (
+        "A method turns a target image into a phase pattern. The pattern is shown on a display, the display's image is "
+        "captured, the capture is registered to the target, matched in intensity and scored."
+    )
+    caution: str = ""
+    displays: str = (
+        "The displays are simulated benches. Listed are the nominal optics, which methods know, and each stage of the "
+        "bench that differs from an ideal one, which they do not, with the parameters of the profile file."
+    )
+    floor: str = (
+        "The same targets, scored against images that no method made, through the same intensity match and metrics."
+    )
+    instead: str = "shown instead of a capture"
+    looked_at: str = "Captures to look at"
+    picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
+    geometry: str = (
+        'Registration is frozen before any method\'s image is seen. "Refined" lets each capture move rigidly by at '
+        "most 2 px and 0.1 degree, found by correlation and never by maximising the score; a large difference means "
+        "that the geometry drifted."
+    )
+    blur: str = "Methods that trade speckle for sharpness can change places."
+    effort: str = "Captures are camera captures that a method used to solve one target."
+    seeds: str = (
+        "The noise of a capture depends on target, display and repeat and not on the method, so all methods meet the "
+        "same noise and differences are paired."
+    )
+
+    def floor_name(self, name: str) -> str:
+        """What a floor row shows."""
+        wrong = "the wrong target" if self.truth == "target" else f"the {self.truth} of the wrong target"
+        return {
+            "floor_constant": "a constant image",
+            "floor_black": "a black image",
+            "floor_speckle": "pure speckle",
+            "floor_wrong_target": wrong,
+            "floor_mirrored": f"the mirrored {self.truth}",
+            "floor_shift_1px": f"the {self.truth} shifted by 1 px",
+        }[name]
+
+
+PICTURE = Wording()
+
+ON_A_NETWORK = replace(
+    PICTURE,
+    scored="predicted capture",
+    procedure=(
+        "A method turns a target image into a phase pattern. No display shows it: what a trained, frozen network "
+        "predicts of its capture is matched in intensity and scored."
+    ),
+    caution=(
+        "The scores say how well a method exploits the network, which may expect what no display would show. What a "
+        "bench makes of the same holograms is another study."
+    ),
+    displays="The display is a trained network, held as it is; there is no bench, no camera and no noise.",
+    instead="in the place of a predicted capture",
+    looked_at="Predicted captures to look at",
+    picture="Each predicted capture is matched in intensity and sRGB-encoded",
+    geometry=(
+        'The network predicts in the frame of the target. "Refined" lets each predicted capture move rigidly by at '
+        "most 2 px and 0.1 degree, found by correlation and never by maximising the score; a large difference means "
+        "that the picture is displaced."
+    ),
+    effort="There is no camera, so that no method captures anything while it solves.",
+    seeds="A learned display has no noise, so that repeats differ by the methods' own random numbers alone.",
+)
+
+PREDICTION = replace(
+    PICTURE,
+    scored="prediction",
+    truth="capture",
+    axis=", of predictions against captures",
+    best="Of the {count} ranked methods the captures are predicted most closely by",
+    only="The only ranked method",
+    other="By {metrics} the closest predictions are those of {label}, not of {best}.",
+    procedure=(
+        "Here trained methods predict what a camera captures of a phase pattern. The patterns are holograms of the "
+        "targets by {holograms}, the same for all methods. Each is shown on the display and captured, and the capture "
+        "is registered to its target. A method is given the phase pattern; its prediction is matched in intensity to "
+        "the capture and scored against the capture."
+    ),
+    caution=(
+        "A high score means that the capture was foreseen, flaws included. It says nothing about how good a picture "
+        "is, and no method's own holograms are shown."
+    ),
+    floor="The same captures, scored against images that no method predicted, through the same match and metrics.",
+    instead="in the place of a prediction",
+    looked_at="Predictions to look at",
+    picture=(
+        'In the column "capture" stands what was captured of the hologram by {holograms}, registered and matched to '
+        "the target; each prediction is matched in intensity to it; all are sRGB-encoded"
+    ),
+    geometry=(
+        'Captures are registered before anything is predicted. "Refined" lets each prediction move rigidly by at most '
+        "2 px and 0.1 degree, found by correlation and never by maximising the score; a large difference means that "
+        "predictions are displaced."
+    ),
+    blur="Predictions that leave out speckle can change places with those that show it.",
+    effort="A prediction takes no captures.",
+    seeds=(
+        "The noise of a capture depends on target, display and repeat and not on the method, so all methods predict "
+        "the same captures and differences are paired."
+    ),
+)
+
+
+def wording(measure: str, holograms: str, on_a_network: bool) -> Wording:
+    """The words for a measure; holograms: the method whose captures are predicted."""
+    if measure == "prediction":
+        return replace(
+            PREDICTION,
+            procedure=PREDICTION.procedure.replace("{holograms}", holograms),
+            picture=PREDICTION.picture.replace("{holograms}", holograms),
+        )
+    return ON_A_NETWORK if on_a_network else PICTURE

@@ -1,0 +1,224 @@
+"""What trained methods learned, kept in a folder each and shared by studies; made once, checked before it is used."""
+
+from __future__ import annotations
+
+import csv
+import fcntl
+import hashlib
+import io
+import json
+import shutil
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from ..errors import UserError
+from .preparation import Preparation
+from .store import TEMPORARY, file_name, write_atomically
+
+STATE, PROVENANCE, LOG, FAILURE = "learned.pt", "provenance.json", "training.csv", "failure.log"
+UNFINISHED = "unfinished"
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A learned state and where it comes from.
+
+    state: what the method's ``prepare`` returned; provenance: its description, the captures and seconds it took, the
+    sha256 of its file, and the versions it was made with.
+    """
+
+    state: Mapping[str, Any]
+    provenance: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Artifacts:
+    """A folder of artifacts, one folder each, named by what they depend on."""
+
+    folder: Path
+
+    def place(self, needed: Preparation) -> Path:
+        """The artifact's folder."""
+        return self.folder / file_name(needed.name)
+
+    def has(self, needed: Preparation) -> bool:
+        """Whether the artifact is there; it is checked when it is loaded."""
+        return (self.place(needed) / PROVENANCE).is_file()
+
+    def load(self, needed: Preparation) -> Artifact:
+        """The artifact, once for a process. UserError: damaged, foreign, or made for something else."""
+        place = self.place(needed)
+        try:
+            stamp = (place / STATE).stat().st_mtime_ns
+            described = (place / PROVENANCE).read_bytes()
+        except OSError:
+            raise UserError(f"{place}: {STATE} or {PROVENANCE} is missing; delete the folder and run again") from None
+        artifact = _loaded(place, stamp, described)
+        check_matches(place, artifact.provenance, needed)
+        return artifact
+
+    def write(self, needed: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
+        """Keep a learned state; facts: what else its provenance should say. What the training left behind goes."""
+        place, buffer = self.place(needed), io.BytesIO()
+        torch.save({"format": FORMAT, "state": dict(state)}, buffer)
+        content = buffer.getvalue()
+        write_atomically(place / STATE, content)
+        sha256 = hashlib.sha256(content).hexdigest()
+        described = {"format": FORMAT, "sha256": sha256, "description": needed.description(), **facts}
+        write_atomically(place / PROVENANCE, f"{json.dumps(described, indent=1)}\n".encode())
+        (place / FAILURE).unlink(missing_ok=True)
+        shutil.rmtree(place / UNFINISHED, ignore_errors=True)
+
+    def remove(self, needed: Preparation) -> None:
+        """Forget an artifact, finished or not, so that it is made again."""
+        shutil.rmtree(self.place(needed), ignore_errors=True)
+
+    def fail(self, needed: Preparation, error: BaseException) -> str:
+        """Note why an artifact could not be made, with the traceback; the reason in one line."""
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        trace = "".join(traceback.format_exception(error))
+        write_atomically(self.place(needed) / FAILURE, f"{reason}\n\n{trace}".encode())
+        return reason
+
+    def failure(self, needed: Preparation) -> str:
+        """Why an artifact is not there, in one line."""
+        try:
+            lines = (self.place(needed) / FAILURE).read_text(encoding="utf-8").splitlines()
+        except OSError:
+            return "it was not tried"
+        return lines[0] if lines else "no reason was kept"
+
+    @contextmanager
+    def locked(self, needed: Preparation) -> Iterator[None]:
+        """Keep others from making the same artifact; they wait. The lock dies with its process."""
+        place = self.place(needed)
+        place.mkdir(parents=True, exist_ok=True)
+        with (place / ".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            for left in place.rglob(f"{TEMPORARY}*"):
+                left.unlink()
+            yield
+
+    def memory(self, needed: Preparation) -> FolderMemory:
+        """Where an unfinished training is kept."""
+        return FolderMemory(self.place(needed))
+
+
+@dataclass(frozen=True)
+class FolderMemory:
+    """Values of an unfinished training, a file each, and its log."""
+
+    place: Path
+
+    def load(self, name: str) -> dict[str, Any] | None:
+        """The value of a name; None if there is none. UserError for a damaged file."""
+        path = self._path(name)
+        return None if not path.exists() else read_tensors(path)
+
+    def save(self, name: str, value: dict[str, Any]) -> None:
+        """Keep a value, whole or not at all."""
+        buffer = io.BytesIO()
+        torch.save(value, buffer)
+        write_atomically(self._path(name), buffer.getvalue())
+
+    def log(self, row: Mapping[str, float | int | str]) -> None:
+        """Append to ``training.csv``; a row of the same round and step takes the place of an older one."""
+        place = _place(row)
+        rows = [old for old in self.rows() if not place or _place(old) != place]
+        text = io.StringIO()
+        columns = list(dict.fromkeys(key for one in (*rows, row) for key in one))
+        writer = csv.DictWriter(text, columns, lineterminator="\n", restval="")
+        writer.writeheader()
+        writer.writerows(
+            [*rows, {key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()}]
+        )
+        write_atomically(self.place / LOG, text.getvalue().encode())
+
+    def rows(self) -> list[dict[str, str]]:
+        """The log so far."""
+        return read_log(self.place)
+
+    def _path(self, name: str) -> Path:
+        return self.place / UNFINISHED / f"{file_name(name)}.pt"
+
+
+def _place(row: Mapping[str, Any]) -> dict[str, str]:
+    """Round and step of a row, as far as it has them."""
+    return {name: str(row[name]) for name in ("round", "step") if row.get(name) not in (None, "")}
+
+
+def read_log(place: Path) -> list[dict[str, str]]:
+    """The rows of an artifact's ``training.csv``, empty if there is none."""
+    try:
+        with (place / LOG).open(encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+    except FileNotFoundError:
+        return []
+
+
+def read_tensors(path: Path) -> dict[str, Any]:
+    """Tensors and plain values from a file that may be hostile. UserError for one that is damaged or holds code."""
+    try:
+        content = torch.load(path, map_location="cpu", weights_only=True)
+    except Exception as error:  # damaged bytes raise whatever they happen to mean
+        reason = str(error).partition("\n")[0][:120]
+        raise UserError(
+            f"{path}: damaged, or not a file of tensors ({reason}); delete its folder and run again"
+        ) from None
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: holds no mapping; delete its folder and run again")
+    return content
+
+
+@lru_cache(maxsize=4)
+def _loaded(place: Path, _stamp: int, described: bytes) -> Artifact:
+    provenance = _provenance(place / PROVENANCE, described)
+    content = read_tensors(place / STATE)
+    found = hashlib.sha256((place / STATE).read_bytes()).hexdigest()
+    if found != provenance["sha256"]:
+        raise UserError(
+            f"{place / STATE}: is not the file that {PROVENANCE} describes; delete the folder and run again"
+        )
+    if content.get("format") != FORMAT or not isinstance(content.get("state"), dict):
+        raise UserError(f"{place / STATE}: of another version; delete the folder and run again")
+    return Artifact(content["state"], provenance)
+
+
+def _provenance(path: Path, text: bytes) -> dict[str, Any]:
+    """A provenance that has all that is asked of one. UserError says what is wrong."""
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: not an artifact's provenance; delete the folder and run again")
+    if content.get("format") != FORMAT:
+        raise UserError(f"{path}: of another version; delete the folder and run again")
+    for key, kind in {"description": dict, "sha256": str, "captures": int, "seconds": int | float}.items():
+        if not isinstance(content.get(key), kind):
+            raise UserError(f"{path}: has no valid '{key}'; delete the folder and run again")
+    return content
+
+
+def check_matches(place: Path, provenance: Mapping[str, Any], needed: Preparation) -> None:
+    """Refuse a network of another panel, wavelength, profile version, method or setting; UserError names the first."""
+    made, wanted = provenance["description"], needed.description()
+    for key in wanted:
+        if made.get(key) != wanted[key]:
+            raise UserError(
+                f"{place}: trained for {key.replace('_', ' ')} {_short(made.get(key))}, this study needs "
+                f"{_short(wanted[key])}; delete it, or give --retrain"
+            )
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -1,0 +1,113 @@
+"""A task with all that a worker needs to compute it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from .. import registry
+from ..config import Save
+from ..errors import CellError
+from ..seeds import seed
+from .artifacts import Artifact, Artifacts
+from .bench import Condition, workbench
+from .plan import Cell, Task
+from .preparation import Preparation
+from .store import Record
+
+if TYPE_CHECKING:
+    from ..display import Workbench
+    from ..display.learned import LearnedBench
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a worker needs to know of a run besides its task.
+
+    output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
+    what trained methods learned; threads: torch threads of a worker; workers: tasks computed side by side; retime:
+    measure wall times again, see ``timings``.
+    """
+
+    output: Path
+    folder: Path
+    artifacts: Path
+    save: Save
+    lpips_weights: str | None
+    threads: int
+    workers: int
+    retime: bool = False
+
+
+@dataclass(frozen=True)
+class Job:
+    """A task, the cells of it that are wanted, and the setting of the run."""
+
+    task: Task
+    wanted: frozenset[str]
+    setting: Setting
+
+    @property
+    def cells(self) -> list[tuple[Cell, Condition]]:
+        """The wanted cells and their displays."""
+        pairs = zip(self.task.cells, self.task.conditions, strict=True)
+        return [(cell, place) for cell, place in pairs if cell.id in self.wanted]
+
+    def failed(self, cell: Cell, error: BaseException) -> Record:
+        """The record of a cell that has no score, with the reason in one line."""
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        label = cell.method if self.task.is_floor else self.task.label
+        return Record(cell.description(), "failed", label, reason)
+
+    def learned(self, needed: Preparation | None) -> Artifact | None:
+        """What a method learned; None if it had nothing to learn. CellError when its training failed."""
+        if needed is None:
+            return None
+        artifacts = Artifacts(self.setting.artifacts)
+        if not artifacts.has(needed):
+            raise CellError(f"not trained: {artifacts.failure(needed)}")
+        return artifacts.load(needed)
+
+    def bench(self, cell: Cell, place: Condition) -> Workbench | LearnedBench:
+        """The display of a cell: a simulated bench, or a trained network."""
+        learned = self.learned(place.learned)
+        if place.learned is None or learned is None:
+            return workbench(place, cell.seed)
+        from ..display.learned import LearnedBench
+
+        needed = place.learned
+        method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
+        return LearnedBench(place.spec, method, learned.state, (cell.seed,))
+
+
+def target_of(cell: Cell, place: Condition, folder: Path) -> Tensor:
+    """The target at the size of the scored region, ``(C, h, w)`` linear light in [0, 1]."""
+    dataset = registry.build("datasets", cell.dataset, dict(cell.dataset_params), folder)
+    if dataset.digest(cell.target) != cell.target_sha256:
+        raise CellError(f"target '{cell.target}' has changed since the study was planned; start the run again")
+    target: Tensor = dataset.load(cell.target, place.spec.region.shape, channels=len(place.spec.wavelengths))
+    return target
+
+
+@contextmanager
+def repeatable(threads: int) -> Iterator[None]:
+    """The same numbers for the same input: threads as asked for, operations without a deterministic form refused."""
+    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    torch.set_default_dtype(torch.float32)  # a method's file may have changed these two for everybody
+    torch.set_grad_enabled(True)
+    torch.manual_seed(seed("global random numbers"))
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+    # Filling fresh memory guards against reading it too early; it would be timed with the methods.
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before[0])
+        torch.use_deterministic_algorithms(before[1])

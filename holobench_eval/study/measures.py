@@ -1,0 +1,179 @@
+"""How a cell becomes scores: a picture against its target, a prediction against a capture, a reference image."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from torch import Tensor
+
+from .. import registry
+from ..errors import CellError
+from ..metrics import floor_captures, match, score
+from . import timings
+from .artifacts import Artifact
+from .bench import Condition, workbench
+from .images import write_capture, write_phase, write_thumbnail
+from .job import Job, target_of
+from .plan import Cell
+from .store import Record, Store, file_name
+
+if TYPE_CHECKING:
+    from ..display.workbench import Shot
+
+MOST_SATURATED = 0.001
+"""Largest fraction of saturated samples with which a capture is scored (protocol v1, step 1)."""
+
+Measure = Callable[[Cell, Condition], Record]
+
+
+def picture(job: Job) -> Measure:
+    """Solve the task's target on its first display; the result shows the phase on any of its displays."""
+    task, setting = job.task, job.setting
+    first, place = task.cells[0], task.conditions[0]
+    method = registry.build("methods", first.method, dict(first.params), setting.folder)
+    target, learned = target_of(first, place, setting.folder), job.learned(task.preparation)
+    handle = job.bench(first, place).for_method(
+        method, task.label, target, item=first.target, repeat=first.repeat, learned=learned.state if learned else None
+    )
+    given = target[None].clone()  # what a method does to its target must not reach the score
+    started = time.perf_counter()
+    solved = method.solve(given, handle)
+    elapsed = time.perf_counter() - started
+    if not isinstance(solved, Tensor) or tuple(solved.shape[:2]) != tuple(given.shape[:2]):
+        found = tuple(solved.shape) if isinstance(solved, Tensor) else type(solved).__name__
+        raise CellError(f"{task.label}: solve returned {found}, not a phase ({given.shape[0]}, {given.shape[1]}, H, W)")
+    phase = solved.detach().cpu()[0]
+    seconds = timings.keep(timings.key(task, setting.threads, setting.workers), elapsed, setting.retime)
+
+    def show(cell: Cell, place: Condition) -> Record:
+        shot = job.bench(cell, place).photograph(
+            phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure, label=task.label
+        )
+        if shot.saturated > MOST_SATURATED:
+            raise CellError(f"{shot.saturated:.2%} of the capture is saturated, more than {MOST_SATURATED:.1%}")
+        _save(job, cell, shot.image, phase)
+        scores = score(shot.image, target, lpips_weights=setting.lpips_weights)
+        write_thumbnail(Store(setting.output).thumbnail(cell.id), match(shot.image, target)[0])
+        return Record(
+            cell=cell.description(),
+            state="done",
+            label=task.label,
+            scores=scores | {"efficiency": shot.efficiency},
+            captures=handle.captures,
+            seconds=seconds,
+            registration_residual_px=shot.residual,
+            saturated=shot.saturated,
+            learned=_account(learned),
+        )
+
+    return show
+
+
+def prediction(job: Job) -> Measure:
+    """What a method predicts of the capture of another method's hologram, scored against that capture (paper 6.1).
+
+    Capture and prediction get the factors that match the capture to the target, so that the capture is a picture in
+    [0, 1]; the protocol's own match of the prediction follows.
+    """
+    task, setting = job.task, job.setting
+    cell, place = task.cells[0], task.conditions[0]
+    method = registry.build("methods", cell.method, dict(cell.params), setting.folder)
+    learned, target = job.learned(task.preparation), target_of(cell, place, setting.folder)
+    phase, shot = _shown(_Shown(cell), place, setting.folder)
+    wanted, factors = match(shot.image, target)
+    handle = workbench(place, cell.seed).for_method(
+        method, task.label, target, item=cell.target, repeat=cell.repeat, learned=learned.state if learned else None
+    )
+    started = time.perf_counter()
+    predicted = method.predict(phase[None].clone(), handle)
+    elapsed = time.perf_counter() - started
+    if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *wanted.shape):
+        found = tuple(predicted.shape) if isinstance(predicted, Tensor) else type(predicted).__name__
+        raise CellError(f"{task.label}: predict returned {found}, not an image {(1, *wanted.shape)}")
+    image = factors.view(-1, 1, 1) * predicted.detach().cpu()[0]
+    seconds = timings.keep(timings.key(task, setting.threads, setting.workers), elapsed, setting.retime)
+
+    def compare(cell: Cell, _: Condition) -> Record:
+        _save(job, cell, image, phase)
+        write_thumbnail(Store(setting.output).thumbnail(cell.id), match(image, wanted)[0])
+        return Record(
+            cell=cell.description(),
+            state="done",
+            label=task.label,
+            scores=score(image, wanted, lpips_weights=setting.lpips_weights),
+            seconds=seconds,
+            registration_residual_px=shot.residual,
+            saturated=shot.saturated,
+            learned=_account(learned),
+        )
+
+    return compare
+
+
+def floor(job: Job) -> Measure:
+    """What images that no display made score on the task's target, or on the capture that is to be predicted."""
+    setting, cells, place = job.setting, job.task.cells, job.task.conditions[0]
+    images = [_wanted(cells[0], place, setting.folder)]
+    images += [_wanted(replace(cell, **cell.params), place, setting.folder) for cell in cells if cell.params]
+    captures = floor_captures(images[0], images[1:], cells[0].seed, cells[0].target)
+    write_thumbnail(Store(setting.output).target_thumbnail(cells[0].target), images[0])
+
+    def reference(cell: Cell, _: Condition) -> Record:
+        scores = score(captures[cell.method], images[0], lpips_weights=setting.lpips_weights)
+        return Record(cell.description(), "done", cell.method, scores=scores)
+
+    return reference
+
+
+def _wanted(cell: Cell, place: Condition, folder: Path) -> Tensor:
+    """What a cell's image is compared with, ``(C, h, w)`` linear light in [0, 1]: its target, or a capture."""
+    target = target_of(cell, place, folder)
+    return target if cell.measure == "picture" else match(_shown(_Shown(cell), place, folder)[1].image, target)[0]
+
+
+class _Shown:
+    """A cell as far as the hologram goes whose capture is predicted; equal for all methods that predict it."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        self.key = (repr(cell.holograms), cell.target, cell.target_sha256, cell.profile_sha256, cell.repeat, cell.seed)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Shown) and self.key == other.key
+
+
+@lru_cache(maxsize=64)
+def _shown(shown: _Shown, place: Condition, folder: Path) -> tuple[Tensor, Shot]:
+    """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture; once in a process."""
+    cell = shown.cell
+    bench, target = workbench(place, cell.seed), target_of(cell, place, folder)
+    method = registry.build("methods", cell.holograms["name"], dict(cell.holograms["params"]), folder)
+    handle = bench.for_method(method, cell.holograms["name"], target, item=cell.target, repeat=cell.repeat)
+    phase = method.solve(target[None].clone(), handle).detach()[0]
+    return phase, bench.photograph(phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure)
+
+
+def _account(learned: Artifact | None) -> dict[str, Any] | None:
+    """What a record says of the training behind it."""
+    if learned is None:
+        return None
+    known = learned.provenance
+    return {"sha256": known["sha256"], "captures": known["captures"], "seconds": known["seconds"]}
+
+
+def _save(job: Job, cell: Cell, image: Tensor, phase: Tensor) -> None:
+    setting = job.setting
+    name = file_name(cell.target) + (f"-{cell.repeat}" if cell.repeat else "") + ".png"
+    place = Path(file_name(job.task.label), file_name(cell.condition), name)
+    if setting.save.captures:
+        write_capture(setting.output / "captures" / place, image)
+    if setting.save.phases:
+        write_phase(setting.output / "phases" / place, phase)

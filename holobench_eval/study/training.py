@@ -1,0 +1,80 @@
+"""Make the artifacts that a study's methods need, before its cells are computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import __version__, registry
+from ..display.training import TrainingBench, TrainingImage
+from ..errors import CellError
+from .artifacts import Artifacts
+from .bench import workbench
+from .identity import code_digest, harness_digest
+from .job import repeatable
+from .preparation import Preparation
+from .provenance import now
+
+
+@dataclass(frozen=True)
+class TrainingJob:
+    """A preparation and what a worker needs to carry it out."""
+
+    needed: Preparation
+    folder: Path
+    threads: int
+
+
+def train(job: TrainingJob) -> str:
+    """Make an artifact, going on where an earlier attempt stopped. Returns why it failed, empty if it did not."""
+    artifacts = Artifacts(job.folder)
+    with artifacts.locked(job.needed), repeatable(job.threads):
+        if artifacts.has(job.needed):
+            return ""
+        try:
+            _train(job.needed, artifacts, job.threads)
+        except (Exception, SystemExit) as error:
+            return artifacts.fail(job.needed, error)
+        return ""
+
+
+def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
+    method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
+    images = _images(needed)
+    split = len(images) - needed.held_out
+    bench = TrainingBench(
+        workbench(needed.place, needed.seed),
+        needed.method,
+        images[:split],
+        images[split:],
+        artifacts.memory(needed),
+        needed.captures,
+        needed.seed,
+    )
+    state = method.prepare(bench)
+    if not isinstance(state, Mapping):
+        raise CellError(f"{needed.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
+    facts: dict[str, Any] = {
+        "captures": bench.captures,
+        "seconds": round(bench.seconds, 1),
+        "threads": threads,
+        "perceptual": state.get("perceptual"),
+        "package": __version__,
+        "method_sha256": code_digest(type(method)),
+        "harness_sha256": harness_digest(),
+        "made": now(),
+    }
+    artifacts.write(needed, state, facts)
+
+
+def _images(needed: Preparation) -> list[TrainingImage]:
+    """The training images at the size of the scored region."""
+    dataset = registry.build("datasets", needed.dataset, dict(needed.dataset_params), needed.folder)
+    spec, images = needed.place.spec, []
+    for item, sha256 in needed.images:
+        if dataset.digest(item) != sha256:
+            raise CellError(f"training image '{item}' has changed since the study was planned; start the run again")
+        images.append(TrainingImage(item, dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))))
+    return images

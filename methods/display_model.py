@@ -1,0 +1,124 @@
+"""A display in a few hundred numbers that mean something, learned from captures.
+
+The deviations that Chakravarthula et al. 2020 list in Section 3 and gather in E_err (Eq. 5-10), each as a stage with
+parameters of its own, so that Eq. 13, |P(H) + R|^2, is kept as it stands: a complex field that interferes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from ..optics import AngularSpectrum
+from ..optics.phase import TAU, wrap
+from ..optics.phasor import phasor, squared_modulus
+from ..optics.zernike import NAMES, zernike
+
+if TYPE_CHECKING:
+    from ..display.contract import DisplaySpec
+
+KNOTS = 17
+"""Of the look-up table: levels where its deviation is learned; linear between them."""
+SAMPLES = 3
+"""Sub-samples of a pixel along an axis: the fewest that turn wrap edges into ramps."""
+REACH = 2
+"""Neighbours to each side that crosstalk reaches, in pixels."""
+GAIN_GRID, SOURCE_GRID = 4, 24
+"""Points along an axis of the maps of phase gain and of illumination, interpolated between them."""
+MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "spherical")
+"""Zernike polynomials of the aberration, see ``optics.zernike``."""
+FIRST_CROSSTALK = 0.3
+
+
+class DisplayModel(nn.Module):
+    """Phase to intensity for one display, all colours; every parameter is per colour.
+
+    table: deviation of the look-up table [rad] at ``KNOTS`` levels. gain: logarithm of the phase gain over the panel.
+    crosstalk: logarithm of the width [pixels] of the Gaussian by which fringing fields blur the phase. amplitude,
+    angle: logarithm of the amplitude and phase [rad] of the illumination. undiffracted: real and imaginary part of the
+    light that the panel does not modulate. aberration: Zernike coefficients [rad]. brightness: logarithm of the
+    camera's gain.
+    """
+
+    def __init__(self, spec: DisplaySpec) -> None:
+        super().__init__()
+        channels = len(spec.wavelengths)
+        self.spec = spec
+        self.table = nn.Parameter(torch.zeros(channels, KNOTS))
+        self.gain = nn.Parameter(torch.zeros(channels, GAIN_GRID, GAIN_GRID))
+        self.crosstalk = nn.Parameter(torch.full((channels,), math.log(FIRST_CROSSTALK)))
+        self.amplitude = nn.Parameter(torch.zeros(channels, SOURCE_GRID, SOURCE_GRID))
+        self.angle = nn.Parameter(torch.zeros(channels, SOURCE_GRID, SOURCE_GRID))
+        self.undiffracted = nn.Parameter(torch.zeros(channels, 2))
+        self.aberration = nn.Parameter(torch.zeros(channels, len(MODES)))
+        self.brightness = nn.Parameter(torch.zeros(channels))
+        self.register_buffer("modes", pupil_modes(spec.region.shape, spec.pupil), persistent=False)
+
+    def forward(self, phase: Tensor) -> Tensor:
+        """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; its intensity is in the captures' unit."""
+        shown = self._blurred(self._driven(phase))
+        panel = phasor(shown.new_ones(()), shown).mean(1)
+        panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * self._illumination()
+        region = [self.spec.region.crop(self._propagator(c).forward(field)) for c, field in enumerate(panel)]
+        return self._aberrated(torch.stack(region)) * torch.exp(self.brightness / 2)[:, None, None]
+
+    def intensity(self, phase: Tensor) -> Tensor:
+        """``(C, h, w)`` linear light."""
+        return squared_modulus(self.forward(phase))
+
+    def _propagator(self, channel: int) -> AngularSpectrum:
+        return self.spec.propagator(channel)
+
+    def _driven(self, phase: Tensor) -> Tensor:
+        """Phase that each level stands for: the look-up table, then the gain over the panel."""
+        level = wrap(phase) * ((KNOTS - 1) / TAU)
+        below = level.detach().floor().clamp_max(KNOTS - 2)
+        rows = below.long().flatten(1)
+        low, high = (self.table.gather(1, rows + step).view_as(level) for step in (0, 1))
+        between = level - below
+        driven = level * (TAU / (KNOTS - 1)) + low + (high - low) * between
+        return driven * torch.exp(enlarged(self.gain, self.spec.shape))
+
+    def _blurred(self, phase: Tensor) -> Tensor:
+        """Phase at the sub-samples, ``(C, samples^2, H, W)``: square pixels convolved with a Gaussian."""
+        taps = self._taps()  # (C, samples, 2 reach + 1)
+        channels = len(phase)
+        padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
+        rows = functional.conv2d(padded, taps.reshape(channels * SAMPLES, 1, -1, 1), groups=channels)
+        rows = rows.view(channels, SAMPLES, *rows.shape[-2:]).transpose(0, 1)  # colours side by side again
+        columns = functional.conv2d(rows, taps.reshape(channels * SAMPLES, 1, 1, -1), groups=channels)
+        columns = columns.view(SAMPLES, channels, SAMPLES, *columns.shape[-2:])
+        return columns.transpose(0, 1).flatten(1, 2)
+
+    def _taps(self) -> Tensor:
+        """Share of each neighbouring pixel in each sub-sample, ``(C, samples, 2 reach + 1)``, along one axis."""
+        position = (torch.arange(SAMPLES) - (SAMPLES - 1) / 2) / SAMPLES
+        offset = torch.arange(-REACH, REACH + 1)[None] - position[:, None]
+        scale = torch.exp(self.crosstalk)[:, None, None] * math.sqrt(2)
+        share = torch.erf((offset + 0.5) / scale) - torch.erf((offset - 0.5) / scale)
+        return share / share.sum(-1, keepdim=True)
+
+    def _illumination(self) -> Tensor:
+        shape = self.spec.shape
+        return torch.exp(enlarged(self.amplitude, shape)) * phasor(self.angle.new_ones(()), enlarged(self.angle, shape))
+
+    def _aberrated(self, field: Tensor) -> Tensor:
+        turned = torch.einsum("cm,mhw->chw", self.aberration, self.modes)
+        return torch.fft.ifft2(torch.fft.fft2(field) * phasor(turned.new_ones(()), turned))
+
+
+def enlarged(grid: Tensor, shape: tuple[int, int]) -> Tensor:
+    """A coarse map ``(C, n, n)`` as a smooth one ``(C, H, W)``."""
+    return functional.interpolate(grid[None], size=shape, mode="bicubic", align_corners=True)[0]
+
+
+def pupil_modes(shape: tuple[int, int], pupil: float | None) -> Tensor:
+    """The polynomials of ``MODES`` on the frequencies of an image ``(h, w)``, zero outside the iris."""
+    edge = (pupil or 1.0) / 2  # cycles a pixel
+    y, x = torch.meshgrid(*(torch.fft.fftfreq(side, dtype=torch.float64) / edge for side in shape), indexing="ij")
+    inside = (torch.hypot(x, y) <= 1).double()
+    return torch.stack([zernike(NAMES[name], y * inside, x * inside) * inside for name in MODES]).float()

@@ -1,0 +1,114 @@
+"""The aberration approximator of the paper: a network from the ideal intensity to the captured one, Eq. 18-19."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor
+
+from ...errors import UserError
+from ..common import unit_field
+from .judge import Judge
+from .loop import Sample
+from .networks import Network
+from .objective import Objective, trainer
+from .retrieval import Image, matched
+
+if TYPE_CHECKING:
+    from ...display.contract import DisplaySpec
+
+
+class NetworkApproximator:
+    """D: ideal intensity to captured intensity, both in the region, all colours at once.
+
+    with_judge: train the judge of Eq. 22 beside it. gain: ``(C,)``, the unit in which captures are learned, such that
+    the pictures of the first round are as bright as their targets; a camera would be exposed so. of_amplitude: the
+    network maps amplitudes, the square roots of both intensities, instead.
+    """
+
+    def __init__(
+        self,
+        spec: DisplaySpec,
+        network: Network,
+        loss: Objective | None,
+        with_judge: bool,
+        seed: int,
+        of_amplitude: bool = False,
+    ) -> None:
+        channels = len(spec.wavelengths)
+        self.spec = spec
+        self.trainer = trainer(network, loss, channels, channels, seed)
+        self.gain = torch.ones(channels)
+        self.of_amplitude = of_amplitude
+        self.judge = Judge(channels, network, seed) if with_judge else None
+
+    def expose(self, samples: Sequence[Sample]) -> None:
+        """Set the gain from the first captures."""
+        overlap = torch.stack([(one.capture * one.target).sum((-2, -1)) for one in samples]).sum(0)
+        power = torch.stack([one.capture.square().sum((-2, -1)) for one in samples]).sum(0)
+        self.gain = overlap / power.clamp_min(1e-12)
+
+    def ideal(self, phase: Tensor, light: Tensor) -> Tensor:
+        """|P(exp(i phase))|^2 in the region, ``(1, C, h, w)``, in the unit of the target."""
+        channels = []
+        for channel, one in enumerate(phase):
+            field = self.spec.region.crop(self.spec.propagator(channel).forward(unit_field(one)))
+            channels.append((field.real.square() + field.imag.square()) / light[channel])
+        return torch.stack(channels)[None]
+
+    def _encoded(self, intensity: Tensor) -> Tensor:
+        return intensity.clamp_min(1e-12).sqrt() if self.of_amplitude else intensity
+
+    def step(self, sample: Sample, progress: float) -> dict[str, float]:
+        """One step on a capture of the trainer (Eq. 20), and of the judge (Eq. 22); their rates are constant."""
+        with torch.no_grad():
+            ideal = self._encoded(self.ideal(sample.phase, sample.light))
+        losses = self.trainer.step(ideal, self._encoded((self.gain.view(-1, 1, 1) * sample.capture)[None]))
+        if self.judge is not None:
+            with torch.no_grad():
+                predicted = self.trainer.generator(ideal)[0]
+            losses["judge"] = self.judge.step(matched(predicted, sample.target)[None], sample.target[None])
+        return losses
+
+    def image(self, light: Tensor) -> Image:
+        """The display with the weights as they are now, held."""
+        network = self.trainer.frozen()
+
+        def display(phase: Tensor) -> Tensor:
+            predicted = network(self._encoded(self.ideal(phase, light)))[0]
+            return (predicted.square() if self.of_amplitude else predicted) / self.gain.view(-1, 1, 1)
+
+        return display
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that the next step depends on."""
+        judge = None if self.judge is None else self.judge.state_dict()
+        return {"trainer": self.trainer.state_dict(), "gain": self.gain, "judge": judge}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.trainer.load_state_dict(state["trainer"])
+        self.gain = state["gain"]
+        if self.judge is not None:
+            self.judge.load_state_dict(state["judge"])
+
+    def learned(self) -> dict[str, Any]:
+        """What phase retrieval needs, and which features the perceptual loss compared."""
+        weights: dict[str, Any] = {"generator": self.trainer.generator.state_dict(), "gain": self.gain}
+        weights["perceptual"] = None if self.trainer.perceptual is None else self.trainer.perceptual.name
+        if self.judge is not None:
+            weights["judge"] = self.judge.network.state_dict()
+        return weights
+
+    def load_learned(self, weights: Mapping[str, Any]) -> None:
+        """UserError for the weights of another network."""
+        try:
+            self.trainer.generator.load_state_dict(weights["generator"])
+            self.gain = weights["gain"]
+            if self.judge is not None:
+                self.judge.network.load_state_dict(weights["judge"])
+        except (KeyError, TypeError, AttributeError, RuntimeError) as error:
+            reason = " ".join(str(error).split())[:160]
+            raise UserError(f"these are not the weights of this network ({reason}); train it anew") from error

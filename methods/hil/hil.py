@@ -1,0 +1,92 @@
+"""Learned hardware-in-the-loop phase retrieval.
+
+Chakravarthula, Tseng, Srivastava, Fuchs & Heide, "Learned hardware-in-the-loop phase retrieval for holographic
+near-eye displays", ACM Trans. Graph. 39(6), 186 (2020), Section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from ..wirtinger import Wirtinger
+from .approximator import NetworkApproximator
+from .loop import Rounds, train_in_the_loop
+from .networks import Network
+from .objective import Objective
+from .offset import best_offset
+from .retrieval import Image, Retrieval, retrieve
+
+if TYPE_CHECKING:
+    from ...display.training import TrainingBench, TrainingImage
+    from ...display.workbench import MeteredBench
+
+
+@dataclass(frozen=True)
+class HIL:
+    """Phases retrieved through a network that learned, from captures, what the display makes of an ideal image.
+
+    network: the approximator (Section 4.3.1) or a baseline of Table 1. loss: Eq. 20 (None: the one the network is
+    published with). training: Algorithm 1. retrieval: Eq. 22. seed: of weights and order, besides the study's.
+    start: Wirtinger holography, where Algorithm 1 and every retrieval begin; stopped early, since a converged phase is
+    full of wraps, and what a display makes of those cannot be told from the ideal image.
+    offsets: constant phases that are tried on the display for the start, evenly over 2 pi, with captures of the first
+    training images; the one of the least error is kept. An ideal image does not depend on it, and so nor does the
+    network's input, but unmodulated light interferes with the image.
+    """
+
+    network: Network = Network()
+    loss: Objective | None = None
+    training: Rounds = Rounds()
+    retrieval: Retrieval = Retrieval()
+    start: Wirtinger = Wirtinger(iterations=8)
+    offsets: Annotated[int, Interval(ge=1, le=64)] = 8
+    seed: int = 0
+
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+    trains: ClassVar[bool] = True
+    version: ClassVar[int] = 1
+
+    def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
+        """Train the approximator on captures of the display; what ``solve`` and ``predict`` need of it."""
+        approximator = self._approximator(bench)
+        offset = best_offset(bench, self.start, self.offsets)
+
+        def begin(image: TrainingImage) -> Tensor:
+            return self.start.solve(image.target[None], bench)[0] + offset
+
+        def search(display: Image, target: Tensor, phase: Tensor) -> Tensor:
+            return retrieve(display, target, phase, self.retrieval, approximator.judge)
+
+        train_in_the_loop(bench, approximator, begin, search, self.training)
+        return {**approximator.learned(), "offset": offset}
+
+    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        approximator = self._frozen(bench)
+        display, start = approximator.image(bench.light), self.start.solve(target, bench) + bench.learned["offset"]
+        found = [
+            retrieve(display, image, phase, self.retrieval, approximator.judge)
+            for image, phase in zip(target, start, strict=True)
+        ]
+        return torch.stack(found)
+
+    @torch.no_grad()
+    def predict(self, phase: Tensor, bench: MeteredBench) -> Tensor:
+        """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)`` that the approximator expects."""
+        display = self._frozen(bench).image(bench.light)
+        return torch.stack([display(one) for one in phase])
+
+    def _approximator(self, bench: TrainingBench | MeteredBench) -> NetworkApproximator:
+        return NetworkApproximator(bench.spec, self.network, self.loss, self.retrieval.adversarial > 0, self.seed)
+
+    def _frozen(self, bench: MeteredBench) -> NetworkApproximator:
+        approximator = self._approximator(bench)
+        approximator.load_learned(bench.learned)
+        return approximator

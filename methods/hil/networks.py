@@ -1,0 +1,122 @@
+"""Which network approximates the display: the parameters under ``network:``, and the modules they stand for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Annotated, Literal, TypeVar
+
+import torch
+from annotated_types import Interval
+from torch import nn
+
+from ...errors import UserError
+from .baselines import Identity, Pix2Pix, Pix2PixHD, UNet
+from .discriminator import MultiScaleDiscriminator, PatchDiscriminator
+from .generator import Generator
+
+Name = Literal["proposed", "unet", "pix2pix", "pix2pixhd", "identity"]
+Discriminator = PatchDiscriminator | MultiScaleDiscriminator
+
+Module = TypeVar("Module", bound=nn.Module)
+
+PIX2PIX_DEVIATION = 0.02  # of the first weights (Isola et al., appendix)
+HALVED = ("unet", "pix2pixhd")  # have half the filters, Section 6.1
+PUBLISHED_HALVINGS = 4  # of the resolution in these two
+SWITCHES = ("conditional", "dropout", "full_resolution_stage", "plain_ends", "skip_after_activation")
+
+
+@dataclass(frozen=True)
+class Network:
+    """Generator and discriminator by name and size.
+
+    preset: "paper" is what is published; "small" has a quarter of the filters and fewer levels, for small panels and a
+    CPU. levels (halvings of the resolution) and width (filters of the first level, doubled from level to level) replace
+    the preset's: 8 and 64 or 5 and 16, and 4 levels for U-Net and Pix2PixHD in both. U-Net and Pix2PixHD have half the
+    filters of ``width``, as in Section 6.1 of the paper.
+
+    For the proposed network only: conditional, the discriminator sees the ideal image too; and the four changes to
+    Pix2Pix (see ``Generator``), each of which can be undone. Raises UserError where one is set for another network.
+    """
+
+    name: Name = "proposed"
+    preset: Literal["small", "paper"] = "small"
+    levels: Annotated[int, Interval(ge=1, le=10)] | None = None
+    width: Annotated[int, Interval(ge=2, le=256)] | None = None
+    conditional: bool = True
+    dropout: bool = False
+    full_resolution_stage: bool = True
+    plain_ends: bool = True
+    skip_after_activation: bool = True
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if self.name != "proposed" and field.name in SWITCHES and getattr(self, field.name) != field.default:
+                raise UserError(f"network '{self.name}' has no '{field.name}'; it is for the network 'proposed'")
+
+    def generator(self, inputs: int, outputs: int) -> nn.Module:
+        """The generator for intensities with so many channels; its weights come from torch's global random numbers."""
+        levels, width = self.halvings, self.filters
+        if self.name == "identity":
+            if inputs != outputs:
+                raise UserError(f"network 'identity' needs as many inputs as outputs, got {inputs} and {outputs}")
+            return Identity()
+        if self.name == "unet":
+            return draw_weights(UNet(inputs, outputs, levels, width), None)
+        if self.name == "pix2pix":
+            return draw_weights(Pix2Pix(inputs, outputs, levels, width), PIX2PIX_DEVIATION)
+        if self.name == "pix2pixhd":
+            return draw_weights(Pix2PixHD(inputs, outputs, levels, width), PIX2PIX_DEVIATION)
+        proposed = Generator(
+            inputs,
+            outputs,
+            levels,
+            width,
+            dropout=self.dropout,
+            full_resolution_stage=self.full_resolution_stage,
+            plain_ends=self.plain_ends,
+            skip_after_activation=self.skip_after_activation,
+        )
+        return draw_weights(proposed, PIX2PIX_DEVIATION)
+
+    def discriminator(self, channels: int, condition: int | None = None) -> Discriminator | None:
+        """The discriminator of images with so many channels; None for networks that are published without.
+
+        condition: channels of the ideal intensity it is conditioned on, as many as the image's if None.
+        """
+        seen = (channels if condition is None else condition) if self.conditional else 0
+        if self.name == "proposed":
+            return draw_weights(PatchDiscriminator(channels, seen, self.filters), PIX2PIX_DEVIATION)
+        if self.name == "pix2pix":
+            return draw_weights(PatchDiscriminator(channels, seen, self.filters, flat=2), PIX2PIX_DEVIATION)
+        if self.name == "pix2pixhd":
+            return draw_weights(MultiScaleDiscriminator(channels, seen, self.filters), PIX2PIX_DEVIATION)
+        return None
+
+    @property
+    def halvings(self) -> int:
+        """How often the generator halves the resolution."""
+        preset = {"small": 5, "paper": 8}[self.preset]
+        return self.levels or (PUBLISHED_HALVINGS if self.name in HALVED else preset)
+
+    @property
+    def filters(self) -> int:
+        """Filters of the first level of generator and discriminator."""
+        width = self.width or {"small": 16, "paper": 64}[self.preset]
+        return width // 2 if self.name in HALVED else width
+
+
+def draw_weights(module: Module, deviation: float | None) -> Module:
+    """The module with fresh normal weights and zero offsets, laid out channels last, which a CPU convolves faster.
+
+    deviation: of the weights; None takes sqrt(2 / inputs of a neuron), as U-Net's publication does.
+    """
+    for layer in module.modules():
+        if isinstance(layer, nn.Conv2d | nn.ConvTranspose2d):
+            taps = math.prod(layer.kernel_size)
+            if isinstance(layer, nn.ConvTranspose2d):
+                taps //= math.prod(layer.stride)  # the zeros between the pixels are no inputs
+            nn.init.normal_(layer.weight, std=deviation or math.sqrt(2 / (layer.in_channels * taps)))
+            if layer.bias is not None:
+                nn.init.zeros_(layer.bias)
+    return module.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

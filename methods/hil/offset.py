@@ -1,0 +1,42 @@
+"""The constant phase of a hologram, found with captures.
+
+It does not change an ideal image. On a display it decides where the phase wraps and how the image interferes with the
+light that the panel does not modulate (Chakravarthula et al. 2020, Eq. 5 and 13).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from torch.nn import functional
+
+from ..wirtinger import Wirtinger
+from .retrieval import matched
+
+if TYPE_CHECKING:
+    from ...display.training import TrainingBench
+
+TRIED_IMAGES = 4
+
+
+def best_offset(bench: TrainingBench, start: Wirtinger, offsets: int) -> float:
+    """The one of so many constants [rad], evenly over 2 pi, whose captures are closest to the first training images.
+
+    Zero without a capture if there is one alone.
+    """
+    tried = [math.tau * index / offsets for index in range(offsets)]
+    if len(tried) == 1:
+        return 0.0
+
+    def search() -> dict[str, list[float]]:
+        errors = [0.0] * offsets
+        for image in bench.images[:TRIED_IMAGES]:
+            phase = start.solve(image.target[None], bench)[0]
+            for index, offset in enumerate(tried):
+                capture = bench.photograph(phase + offset, image, "offset", index)
+                errors[index] += float(functional.mse_loss(matched(capture, image.target), image.target))
+        return {"errors": errors}
+
+    errors = bench.kept("offset", search)["errors"]
+    return tried[errors.index(min(errors))]

@@ -1,0 +1,114 @@
+"""Phase retrieval through a frozen approximator of the display: Eq. 22 and its Wirtinger gradient.
+
+Chakravarthula et al. 2020, Sections 4.4 and 5.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+from torch.nn import functional
+
+from ...errors import UserError
+from ...metrics.feature_distance import SMALLEST as SMALLEST_PERCEPTUAL
+from ...metrics.feature_distance import FixedMofd
+from ...metrics.lpips import available, lpips
+from ...metrics.ms_ssim import SMALLEST as SMALLEST_MS_SSIM
+from ...metrics.ms_ssim import FixedMsSsim
+from ...optics import srgb_encode
+from ..descent import Best, cosine_decay
+from .judge import Judge
+
+Weight = Annotated[float, Interval(ge=0, le=1e6)]
+
+Image = Callable[[Tensor], Tensor]
+"""Phase ``(C, H, W)`` [rad] to the predicted capture ``(C, h, w)``, differentiable."""
+
+
+@dataclass(frozen=True)
+class Retrieval:
+    """Adam on the phase for Eq. 22, from a start that the method chooses.
+
+    perceptual: LPIPS where its weights are found, else the weight-free feature distance (``mofd``), of sRGB pictures;
+    the paper's weight is 1, and it gives none of the other three. ms_ssim, l2: of linear light. adversarial: the
+    verdict of ``judge.Judge``. A term of weight 0 is not computed.
+    iterations, step: the paper takes 300 of 0.001 rad; step is cosine-decayed to zero here. No iteration leaves the
+    start as it is.
+    threshold: stop when the mean squared error of the predicted picture is below.
+    """
+
+    iterations: Annotated[int, Interval(ge=0, le=100_000)] = 60
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.015
+    perceptual: Weight = 1.0
+    ms_ssim: Weight = 1.0
+    l2: Weight = 10.0
+    adversarial: Weight = 0.01
+    threshold: Annotated[float, Interval(ge=0)] = 0.0
+
+
+def matched(image: Tensor, target: Tensor) -> Tensor:
+    """An image ``(C, h, w)`` at the brightness of its target, by the least-squares factor of each channel."""
+    overlap = (image * target).sum((-2, -1), keepdim=True)
+    return image * (overlap / image.square().sum((-2, -1), keepdim=True).clamp_min(1e-12))
+
+
+class PictureLoss:
+    """Eq. 22 for one target ``(C, h, w)``, of which everything that does not change is computed once.
+
+    The perceptual distance is LPIPS if its weights are there, else the project's feature distance.
+    """
+
+    def __init__(self, target: Tensor, settings: Retrieval, judge: Judge | None) -> None:
+        check_region((target.shape[-2], target.shape[-1]), settings)
+        self.target, self.settings, self.judge = target, settings, judge
+        wanted = target[None]
+        encoded = srgb_encode(wanted)
+        self.structure = FixedMsSsim(wanted) if settings.ms_ssim else None
+        self.perceptual: Callable[[Tensor], Tensor] | None = None
+        if settings.perceptual:
+            self.perceptual = FixedMofd(encoded) if available("alex") else lambda picture: lpips(picture, encoded)
+
+    def __call__(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        """The loss of a predicted capture ``(C, h, w)``, and its mean squared error alone."""
+        weights, picture = self.settings, matched(image, self.target)
+        error = functional.mse_loss(picture, self.target)
+        loss = weights.l2 * error
+        shown = picture.clamp(0, 1)[None]
+        if self.perceptual is not None:
+            loss = loss + weights.perceptual * self.perceptual(srgb_encode(shown)).mean()
+        if self.structure is not None:
+            loss = loss + weights.ms_ssim * (1 - self.structure(shown).mean())
+        if weights.adversarial and self.judge is not None:
+            loss = loss + weights.adversarial * self.judge.verdict(picture[None])
+        return loss, error.detach()
+
+
+def check_region(shape: tuple[int, int], settings: Retrieval) -> None:
+    """UserError for a region that is too small for a term of the loss."""
+    for name, smallest in (("perceptual", SMALLEST_PERCEPTUAL), ("ms_ssim", SMALLEST_MS_SSIM)):
+        if getattr(settings, name) and min(shape) < smallest:
+            found = " x ".join(map(str, shape))
+            raise UserError(f"retrieval: {name} needs a region of {smallest} x {smallest} px, got {found}; set it to 0")
+
+
+def retrieve(image: Image, target: Tensor, start: Tensor, settings: Retrieval, judge: Judge | None = None) -> Tensor:
+    """The phase ``(C, H, W)`` [rad] near ``start`` whose predicted capture looks most like ``target`` ``(C, h, w)``."""
+    picture_loss = PictureLoss(target, settings, judge)
+    phase, best = start.detach().clone().requires_grad_(), Best(start[None])
+    pixels = phase.shape[-2] * phase.shape[-1]
+    optimiser = torch.optim.Adam([phase], lr=settings.step, betas=(0.9, 0.999))
+    for iteration in range(settings.iterations):
+        loss, error = picture_loss(image(phase))
+        best.update(loss.detach()[None], phase[None])
+        if float(error) < settings.threshold:
+            break
+        # the factor keeps the gradient far above Adam's epsilon
+        (phase.grad,) = torch.autograd.grad(pixels * loss, phase)
+        optimiser.param_groups[0]["lr"] = cosine_decay(settings.step, iteration / settings.iterations)
+        optimiser.step()
+    return best.phase[0]

@@ -1,0 +1,242 @@
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write, write_profile
+
+from holobench_eval.errors import UserError
+from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+
+def test_an_artifact_says_what_it_was_made_for_and_what_it_took(tmp_path: Path) -> None:
+    config = write(tmp_path)
+    outcome = compute(config)
+    assert outcome.failed == 0
+    (needed,) = needs(config)
+    artifact = Artifacts(tmp_path / "artifacts").load(needed)
+    assert artifact.provenance["description"] == needed.description()
+    assert artifact.provenance["captures"] == 2
+    assert set(artifact.state) == {"gain", "last"}
+    learned = {name: artifact.provenance[name] for name in ("sha256", "captures", "seconds")}
+    assert outcome.records[-1]["learned"] == learned
+    assert all(record["learned"] is None for record in outcome.records[:-1])
+    assert {path.name for path in artifact_of(config).iterdir()} == {STATE, PROVENANCE, "training.csv", ".lock"}
+
+
+def test_an_artifact_is_made_once_for_all_studies_that_need_it(tmp_path: Path) -> None:
+    first = compute(write(tmp_path))
+    again = compute(write(tmp_path, ("count: 1", "count: 2")), "other")
+    assert rounds(tmp_path) == [0, 1]
+    assert again.records[-1]["learned"] == first.records[-1]["learned"]
+
+
+def test_retraining_makes_an_artifact_again_and_only_the_cells_that_depend_on_it(tmp_path: Path) -> None:
+    config = write(tmp_path, ("methods: [", 'methods: ["trained.py:Even", '))
+    first = compute(config)
+    again = compute(config, retrain=True)
+    assert rounds(tmp_path) == [0, 1, 0, 1]
+    assert (first.computed, again.computed) == (7, 1)
+    assert again.records[-1]["scores"] == first.records[-1]["scores"]
+
+
+def panel(folder: Path) -> tuple[str, str]:
+    return "panel: [128, 128]", "panel: [128, 192]"
+
+
+def wavelength(folder: Path) -> tuple[str, str]:
+    return write_profile(folder, ("5.17e-7", "5.32e-7"))
+
+
+def version(folder: Path) -> tuple[str, str]:
+    return write_profile(folder, ("version: 1", "version: 2"))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (panel, "panel [128, 128], this study needs [128, 192]"),
+        (wavelength, "wavelengths [6.36e-07, 5.17e-07, 4.46e-07], this study needs [6.36e-07, 5.32e-07, 4.46e-07]"),
+        (version, "profile version 1, this study needs 2"),
+    ],
+)
+def test_an_artifact_that_was_learned_for_another_display_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    change: Callable[[Path], tuple[str, str]],
+    words: str,
+) -> None:
+    own = write_profile(tmp_path)
+    config = write(tmp_path, own)
+    compute(config)
+    made = artifact_of(config)
+    different = change(tmp_path)
+    config = write(tmp_path, *{own, different})
+    made.rename(artifact_of(config))
+    capsys.readouterr()
+    assert_refused(holoeval(monkeypatch, config), capsys.readouterr(), artifact_of(config).name, "trained for", words)
+    assert holoeval(monkeypatch, config, "--retrain") == 0
+
+
+class Code:
+    """A pickle that would make a file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os.mkdir, (str(self.path),)
+
+
+def truncated(place: Path) -> None:
+    content = (place / STATE).read_bytes()
+    (place / STATE).write_bytes(content[: len(content) // 2])
+
+
+def emptied(place: Path) -> None:
+    (place / STATE).write_bytes(b"")
+
+
+def with_code(place: Path) -> None:
+    (place / STATE).write_bytes(pickle.dumps({"format": 1, "state": Code(place / "entered")}, protocol=2))
+
+
+def with_code_saved_by_torch(place: Path) -> None:
+    torch.save({"format": 1, "state": Code(place / "entered")}, place / STATE)
+
+
+def another_state(place: Path) -> None:
+    content = torch.load(place / STATE, weights_only=True)
+    content["state"]["gain"] += 1
+    torch.save(content, place / STATE)
+
+
+def gone(place: Path) -> None:
+    (place / STATE).unlink()
+
+
+def no_state(place: Path) -> None:
+    torch.save({"format": 1}, place / STATE)
+    edit(place, sha256=hashlib.sha256((place / STATE).read_bytes()).hexdigest())
+
+
+def edit(place: Path, **values: Any) -> None:
+    """Exchange entries of the provenance; None removes one."""
+    known = json.loads((place / PROVENANCE).read_text()) | values
+    (place / PROVENANCE).write_text(json.dumps({key: value for key, value in known.items() if value is not None}))
+
+
+def edited_description(place: Path) -> None:
+    known = json.loads((place / PROVENANCE).read_text())["description"]
+    edit(place, description=known | {"seed": 4})
+
+
+DAMAGES: list[tuple[Callable[[Path], None], str]] = [
+    (truncated, "damaged, or not a file of tensors"),
+    (emptied, "damaged, or not a file of tensors"),
+    (with_code, "damaged, or not a file of tensors"),
+    (with_code_saved_by_torch, "damaged, or not a file of tensors"),
+    (another_state, "is not the file that provenance.json describes"),
+    (gone, "learned.pt or provenance.json is missing"),
+    (no_state, "of another version"),
+    (edited_description, "trained for seed 4, this study needs 3"),
+    (lambda place: edit(place, description={}), "trained for method null"),
+    (lambda place: edit(place, sha256="0" * 64), "is not the file"),
+    (lambda place: edit(place, format=None), "of another version"),
+    (lambda place: edit(place, format=2), "of another version"),
+    (lambda place: edit(place, description=None), "no valid 'description'"),
+    (lambda place: edit(place, sha256=None), "no valid 'sha256'"),
+    (lambda place: edit(place, captures=None), "no valid 'captures'"),
+    (lambda place: edit(place, captures="few"), "no valid 'captures'"),
+    (lambda place: edit(place, seconds=None), "no valid 'seconds'"),
+    (lambda place: void((place / PROVENANCE).write_text("{")), "not an artifact's provenance"),
+    (lambda place: void((place / PROVENANCE).write_text("[1]")), "not an artifact's provenance"),
+    (lambda place: void((place / PROVENANCE).write_text("[" * 100_000)), "not an artifact's provenance"),
+    (lambda place: void((place / PROVENANCE).write_bytes(b"\xff\xfe{")), "not an artifact's provenance"),
+]
+
+
+def void(_: object) -> None:
+    """For the lambdas above, which give nothing."""
+
+
+@pytest.mark.parametrize(("damage", "words"), DAMAGES)
+def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(
+    tmp_path: Path, damage: Callable[[Path], None], words: str
+) -> None:
+    (needed,) = needs(write(tmp_path))
+    artifacts = Artifacts(tmp_path / "artifacts")
+    artifacts.write(needed, {"gain": torch.ones(3)}, {"captures": 2, "seconds": 0.5})
+    assert artifacts.load(needed).state["gain"].tolist() == [1, 1, 1]
+    place = artifacts.place(needed)
+    damage(place)
+    with pytest.raises(UserError) as refused:
+        artifacts.load(needed)
+    assert str(refused.value).startswith(str(place))
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert not (place / "entered").exists()
+
+
+@pytest.mark.parametrize("damage", [truncated, with_code, edited_description])
+def test_a_run_with_a_damaged_artifact_ends_with_one_line_and_exit_code_2(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    damage: Callable[[Path], None],
+) -> None:
+    config = write(tmp_path)
+    compute(config)
+    damage(artifact_of(config))
+    other = write(tmp_path, ("count: 1", "count: 2"))
+    capsys.readouterr()
+    assert_refused(holoeval(monkeypatch, other), capsys.readouterr(), str(artifact_of(config)))
+    assert not (artifact_of(config) / "entered").exists()
+    assert rounds(tmp_path) == [0, 1]
+
+
+def test_an_unfinished_value_that_is_damaged_is_refused(tmp_path: Path) -> None:
+    memory = FolderMemory(tmp_path)
+    memory.save("a value", {"a": torch.ones(2)})
+    assert torch.equal(memory.load("a value")["a"], torch.ones(2))  # type: ignore[index]
+    assert memory.load("another") is None
+    (path,) = (tmp_path / "unfinished").glob("*.pt")
+    path.write_bytes(path.read_bytes()[:40])
+    with pytest.raises(UserError, match="damaged, or not a file of tensors"):
+        memory.load("a value")
+
+
+def test_values_of_any_name_stay_in_their_folder(tmp_path: Path) -> None:
+    memory = FolderMemory(tmp_path / "one")
+    for name in ("../../up", "/absolute", "a/b", "a_b", ""):
+        memory.save(name, {"name": name})
+    assert [memory.load(name) for name in ("../../up", "a/b", "a_b", "")] == [
+        {"name": name} for name in ("../../up", "a/b", "a_b", "")
+    ]
+    assert len(list((tmp_path / "one" / "unfinished").iterdir())) == 5
+    assert [path.name for path in tmp_path.iterdir()] == ["one"]
+
+
+def test_a_logged_row_takes_the_place_of_an_older_one_of_its_round_and_step(tmp_path: Path) -> None:
+    memory = FolderMemory(tmp_path)
+    for row in ({"round": 1, "step": 10, "l1": 0.5}, {"round": 1, "fidelity": 20.0}, {"note": "x"}, {"note": "y"}):
+        memory.log(row)
+    for again in ({"round": 1, "step": 10, "l1": 0.25}, {"round": 1, "fidelity": 21.0}):
+        memory.log(again)
+    rows = [{key: value for key, value in row.items() if value} for row in memory.rows()]
+    assert rows == [
+        {"note": "x"},
+        {"note": "y"},
+        {"round": "1", "step": "10", "l1": "0.25"},
+        {"round": "1", "fidelity": "21"},
+    ]

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from trained_study import compute, needs, rounds, write
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study.plan import displays, plan
+
+LEARNED = ("profiles: [ideal]", 'learned: {method: "trained.py:Gain", profile: ideal, params: {rounds: 3}}')
+FAST = "{name: wirtinger, params: {iterations: 3}}"
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_methods_are_shown_on_a_display_that_was_learned(tmp_path: Path) -> None:
+    methods = f'[{FAST}, "trained.py:Capturing", "trained.py:Peeking", "trained.py:Gain"]'
+    config = write(tmp_path, LEARNED, ('["trained.py:Gain"]', methods))
+    outcome = compute(config)
+    found = {record["label"]: record for record in outcome.records}
+    reasons = {label: (record["state"], record["reason"]) for label, record in found.items()}
+    assert reasons == dict.fromkeys(reasons, ("done", "")) | {
+        "Capturing": ("failed", "CellError: a learned display has no camera"),
+        "Peeking": ("failed", "CellError: a learned display has no simulated bench to look into"),
+    }
+    assert {record["cell"]["condition"] for record in outcome.records} == {"reference", "Gain trained on ideal"}
+    assert found["wirtinger"]["registration_residual_px"] == 0
+    assert found["wirtinger"]["captures"] == 0
+    assert found["wirtinger"]["learned"] is None
+    assert found["Gain"]["learned"]["captures"] == 2
+    assert sorted(rounds(tmp_path)) == [0, 0, 1, 1, 2]  # the display in three rounds, the method in two
+
+    again = compute(config, "again")
+    assert len(rounds(tmp_path)) == 5
+    assert [record["scores"] for record in again.records] == [record["scores"] for record in outcome.records]
+    assert compute(config, retrain=True).computed == len(outcome.records)  # the floor stands on that display too
+    assert len(rounds(tmp_path)) == 10
+
+
+def test_a_learned_display_is_one_more_thing_to_learn(tmp_path: Path) -> None:
+    config = write(tmp_path, LEARNED, ('["trained.py:Gain"]', f'[{FAST}, "trained.py:Gain"]'))
+    grid = plan(load_study(config))
+    (place,) = displays(load_study(config)).values()
+    assert place.learned is not None
+    assert [needed.params["rounds"] for needed in needs(config)] in ([2, 3], [3, 2])
+    assert {needed.place.name for needed in needs(config)} == {"ideal"}
+    assert all(place.learned.id in cell.prepared for cell in grid.cells)
+    assert json.loads(json.dumps(grid.cells[-1].description())) == grid.cells[-1].description()
+
+
+def test_a_display_of_another_training_gives_other_cells(tmp_path: Path) -> None:
+    first, second = (
+        plan(load_study(write(tmp_path, (LEARNED[0], LEARNED[1].replace("rounds: 3", f"rounds: {count}"))))).cells
+        for count in (3, 4)
+    )
+    assert not {cell.id for cell in first} & {cell.id for cell in second}
+
+
+REFUSED = [
+    ("learned: {method: wirtinger, profile: ideal}", "3:29: method 'wirtinger' learns no display"),
+    ('learned: {method: "trained.py:Even", profile: ideal}', "3:29: method 'trained.py:Even' learns no display"),
+    ('learned: {method: "trained.py:Blind", profile: ideal}', "3:29: method 'trained.py:Blind' learns no display"),
+    ('learned: {method: "trained.py:Gain", profile: idel}', "3:57: unknown profile 'idel'; did you mean 'ideal'?"),
+    ('learned: {method: "trained.py:Gain"}', "3:20: missing key 'profile' in display.learned"),
+    (
+        'learned: {method: "trained.py:Gain", profile: ideal, params: {round: 1}}',
+        "3:73: method 'trained.py:Gain' has no",
+    ),
+    ('learned: {method: "trained.py:Gain", profile: ideal}, profiles: [ideal]', "3:20: display.profiles or"),
+]
+
+
+@pytest.mark.parametrize(("display", "message"), REFUSED)
+def test_what_is_no_learned_display_is_refused_at_its_place(tmp_path: Path, display: str, message: str) -> None:
+    config = write(tmp_path, ("profiles: [ideal]", display))
+    with pytest.raises(UserError) as refused:
+        load_study(config)
+    assert str(refused.value).startswith(f"{config}:{message}")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_learned_display_is_a_prediction_and_does_not_measure_others(tmp_path: Path) -> None:
+    config = write(tmp_path, LEARNED, ("seed: 3", "seed: 3\nmeasure: prediction"))
+    with pytest.raises(UserError, match=r"study\.yaml:3:10: a learned display is a prediction already"):
+        load_study(config)

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import fake_trained
+import pytest
+from trained_study import CONFIG, compute, write
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study import timings
+from holobench_eval.study.plan import plan
+
+PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 3}}")
+METHODS = ('["trained.py:Gain"]', '["trained.py:Gain", "trained.py:Even"]')
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """The records of a prediction study on a real bench, by label."""
+    folder = tmp_path_factory.mktemp("prediction")
+    config = write(folder, PREDICTION, METHODS, ("count: 1", "count: 2"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+        found = compute(config).records
+    assert {record["state"] for record in found} == {"done"}, [record["reason"] for record in found]
+    return {record["label"]: record for record in found if record["cell"]["target"] == "picture 0"}
+
+
+def test_the_ideal_image_predicts_the_capture_of_an_ideal_display(records: dict[str, dict[str, Any]]) -> None:
+    scores = records["Gain"]["scores"]
+    assert scores["psnr_linear"] > 30
+    assert scores["ssim_linear"] > 0.9
+    assert records["Gain"]["learned"]["captures"] == 2
+    assert all(abs(scores[f"scale_{channel}"] - 1) < 0.1 for channel in range(3))
+
+
+def test_even_light_scores_what_the_floor_says_of_the_same_capture(records: dict[str, dict[str, Any]]) -> None:
+    even, floor = records["Even"]["scores"], records["floor_constant"]["scores"]
+    for name in ("psnr_linear", "ssim_linear", "psnr_srgb"):
+        assert even[name] == pytest.approx(floor[name], abs=1e-4)
+    assert records["Even"]["learned"] is None
+    assert records["Gain"]["scores"]["psnr_linear"] > floor["psnr_linear"] + 5
+
+
+def test_the_floor_compares_with_the_capture_and_not_with_the_target(
+    records: dict[str, dict[str, Any]], tmp_path: Path
+) -> None:
+    pictures = compute(write(tmp_path, ('["trained.py:Gain"]', '["trained.py:Even"]'))).records
+    floor = {record["label"]: record["scores"] for record in pictures}
+    for name in ("floor_black", "floor_shift_1px"):
+        assert records[name]["scores"]["psnr_linear"] != pytest.approx(floor[name]["psnr_linear"], abs=1e-3)
+
+
+def test_cells_of_predictions_name_the_hologram_and_are_no_cells_of_pictures(tmp_path: Path) -> None:
+    pictures = plan(load_study(write(tmp_path))).cells
+    cells = plan(load_study(write(tmp_path, PREDICTION))).cells
+    others = plan(load_study(write(tmp_path, (PREDICTION[0], PREDICTION[1].replace("3}", "4}"))))).cells
+    assert len({cell.id for cell in (*pictures, *cells, *others)}) == len(pictures) + len(cells) + len(others)
+    assert cells[-1].holograms["name"] == "wirtinger"
+    assert cells[-1].holograms["params"]["iterations"] == 3
+
+
+def test_the_time_of_a_prediction_is_not_that_of_a_solution(tmp_path: Path) -> None:
+    pictures, predictions = (plan(load_study(write(tmp_path, *change))).tasks[-1] for change in ((), (PREDICTION,)))
+    assert timings.key(pictures, 1, 1) != timings.key(predictions, 1, 1)
+
+
+REFUSED = [
+    (
+        "measure: prediction",
+        '["trained.py:Gain", wirtinger]',
+        "7:30: method 'wirtinger' predicts no captures; measure: prediction needs methods that do",
+    ),
+    (
+        "measure: prediction",
+        '["trained.py:Gain", {name: "trained.py:Blind", label: x}]',
+        "7:37: method 'trained.py:Blind' predicts no captures",
+    ),
+    (
+        'holograms: {name: "trained.py:Gain"}',
+        '["trained.py:Gain"]',
+        "3:19: method 'trained.py:Gain' has to be trained; holograms should be of one that learns nothing",
+    ),
+    ("holograms: {params: {iteration: 3}}", "[wirtinger]", "3:22: method 'wirtinger' has no parameter 'iteration'"),
+    ("measure: predictions", "[wirtinger]", "3:10: measure should be 'picture' or 'prediction'"),
+]
+
+
+@pytest.mark.parametrize(("line", "methods", "message"), REFUSED)
+def test_what_cannot_be_predicted_is_refused_at_its_place(
+    tmp_path: Path, line: str, methods: str, message: str
+) -> None:
+    config = write(tmp_path, ("seed: 3", f"seed: 3\n{line}"), ('["trained.py:Gain"]', methods))
+    with pytest.raises(UserError) as refused:
+        load_study(config)
+    assert str(refused.value).startswith(f"{config}:{message}")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path: Path, no_physics: None) -> None:
+    shutil.copy(fake_trained.__file__, tmp_path / "trained.py")
+    plugins = (tmp_path / "trained.py").read_text()
+    config = tmp_path / "study.yaml"
+    config.write_text(CONFIG.replace(*PREDICTION).replace("trained.py:Gain", "narrow.py:Even"))
+    (tmp_path / "narrow.py").write_text(plugins.replace("*bench.spec.region.shape)", "5, 5)"))
+    reason = compute(config).records[-1]["reason"]
+    assert reason == "CellError: Even: predict returned (1, 3, 5, 5), not an image (1, 3, 104, 104)"

@@ -1,0 +1,223 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import fake_study
+import pytest
+import torch
+from trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write
+
+from holobench_eval.config import load_study
+from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Follower, Lines
+from holobench_eval.study.run import run
+from holobench_eval.study.store import TEMPORARY
+from holobench_eval.study.training import train
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+BESIDE = ("methods: [", 'methods: ["trained.py:Even", ')
+"""A method beside that needs no training."""
+
+
+def states(records: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    return [(record["label"], record["state"]) for record in records if record["cell"]["condition"] != "reference"]
+
+
+def gain(**params: object) -> tuple[str, str]:
+    return '"trained.py:Gain"', json.dumps({"name": "trained.py:Gain", "params": params})
+
+
+def test_a_spent_budget_leaves_failed_cells_with_the_reason_and_all_other_cells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = write(tmp_path, BESIDE, gain(rounds=4), ("held_out: 1", "held_out: 1, captures: 3"))
+    assert holoeval(monkeypatch, config) == 1
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert "1 cell failed" in printed.out
+    assert "failed: training Gain-ideal-128x128-" in printed.out
+    assert rounds(tmp_path) == [0, 1, 2, 3]
+    outcome = compute(config)
+    assert states(outcome.records) == [("Even", "done"), ("Gain", "failed")]
+    reason = outcome.records[-1]["reason"]
+    assert reason.endswith("BudgetError: trained.py:Gain has used its 3 captures for training")
+    assert "\n" not in reason
+    table = (tmp_path / "out" / "table.csv").read_text().splitlines()
+    assert [line.split(",")[:4] for line in table if line.startswith(("Even", "Gain"))] == [
+        ["Even", "ideal", "1", "0"],
+        ["Gain", "ideal", "0", "1"],
+    ]
+
+
+def test_a_budget_that_is_enough_changes_nothing_but_the_name(tmp_path: Path) -> None:
+    free = write(tmp_path)
+    compute(free)
+    before = artifact_of(free)
+    metered = write(tmp_path, ("held_out: 1", "held_out: 1, captures: 2"))
+    assert compute(metered, "metered").failed == 0
+    assert artifact_of(metered) != before
+    assert same_state(artifact_of(metered), before)
+
+
+def same_state(one: Path, other: Path) -> bool:
+    """Whether two artifacts hold the same tensors, bit for bit."""
+    first, second = (torch.load(place / STATE, weights_only=True)["state"] for place in (one, other))
+    return first.keys() == second.keys() and all(torch.equal(first[name], second[name]) for name in first)
+
+
+def test_a_training_that_fails_is_told_with_its_reason_and_tried_again_when_asked(tmp_path: Path) -> None:
+    lines: list[str] = []
+    config = write(tmp_path, BESIDE, gain(fail="no\n light"))
+    outcome = compute(config, write=lines.append)
+    assert states(outcome.records) == [("Even", "done"), ("Gain", "failed")]
+    assert outcome.records[-1]["reason"] == "CellError: not trained: ValueError: no light"
+    assert any(line.startswith("failed: training") and line.endswith("ValueError: no light") for line in lines)
+    assert "Traceback" in (artifact_of(config) / "failure.log").read_text()
+    assert compute(config).computed == 0
+    assert compute(config, retry_failed=True).computed == 1
+    assert rounds(tmp_path) == [0, 1]  # what was kept before the failure is not done again
+
+
+def test_a_reason_goes_when_the_training_succeeds(tmp_path: Path) -> None:
+    config = write(tmp_path)
+    plugins = tmp_path / "trained.py"
+    good = plugins.read_text()
+    plugins.write_text(good.replace('return {"gain"', 'return None and {"gain"'))
+    reason = compute(config).records[-1]["reason"]
+    assert reason.endswith("prepare returned NoneType, not a mapping of tensors")
+    plugins.write_text(good)
+    assert compute(config, retry_failed=True).failed == 0
+    assert not (artifact_of(config) / "failure.log").exists()
+
+
+def test_a_target_among_the_training_images_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = write(tmp_path, ('"trained.py:Unseen"', '"trained.py:Pictures"'))
+    assert_refused(holoeval(monkeypatch, config), capsys.readouterr(), "training image 'picture 0' is the scored")
+    assert rounds(tmp_path) == []
+
+
+def test_a_lost_worker_is_the_reason_of_a_training_that_fails(tmp_path: Path) -> None:
+    class Losing(Serial):
+        def map(self, function: Any, jobs: Any) -> Any:
+            for job in jobs:
+                yield job, ConnectionError("the worker\n is gone") if function is train else function(job)
+
+    study = load_study(write(tmp_path))
+    watch = Lines(lambda line: None)
+    outcome = run(study, plan(study), tmp_path / "out", Losing(), watch, 1, tmp_path / "artifacts")
+    assert outcome.records[-1]["reason"] == "CellError: not trained: ConnectionError: the worker is gone"
+
+
+def test_held_out_images_are_the_last_ones(tmp_path: Path) -> None:
+    config = write(tmp_path, ('"trained.py:Gain"', '"trained.py:Blind"'), ("held_out: 1", "held_out: 2"))
+    compute(config)
+    state = torch.load(artifact_of(config) / STATE, weights_only=True)["state"]
+    assert state == {"held out": 2}
+
+
+@pytest.mark.slow
+def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_that_was_not(tmp_path: Path) -> None:
+    config = write(tmp_path, gain(rounds=5, pause=0.15))
+    command = [sys.executable, str(Path(fake_study.__file__)), "run", str(config), "--executor", "serial"]
+    killed = subprocess.Popen(
+        [*command, "--output", str(tmp_path / "out"), "--artifacts", str(tmp_path / "artifacts")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env=os.environ | {"MPLBACKEND": "agg"},
+    )
+    wait_for_rounds(tmp_path, 3, killed)
+    killed.kill()
+    killed.communicate(timeout=60)
+    assert killed.returncode == -signal.SIGKILL
+    place = artifact_of(config)
+    assert not (place / STATE).exists()
+    (place / "unfinished" / f"{TEMPORARY}left").write_bytes(b"half")
+    (place / f"{TEMPORARY}left").write_bytes(b"half")
+
+    assert compute(config).failed == 0
+    assert set(rounds(tmp_path)) == set(range(5))
+    assert len(rounds(tmp_path)) <= 5 + 1  # the kill costs the round it cut short
+    whole = tmp_path / "whole"
+    whole.mkdir()
+    again = write(whole, gain(rounds=5, pause=0.15))
+    compute(again)
+    assert same_state(place, artifact_of(again))
+    known = [json.loads((one / PROVENANCE).read_text()) for one in (place, artifact_of(again))]
+    assert [one["captures"] for one in known] == [5, 5]
+    assert known[0]["description"] == known[1]["description"]
+    assert known[0]["seconds"] >= 5 * 0.15 - 0.05  # the rounds before the kill count too
+    logs = [FolderMemory(one).rows() for one in (place, artifact_of(again))]
+    assert [[row["round"] for row in log] for log in logs] == [list("01234")] * 2
+    assert [row["gain"] for row in logs[0]] == [row["gain"] for row in logs[1]]
+    assert list(place.rglob(f"{TEMPORARY}*")) == []
+
+
+def wait_for_rounds(folder: Path, count: int, process: subprocess.Popen[bytes]) -> None:
+    deadline = time.monotonic() + 120
+    while len(rounds(folder)) < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_artifacts_that_several_runs_need_at_once_are_made_by_one_of_them(tmp_path: Path) -> None:
+    (needed,) = needs(write(tmp_path))
+    artifacts, entered = Artifacts(tmp_path / "artifacts"), threading.Event()
+
+    def wait() -> None:
+        with artifacts.locked(needed):
+            entered.set()
+
+    with artifacts.locked(needed):
+        other = threading.Thread(target=wait, daemon=True)
+        other.start()
+        assert not entered.wait(0.1)
+    assert entered.wait(5)
+
+
+def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_path: Path) -> None:
+    told: list[str] = []
+    follower = Follower(0.01)
+    logs = {name: FolderMemory(tmp_path / name) for name in ("one", "two")}
+    follower.start([(name, log.place) for name, log in logs.items()], told.append)
+
+    def tells(line: str) -> None:
+        deadline = time.monotonic() + 10
+        while line not in told:
+            assert time.monotonic() < deadline, (line, told)
+            time.sleep(0.005)
+
+    logs["one"].log({"round": 0, "step": 5, "l1": 0.25})
+    tells("one: round 0, step 5, l1 0.25")
+    logs["two"].log({"round": 3})
+    tells("two: round 3")
+    logs["one"].log({"round": 0, "step": 10, "fidelity": 20.5})
+    tells("one: round 0, step 10, fidelity 20.5")
+    time.sleep(0.05)
+    assert len(told) == 3
+    assert not follower.ended("one")
+    assert follower.ended("two")
+
+
+def test_a_run_says_what_it_trains_and_when_it_has(tmp_path: Path) -> None:
+    lines: list[str] = []
+    config = write(tmp_path)
+    compute(config, write=lines.append)
+    name = needs(config)[0].name
+    assert lines[1:3] == [f"1 to train: {name}", f"trained: {name}"]
+    again: list[str] = []
+    compute(write(tmp_path, ("count: 1", "count: 2")), "other", write=again.append)
+    assert not any("train" in line for line in again)
