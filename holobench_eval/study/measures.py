@@ -54,8 +54,7 @@ def picture(job: Job) -> Measure:
         shot = job.bench(cell, place).photograph(
             phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure, label=task.label
         )
-        if shot.saturated > MOST_SATURATED:
-            raise CellError(f"{shot.saturated:.2%} of the capture is saturated, more than {MOST_SATURATED:.1%}")
+        _refuse_saturated(shot)
         _save(job, cell, shot.image, phase)
         scores = score(shot.image, target, lpips_weights=setting.lpips_weights)
         write_thumbnail(Store(setting.output).thumbnail(cell.id), match(shot.image, target)[0])
@@ -85,6 +84,7 @@ def prediction(job: Job) -> Measure:
     method = registry.build("methods", cell.method, dict(cell.params), setting.folder)
     learned, target = job.learned(task.preparation), target_of(cell, place, setting.folder)
     phase, shot = _shown(_Shown(cell), place, setting.folder)
+    _refuse_saturated(shot)
     wanted, factors = match(shot.image, target)
     handle = workbench(place, cell.seed).for_method(
         method, task.label, target, item=cell.target, repeat=cell.repeat, learned=learned.state if learned else None
@@ -159,6 +159,11 @@ def _shown(shown: _Shown, place: Condition, folder: Path) -> tuple[Tensor, Shot]
     handle = bench.for_method(method, cell.holograms["name"], target, item=cell.target, repeat=cell.repeat)
     phase = method.solve(target[None].clone(), handle).detach()[0]
     return phase, bench.photograph(phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure)
+
+
+def _refuse_saturated(shot: Shot) -> None:
+    if shot.saturated > MOST_SATURATED:
+        raise CellError(f"{shot.saturated:.2%} of the capture is saturated, more than {MOST_SATURATED:.1%}")
 
 
 def _account(learned: Artifact | None) -> dict[str, Any] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import io
 import math
 from collections.abc import Mapping
@@ -39,7 +40,9 @@ def small_spec(size: int = 64, region: int = 48, colours: int = 1, **optics: Any
     edge = (size - region) // 2
     nominal: dict[str, Any] = {"pitch": 6.4e-6, "distance": 4e-3, "bits": 8, "pupil": None, **optics}
     wavelengths = (636e-9, 517e-9, 446e-9)[:colours]
-    return DisplaySpec("small", (size, size), wavelengths=wavelengths, region=Region(edge, edge, region, region), **nominal)
+    return DisplaySpec(
+        "small", (size, size), wavelengths=wavelengths, region=Region(edge, edge, region, region), **nominal
+    )
 
 
 def pictures(spec: DisplaySpec, count: int = 1, first: int = 0) -> Tensor:
@@ -88,24 +91,20 @@ class BentDisplay:
 
 
 class Memory:
-    """What stays of a training that was killed: bytes and rows."""
+    """What stays of a training that was killed: values and rows. as_files: the values go through a file's bytes."""
 
-    def __init__(self) -> None:
+    def __init__(self, as_files: bool = False) -> None:
+        self.as_files = as_files
         self.fate = Fate()
-        self.kept: dict[str, bytes] = {}
+        self.kept: dict[str, dict[str, Any]] = {}
         self.rows: list[dict[str, float | int | str]] = []
 
     def load(self, name: str) -> dict[str, Any] | None:
-        if name not in self.kept:
-            return None
-        value: dict[str, Any] = torch.load(io.BytesIO(self.kept[name]), weights_only=True)
-        return value
+        return copy.deepcopy(self.kept.get(name))
 
     def save(self, name: str, value: dict[str, Any]) -> None:
         self.fate.meets(f"before keeping {name}")
-        buffer = io.BytesIO()
-        torch.save(value, buffer)
-        self.kept[name] = buffer.getvalue()
+        self.kept[name] = through_a_file(value) if self.as_files else copy.deepcopy(value)
         self.fate.meets(f"after keeping {name}")
 
     def log(self, row: Mapping[str, float | int | str]) -> None:
@@ -119,6 +118,14 @@ class Memory:
     def story(self) -> list[dict[str, float | int | str]]:
         """The rows without the time they took."""
         return [{key: value for key, value in row.items() if key != "seconds"} for row in self.rows]
+
+
+def through_a_file(value: dict[str, Any]) -> dict[str, Any]:
+    buffer = io.BytesIO()
+    torch.save(value, buffer)
+    buffer.seek(0)
+    loaded: dict[str, Any] = torch.load(buffer, weights_only=True)
+    return loaded
 
 
 def training_bench(

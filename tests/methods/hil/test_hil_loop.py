@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from holobench_eval.methods.hil.retrieval import Image, Retrieval
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study.artifacts import FolderMemory
 
-SPEC = small_spec()
+SPEC = small_spec(size=24, region=16)
 
 
 class Scale:
@@ -94,8 +95,8 @@ def test_captures_are_all_images_then_some_a_round_and_those_held_out(
 def test_every_round_is_captured_under_noise_of_its_own() -> None:
     memory = Memory()
     run(training_bench(SPEC, memory), Rounds(3, steps=2, refine_steps=2), memory)
-    names = [name for name in memory.kept if name.startswith(("round", "held out"))]
-    assert len({memory.kept[name] for name in names}) == len(names) == 12
+    captures = [kept["value"]["capture"] for name, kept in memory.kept.items() if "capture" in kept["value"]]
+    assert len({float(capture.double().sum()) for capture in captures}) == len(captures) == 12
 
 
 def test_images_of_later_rounds_go_round_in_turn() -> None:
@@ -160,92 +161,109 @@ def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None
     assert not torch.equal(second["value"]["phase"], start["value"]["phase"])
 
 
-RESUMED = Rounds(3, refine_images=2, steps=7, refine_steps=4)
+RESUMED = Rounds(3, images=2, refine_images=1, steps=4, refine_steps=4)
 
 
-def killed_and_resumed(at: int, moments: list[str]) -> tuple[Memory, Scale, int]:
-    """A training that is killed at the moment ``at`` of those of an undisturbed one, and started again."""
-    memory = Memory()
-    fate = Fate(at)
-    bench = training_bench(SPEC, memory, fate)
-    with pytest.raises(Killed):
-        run(bench, RESUMED, memory)
-    assert fate.passed == moments[: at + 1]
-    again = training_bench(SPEC, memory)
-    approximator = run(again, RESUMED, memory)
-    return memory, approximator, again.captures
+@dataclass(frozen=True)
+class Outcome:
+    """A training's end: what it kept, its approximator, and the captures it counted."""
+
+    memory: Memory
+    approximator: Scale
+    captures: int
+
+    def values(self) -> dict[str, Any]:
+        return {name: kept["value"] for name, kept in self.memory.kept.items()}
 
 
-def undisturbed() -> tuple[Memory, Scale, int]:
-    memory = Memory()
+def finished(memory: Memory) -> Outcome:
+    """A training that goes on from what the memory holds, to its end."""
     bench = training_bench(SPEC, memory)
-    approximator = run(bench, RESUMED, memory)
-    return memory, approximator, bench.captures
+    return Outcome(memory, run(bench, RESUMED, memory), bench.captures)
 
 
-def test_a_training_killed_at_any_moment_ends_with_the_same_state_captures_and_values() -> None:
+@pytest.fixture(scope="module")
+def whole() -> Outcome:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+        return finished(Memory())
+
+
+@pytest.fixture(scope="module")
+def resumed(whole: Outcome) -> dict[int, Outcome]:
+    """Trainings that were killed at each moment of an undisturbed one, and started again."""
+    moments, outcomes = whole.memory.fate.passed, {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+        for at in range(len(moments)):
+            memory, fate = Memory(), Fate(at)
+            with pytest.raises(Killed):
+                run(training_bench(SPEC, memory, fate), RESUMED, memory)
+            assert fate.passed == moments[: at + 1]
+            outcomes[at] = finished(memory)
+    return outcomes
+
+
+def test_a_training_killed_at_any_moment_ends_with_the_same_state_captures_and_values(
+    whole: Outcome, resumed: dict[int, Outcome]
+) -> None:
     """Between photographs, in and between steps, around every save and row, in every round and with images held out."""
-    whole, approximator, captures = undisturbed()
-    moments = whole.fate.passed
-    assert len(moments) > 100
-    for at in range(len(moments)):
-        memory, resumed, counted = killed_and_resumed(at, moments)
-        assert same(resumed.state_dict(), approximator.state_dict()), moments[at]
-        assert counted == captures, moments[at]
-        assert memory.kept.keys() == whole.kept.keys(), moments[at]
-        for name in whole.kept:
-            one, other = memory.load(name), whole.load(name)
-            assert one is not None
-            assert other is not None
-            assert same(one["value"], other["value"]), (moments[at], name)
+    assert len(resumed) > 60
+    for at, outcome in resumed.items():
+        moment = (at, whole.memory.fate.passed[at])
+        assert same(outcome.approximator.state_dict(), whole.approximator.state_dict()), moment
+        assert outcome.captures == whole.captures, moment
+        assert outcome.values().keys() == whole.values().keys(), moment
+        assert all(same(value, whole.values()[name]) for name, value in outcome.values().items()), moment
 
 
-def lost_rows(memory: Memory, whole: Memory) -> bool:
-    return memory.story != whole.story
+def kept_but_not_logged(whole: Outcome) -> set[int]:
+    """Moments between the keeping of the approximator and the row about its steps."""
+    moments = whole.memory.fate.passed
+    kept = {at for at, moment in enumerate(moments) if moment == "after keeping approximator"}
+    return kept | {at + 1 for at in kept}
 
 
-def saved_but_not_logged(moments: list[str], at: int) -> bool:
-    """Whether a kill at this moment falls between the keeping of the approximator and the row about its steps."""
-    return moments[at] == "after keeping approximator" or moments[at - 1] == "after keeping approximator"
+def in_order(memory: Memory) -> list[dict[str, float | int | str]]:
+    return sorted(memory.story, key=lambda row: (row["round"], row["step"]))
 
 
-def test_a_training_killed_at_any_other_moment_has_the_same_log() -> None:
-    whole, _, _ = undisturbed()
-    moments = whole.fate.passed
-    for at in range(len(moments)):
-        if not saved_but_not_logged(moments, at):
-            assert not lost_rows(killed_and_resumed(at, moments)[0], whole), moments[at]
+def test_a_training_killed_at_any_other_moment_has_the_same_rows(whole: Outcome, resumed: dict[int, Outcome]) -> None:
+    assert in_order(whole.memory) == whole.memory.story
+    for at in resumed.keys() - kept_but_not_logged(whole):
+        assert in_order(resumed[at].memory) == whole.memory.story, whole.memory.fate.passed[at]
 
 
 @pytest.mark.xfail(strict=True, reason="refine keeps the approximator before it logs the steps")
-def test_a_training_killed_between_keeping_the_approximator_and_its_row_has_the_same_log() -> None:
-    whole, _, _ = undisturbed()
-    moments = whole.fate.passed
-    kills = [at for at in range(len(moments)) if saved_but_not_logged(moments, at)]
-    assert not any(lost_rows(killed_and_resumed(at, moments)[0], whole) for at in kills)
+def test_a_training_killed_between_keeping_the_approximator_and_its_row_has_the_same_rows(
+    whole: Outcome, resumed: dict[int, Outcome]
+) -> None:
+    assert all(in_order(resumed[at].memory) == whole.memory.story for at in kept_but_not_logged(whole))
 
 
-def test_a_training_killed_again_and_again_ends_the_same() -> None:
-    whole, approximator, captures = undisturbed()
+@pytest.mark.xfail(strict=True, reason="a resumed round logs its captures again, after its steps")
+def test_the_rows_of_a_resumed_training_are_in_order(whole: Outcome, resumed: dict[int, Outcome]) -> None:
+    assert all(in_order(outcome.memory) == outcome.memory.story for outcome in resumed.values())
+
+
+def test_a_training_killed_again_and_again_ends_the_same(whole: Outcome) -> None:
     memory, kills = Memory(), 0
-    while True:
-        bench = training_bench(SPEC, memory, Fate(12))
+    while kills < 40:
+        bench = training_bench(SPEC, memory, Fate(14))
         try:
-            resumed = run(bench, RESUMED, memory)
+            approximator = run(bench, RESUMED, memory)
             break
         except Killed:
             kills += 1
-    assert kills > 5
-    assert same(resumed.state_dict(), approximator.state_dict())
-    assert bench.captures == captures
-    assert [(row["round"], row["step"]) for row in memory.rows] == [(row["round"], row["step"]) for row in whole.rows]
+    assert 3 < kills < 40
+    assert same(approximator.state_dict(), whole.approximator.state_dict())
+    assert bench.captures == whole.captures
 
 
 @pytest.mark.xfail(strict=True, reason="the row of a round's fidelity takes the place of the one of its last losses")
 def test_the_log_in_a_folder_has_the_losses_and_the_fidelity_of_every_round(tmp_path: Path) -> None:
     memory = FolderMemory(tmp_path)
-    spec = small_spec()
-    bench = training_bench(spec, Memory())
+    bench = training_bench(SPEC, Memory())
     bench._memory = memory
     train_in_the_loop(bench, Scale(Fate()), begin, search, Rounds(2, steps=3, refine_steps=3))
     rows = memory.rows()
@@ -264,7 +282,9 @@ def test_a_row_tells_the_mean_loss_since_the_row_before() -> None:
         return {"error": losses[-1], "nothing": 0.0}
 
     approximator.step = recorded  # type: ignore[method-assign]
-    samples = [Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (1.0, 2.0)]
+    samples = [
+        Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (1.0, 2.0)
+    ]
     loop.refine(bench, approximator, samples, 1, range(8))
     assert [row["step"] for row in memory.rows] == [3, 6, 8]
     expected = [sum(losses[a:b]) / (b - a) for a, b in ((0, 3), (3, 6), (6, 8))]
@@ -275,19 +295,19 @@ def test_a_row_tells_the_mean_loss_since_the_row_before() -> None:
 def test_fidelity_tells_how_good_prediction_and_capture_are_and_how_close() -> None:
     target = torch.rand(1, *SPEC.region.shape, generator=torch.Generator().manual_seed(0))
     error = 0.1 * (-1.0) ** torch.arange(SPEC.region.width)
-    shown = (0.5 + 0.25 * target)[:, :, :]
 
     class Perfect(Scale):
         def image(self, light: Tensor) -> Image:
             return lambda phase: 3 * target
 
-    sample = Sample(torch.zeros(1, *SPEC.shape), shown + error, target, torch.ones(1))
-    values = fidelity(Perfect(Fate()), [sample])
+    sample = Sample(torch.zeros(1, *SPEC.shape), 0.2 * (target + error), target, torch.ones(1))
+    values = fidelity(Perfect(Fate()), [sample, sample])
     assert values["predicted_psnr"] > 100
-    assert values["fidelity_psnr"] == pytest.approx(values["captured_psnr"], abs=0.3)
-    assert values["captured_psnr"] < 25
+    assert values["captured_psnr"] == pytest.approx(20, abs=1)
+    assert values["fidelity_psnr"] == pytest.approx(20, abs=1)
 
 
+JUDGED_SPEC = small_spec(size=48, region=40)
 SHORT: dict[str, Any] = {
     "network": Network(levels=2, width=4),
     "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
@@ -305,18 +325,18 @@ METHODS = {
 @pytest.mark.parametrize("name", METHODS)
 def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
     method = METHODS[name]
-    whole = Memory()
-    bench = training_bench(SPEC, whole, images=2)
+    memory = Memory(as_files=True)
+    bench = training_bench(JUDGED_SPEC, memory, images=2)
     learned = method.prepare(bench)
-    moments = whole.fate.passed
-    kinds = ("after a photograph", "after keeping approximator", "before keeping approximator", "before a row")
+    moments = memory.fate.passed
+    kinds = ("after a photograph", "after keeping approximator", "before a row")
     last = {kind: len(moments) - 1 - moments[::-1].index(kind) for kind in kinds}
-    for at in sorted({*last.values(), len(moments) // 3, len(moments) // 2}):
-        memory = Memory()
+    for at in sorted({*last.values(), len(moments) // 2}):
+        memory = Memory(as_files=True)
         torch.manual_seed(at)
         with pytest.raises(Killed):
-            method.prepare(training_bench(SPEC, memory, Fate(at), images=2))
+            method.prepare(training_bench(JUDGED_SPEC, memory, Fate(at), images=2))
         torch.manual_seed(at + 1)
-        again = training_bench(SPEC, memory, images=2)
+        again = training_bench(JUDGED_SPEC, memory, images=2)
         assert same(method.prepare(again), learned), moments[at]
         assert again.captures == bench.captures, moments[at]

@@ -1,0 +1,335 @@
+"""Each number of the display model does to the light what it is named for, and a fit finds the numbers of a display."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from holobench_eval.display import load_profile
+from holobench_eval.display.bench import SimulatedBench
+from holobench_eval.display.contract import DisplaySpec, Region
+from holobench_eval.display.stages import LookUpTable, ZeroOrder
+from holobench_eval.display.workbench import concentration
+from holobench_eval.methods.display_model import KNOTS, MODES, DisplayModel
+from holobench_eval.methods.hil.loop import Sample
+from holobench_eval.methods.hil.plus import PlusApproximator
+from holobench_eval.methods.wirtinger import Wirtinger
+from holobench_eval.optics import AngularSpectrum
+
+TAU = 2 * math.pi
+NO_CROSSTALK = -20.0
+STEPS = 250
+
+
+def spec_of(size: int = 48, margin: int = 4, distance: float = 4e-3, pupil: float | None = None) -> DisplaySpec:
+    """distance 0: what the model makes of the panel is what it gives, in the region."""
+    region = Region(margin, margin, size - 2 * margin, size - 2 * margin)
+    return DisplaySpec("small", (size, size), 6.4e-6, (636e-9, 446e-9), distance, 8, pupil, region)
+
+
+def sharp(spec: DisplaySpec) -> DisplayModel:
+    """A neutral model, without crosstalk."""
+    model = DisplayModel(spec)
+    with torch.no_grad():
+        model.crosstalk.fill_(NO_CROSSTALK)
+    return model
+
+
+def random_phase(spec: DisplaySpec) -> Tensor:
+    """Far beyond one turn to both sides."""
+    return 30 * (torch.rand(2, *spec.shape, generator=torch.Generator().manual_seed(1)) - 0.5)
+
+
+def smooth_phase(spec: DisplaySpec) -> Tensor:
+    """Inside one turn."""
+    coarse = torch.rand(1, 2, 5, 5, generator=torch.Generator().manual_seed(2))
+    return 0.5 + 4 * functional.interpolate(coarse, spec.shape, mode="bicubic", align_corners=True)[0].clamp(0, 1)
+
+
+def ideal(spec: DisplaySpec, panel: Tensor) -> Tensor:
+    return spec.region.crop(torch.stack([spec.propagator(c).forward(one) for c, one in enumerate(panel)]))
+
+
+def on_panel(phase: Tensor) -> Tensor:
+    return torch.polar(torch.ones_like(phase), phase)
+
+
+@pytest.mark.parametrize("pupil", [None, 0.8])
+def test_a_neutral_model_without_crosstalk_is_the_ideal_display(pupil: float | None) -> None:
+    spec = spec_of(pupil=pupil)
+    phase = random_phase(spec)
+    with torch.no_grad():
+        field = sharp(spec)(phase)
+    assert field.shape == (2, *spec.region.shape)
+    assert torch.allclose(field, ideal(spec, on_panel(phase)), atol=1e-4)
+
+
+def test_a_neutral_model_keeps_a_constant_phase_exactly() -> None:
+    spec = spec_of()
+    phase = torch.tensor([0.5, 4.0]).view(2, 1, 1).expand(2, *spec.shape)
+    with torch.no_grad():
+        assert torch.allclose(DisplayModel(spec)(phase), ideal(spec, on_panel(phase)), atol=1e-4)
+
+
+def test_a_neutral_model_dims_a_ramp_by_the_mean_over_its_three_blurred_samples() -> None:
+    """Of a ramp, the Gaussian moves each sample by its mean offset alone: a factor, and no change of phase."""
+    spec, slopes = spec_of(distance=0.0), (0.03, 0.08)
+    rows, columns = (torch.arange(48.0).view(shape) for shape in ((-1, 1), (1, -1)))
+    phase = (0.5 + slopes[0] * rows + slopes[1] * columns).expand(2, 48, 48)
+    position = torch.tensor([-1.0, 0.0, 1.0]) / 3
+    offset = torch.arange(-2.0, 3.0) - position[:, None]
+    edges = [torch.erf((offset + side) / (0.3 * math.sqrt(2))) for side in (0.5, -0.5)]
+    share = (edges[0] - edges[1]) / (edges[0] - edges[1]).sum(1, keepdim=True)
+    moved = (share * torch.arange(-2.0, 3.0)).sum(1)
+    assert float(moved[1]) == pytest.approx(0, abs=1e-6)
+    assert float(moved[0]) == pytest.approx(-float(moved[2]), abs=1e-6)
+    factor = math.prod((1 + 2 * math.cos(slope * float(moved[2]))) / 3 for slope in slopes)
+    with torch.no_grad():
+        field = DisplayModel(spec)(phase)
+    assert torch.allclose(field, factor * spec.region.crop(on_panel(phase)), atol=1e-5)
+
+
+def test_a_neutral_model_is_close_to_the_ideal_display_for_a_smooth_phase() -> None:
+    spec = spec_of()
+    phase = smooth_phase(spec)
+    with torch.no_grad():
+        field, expected = DisplayModel(spec)(phase), ideal(spec, on_panel(phase))
+    assert (field - expected).norm() < 0.02 * expected.norm()
+
+
+def test_a_phase_counts_modulo_a_turn() -> None:
+    spec = spec_of()
+    model, phase = DisplayModel(spec), smooth_phase(spec)
+    with torch.no_grad():
+        assert torch.allclose(model(phase + 3 * TAU), model(phase), atol=1e-3)
+
+
+@pytest.mark.parametrize("knot", [0, 5, KNOTS - 1])
+def test_the_table_moves_the_driven_phase_around_its_knot_alone(knot: int) -> None:
+    spec = spec_of(distance=0.0)
+    model = sharp(spec)
+    level = (torch.arange(40.0) / 40 * (KNOTS - 1)).expand(2, 40, 40)
+    phase = functional.pad(level * TAU / (KNOTS - 1), (4, 4, 4, 4))
+    with torch.no_grad():
+        model.table[1, knot] = 0.7
+        shown = model(phase)
+    moved = (shown * spec.region.crop(on_panel(phase)).conj()).angle()
+    assert moved[0].abs().max() < 1e-4
+    expected = 0.7 * (1 - (level[1] - knot).abs()).clamp_min(0)
+    assert torch.allclose(moved[1], expected, atol=1e-4)
+    assert expected.max() > 0.3
+
+
+def test_the_gain_scales_the_wrapped_phase_where_it_is() -> None:
+    spec = spec_of(distance=0.0)
+    model, phase = sharp(spec), random_phase(spec)
+    with torch.no_grad():
+        model.gain[1] = math.log(0.8)
+        shown = model(phase)
+        expected = torch.stack([phase[0], 0.8 * phase[1].remainder(TAU)])
+        assert torch.allclose(shown, spec.region.crop(on_panel(expected)), atol=1e-4)
+        model.gain.zero_()
+        model.gain[:, :, 0] = 0.1
+        change = (model(torch.ones_like(phase)) * torch.polar(torch.tensor(1.0), torch.tensor(-1.0))).angle()
+    assert change[:, :, 0].min() > 0.05
+    assert change[:, :, -1].abs().max() < 0.02
+
+
+def test_crosstalk_turns_a_wrap_edge_into_a_ramp_as_wide_as_it_says() -> None:
+    """The phase of the three samples of a pixel near the edge, where they are not far apart, is the blurred step's."""
+    spec = spec_of(distance=0.0)
+    phase = torch.full((2, *spec.shape), 1.0)
+    phase[:, :, 24:] = 1.6
+    model, middle = sharp(spec), spec.region.width // 2
+    with torch.no_grad():
+        assert torch.allclose(model(phase), spec.region.crop(on_panel(phase)), atol=1e-5)
+        model.crosstalk[0] = math.log(0.4)
+        model.crosstalk[1] = math.log(0.8)
+        shown = model(phase)[:, 20].angle()
+    for row, width in zip(shown, (0.4, 0.8), strict=True):
+        for pixel in range(-3, 3):
+            place = (pixel + 0.5 + torch.tensor([-1.0, 0.0, 1.0]) / 3).double()
+            step = 1.3 + 0.3 * torch.erf(place / (width * math.sqrt(2)))
+            assert float(row[middle + pixel]) == pytest.approx(float(step.mean()), abs=5e-3)
+
+
+def test_a_blurred_wrap_loses_light() -> None:
+    spec = spec_of(distance=0.0)
+    phase = torch.full((2, *spec.shape), 0.01)
+    phase[:, :, 24:] = -0.01
+    with torch.no_grad():
+        intensity = DisplayModel(spec).intensity(phase)
+    assert intensity[..., :15].sub(1).abs().max() < 1e-3
+    assert intensity[..., 19:21].max() < 0.8
+
+
+def test_undiffracted_light_is_a_plane_wave_beside_the_modulated_light() -> None:
+    spec = spec_of()
+    model, phase = sharp(spec), random_phase(spec)
+    with torch.no_grad():
+        model.undiffracted[1] = torch.tensor([0.2, -0.3])
+        added = model(phase) - ideal(spec, on_panel(phase))
+        plane = ideal(spec, torch.full((2, *spec.shape), 0.2 - 0.3j))
+    assert added[0].abs().max() < 1e-4
+    assert torch.allclose(added[1], plane[1], atol=1e-4)
+
+
+def test_amplitude_and_angle_multiply_the_illumination() -> None:
+    spec = spec_of(distance=0.0)
+    model, phase = sharp(spec), random_phase(spec)
+    with torch.no_grad():
+        model.amplitude[0] = math.log(0.5)
+        model.angle[0] = 0.3
+        model.angle[1] = torch.linspace(0, 1, model.angle.shape[-1])
+        model.undiffracted[0, 0] = 0.2
+        shown = model(phase)
+    panel = spec.region.crop(on_panel(phase))
+    lit = 0.5 * torch.polar(torch.tensor(1.0), torch.tensor(0.3))
+    assert torch.allclose(shown[0], lit * (panel[0] + 0.2), atol=1e-4)
+    tilt = spec.region.crop(torch.linspace(0, 1, 48).expand(48, 48))
+    # the interpolation of a line bends a little at its ends
+    assert torch.allclose(shown[1], panel[1] * torch.polar(torch.ones_like(tilt), tilt), atol=0.02)
+
+
+@pytest.mark.parametrize(("colour", "pupil"), [(0, None), (1, 0.8)])
+def test_defocus_is_a_change_of_distance(colour: int, pupil: float | None) -> None:
+    """sqrt(3) (2 r^2 - 1) over the iris against -pi lambda dz f^2: the quadratic terms are equal."""
+    near = spec_of(96, 16, pupil=pupil)
+    moved = 0.15 * near.distance
+    edge = (pupil or 1.0) / 2 / near.pitch
+    radians = -math.pi * near.wavelengths[colour] * moved * edge**2 / (2 * math.sqrt(3))
+    # light in the middle alone, so that nothing crosses the region's border
+    y, x = torch.meshgrid(*(torch.linspace(-1, 1, 96),) * 2, indexing="ij")
+    model = sharp(near)
+    spot = torch.exp(-((x / 0.15).square() + (y / 0.2).square()))
+    model._illumination = lambda: spot.expand(2, 96, 96)  # type: ignore[method-assign]
+    phase = (2 + 1.5 * torch.sin(12 * x + 5 * y)).expand(2, 96, 96)
+    further = AngularSpectrum(near.shape, near.pitch, near.wavelengths[colour], near.distance + moved, pupil=pupil)
+    expected = near.region.crop(further.forward(spot * on_panel(phase[colour]))).abs().square()
+    with torch.no_grad():
+        before = model.intensity(phase)[colour]
+        model.aberration[colour, MODES.index("defocus")] = radians
+        after = model.intensity(phase)[colour]
+    assert (before - expected).norm() > 0.05 * expected.norm()
+    assert (after - expected).norm() < 0.1 * (before - expected).norm()
+
+
+def test_coma_in_x_and_in_y_differ_by_a_quarter_turn() -> None:
+    spec = spec_of()
+    phase = smooth_phase(spec)
+    one, other = sharp(spec), sharp(spec)
+    with torch.no_grad():
+        one.aberration[:, MODES.index("coma_x")] = 0.5
+        other.aberration[:, MODES.index("coma_y")] = 0.5
+        image, turned = one.intensity(phase), other.intensity(phase.transpose(1, 2))
+        assert torch.allclose(image, turned.transpose(1, 2), atol=1e-3)
+        assert not torch.allclose(image, other.intensity(phase), atol=1e-2)
+
+
+def test_an_aberration_inside_the_iris_keeps_the_light() -> None:
+    spec = spec_of(pupil=0.7)
+    model, phase = sharp(spec), smooth_phase(spec)
+    with torch.no_grad():
+        power = model.intensity(phase).sum((1, 2))
+        model.aberration.normal_(generator=torch.Generator().manual_seed(0))
+        assert torch.allclose(model.intensity(phase).sum((1, 2)), power, rtol=1e-4)
+
+
+def test_brightness_scales_the_intensity() -> None:
+    spec = spec_of()
+    model, phase = DisplayModel(spec), smooth_phase(spec)
+    with torch.no_grad():
+        before = model.intensity(phase)
+        model.brightness[1] = math.log(2.5)
+        after = model.intensity(phase)
+    assert torch.equal(after[0], before[0])
+    assert torch.allclose(after[1], 2.5 * before[1], rtol=1e-4)
+
+
+def detuned(spec: DisplaySpec) -> DisplayModel:
+    """A model in double precision, away from its neutral point."""
+    model = DisplayModel(spec).double()
+    draw = torch.Generator().manual_seed(4)
+    with torch.no_grad():
+        for value in model.parameters():
+            value += 0.1 * torch.randn(value.shape, dtype=torch.float64, generator=draw)
+    return model
+
+
+NUMBERS = ("table", "gain", "crosstalk", "amplitude", "angle", "undiffracted", "aberration", "brightness")
+
+
+def test_these_are_all_the_numbers() -> None:
+    assert {name for name, _ in DisplayModel(spec_of()).named_parameters()} == set(NUMBERS)
+
+
+@pytest.mark.parametrize("name", [*NUMBERS, "phase"])
+def test_the_gradient_of_every_number_equals_finite_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = spec_of(pupil=0.8)
+    precise = [spec.propagator(channel, dtype=torch.complex128) for channel in range(2)]
+    monkeypatch.setattr(DisplayModel, "_propagator", lambda self, channel: precise[channel])
+    model, phase = detuned(spec), smooth_phase(spec).double().requires_grad_()
+    weights = torch.rand(2, *spec.region.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(3))
+
+    def value() -> Tensor:
+        return (weights * model.intensity(phase)).sum()
+
+    number = phase if name == "phase" else model.get_parameter(name)
+    (gradient,) = torch.autograd.grad(value(), number)
+    direction = torch.randn(number.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(5))
+    h, sides = 1e-6, []
+    with torch.no_grad():
+        for sign in (1, -1):
+            number += sign * h * direction
+            sides.append(float(value()))
+            number -= sign * h * direction
+    assert (sides[0] - sides[1]) / (2 * h) == pytest.approx(float((gradient * direction).sum()), rel=1e-4)
+
+
+def measured(colours: int, count: int) -> tuple[DisplaySpec, list[Sample]]:
+    """Captures without noise of a simulated bench whose table is bent and which reflects light unmodulated."""
+    lut = LookUpTable(gamma=(1.2, 1.1, 0.9), gain=(0.92, 0.95, 1.05))
+    profile = replace(load_profile("ideal"), lut=lut, zero_order=ZeroOrder(0.04, 1.0)).scaled((64, 64))
+    bench = SimulatedBench(profile)
+    spec = replace(bench.spec, wavelengths=bench.spec.wavelengths[:colours])
+    draw, samples = torch.Generator().manual_seed(6), []
+    for number in range(count):
+        coarse = torch.rand(1, colours, 7, 7, generator=draw)
+        target = functional.interpolate(coarse, spec.region.shape, mode="bilinear")[0]
+        light = concentration(target, spec)
+        handle = type("Handle", (), {"spec": spec})()
+        # spread over the levels, and none in the middle of the wrap
+        phase = Wirtinger(iterations=5, offset="none").solve(target[None], handle)[0] + TAU * (number + 0.5) / count
+        shown = torch.stack([spec.region.crop(bench.intensity(one, c)) for c, one in enumerate(phase)])
+        samples.append(Sample(phase, shown / light[:, None, None], target, light))
+    return spec, samples
+
+
+def test_a_fit_finds_the_gamma_the_gain_and_the_unmodulated_light_of_a_display() -> None:
+    spec, samples = measured(colours=2, count=10)
+    approximator = PlusApproximator(spec, None, seed=0)
+    for step in range(STEPS):
+        approximator.step(samples[step * 7 % len(samples)], step / STEPS)
+    model = approximator.model
+    with torch.no_grad():
+        level = torch.linspace(0, 1, KNOTS)
+        found = (TAU * level + model.table) * torch.exp(model.gain.mean((1, 2)))[:, None]
+        unmodulated = torch.view_as_complex(model.undiffracted) / math.sqrt(0.04 / 0.96)
+    for colour, (gamma, gain) in enumerate(((1.2, 0.92), (1.1, 0.95))):
+        true = gain * TAU * level**gamma
+        # a constant is not seen in an image, and unmodulated light turns with it
+        constant = (found[colour] - true).mean()
+        assert float((found[colour] - true - constant).square().mean().sqrt()) < 0.05 * TAU
+        turned = unmodulated[colour] * torch.polar(torch.tensor(1.0), -constant)
+        assert abs(complex(turned) - complex(math.cos(1), math.sin(1))) < 0.15
+        with torch.no_grad():
+            errors = [
+                float((approximator.image(s.light)(s.phase) - s.capture)[colour].norm() / s.capture[colour].norm())
+                for s in samples
+            ]
+        assert max(errors) < 0.05
