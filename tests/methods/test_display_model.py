@@ -311,6 +311,7 @@ def measured(colours: int, count: int) -> tuple[DisplaySpec, list[Sample]]:
 
 
 def test_a_fit_finds_the_gamma_the_gain_and_the_unmodulated_light_of_a_display() -> None:
+    """To a few percent, but for the levels next to the wrap: those are seen through crosstalk, which learns slowly."""
     spec, samples = measured(colours=2, count=10)
     approximator = PlusApproximator(spec, None, seed=0)
     for step in range(STEPS):
@@ -321,15 +322,15 @@ def test_a_fit_finds_the_gamma_the_gain_and_the_unmodulated_light_of_a_display()
         found = (TAU * level + model.table) * torch.exp(model.gain.mean((1, 2)))[:, None]
         unmodulated = torch.view_as_complex(model.undiffracted) / math.sqrt(0.04 / 0.96)
     for colour, (gamma, gain) in enumerate(((1.2, 0.92), (1.1, 0.95))):
-        true = gain * TAU * level**gamma
+        error = (found[colour] - gain * TAU * level**gamma)[1:-1]
         # a constant is not seen in an image, and unmodulated light turns with it
-        constant = (found[colour] - true).mean()
-        assert float((found[colour] - true - constant).square().mean().sqrt()) < 0.05 * TAU
+        constant = error.mean()
+        assert (error - constant).abs().max() < 0.01 * TAU
         turned = unmodulated[colour] * torch.polar(torch.tensor(1.0), -constant)
-        assert abs(complex(turned) - complex(math.cos(1), math.sin(1))) < 0.15
+        assert abs(complex(turned) - complex(math.cos(1), math.sin(1))) < 0.08
         with torch.no_grad():
             errors = [
                 float((approximator.image(s.light)(s.phase) - s.capture)[colour].norm() / s.capture[colour].norm())
                 for s in samples
             ]
-        assert max(errors) < 0.05
+        assert sorted(errors)[7] < 0.04
