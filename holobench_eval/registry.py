@@ -6,10 +6,10 @@ import hashlib
 import importlib.util
 import json
 import sys
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -75,13 +75,29 @@ def _checked(kind: Kind, name: str, found: Any) -> type[Any]:
     return found
 
 
+def _check_nested(who: str, cls: type[Any], params: dict[str, Any], place: str) -> None:
+    """Refuse keys of nested parameters that are no fields of the dataclass they are for; pydantic would drop them."""
+    hints = get_type_hints(cls)
+    for key, value in params.items():
+        nested = [part for part in (hints.get(key), *get_args(hints.get(key))) if isinstance(part, type)]
+        inner = next((part for part in nested if is_dataclass(part)), None)
+        if not isinstance(value, dict) or inner is None:
+            continue
+        allowed = [item.name for item in fields(inner)]
+        for name in value:
+            if name not in allowed:
+                raise UserError(f"{who} has no parameter '{place}{key}.{name}'; {suggest(name, allowed)}")
+        _check_nested(who, inner, value, f"{place}{key}.")
+
+
 def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = None) -> Any:
     """An instance with validated parameters; a wrong key, type or range is one line naming the parameter."""
     cls = find(kind, name, folder)
-    fields = set(cls.__dataclass_fields__)
+    known = set(cls.__dataclass_fields__)
     for key in params:
-        if key not in fields:
-            raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, fields)}")
+        if key not in known:
+            raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, known)}")
+    _check_nested(f"{kind[:-1]} '{name}'", cls, params, "")
     try:
         return TypeAdapter(cls).validate_json(json.dumps(params), strict=True)
     except ValidationError as error:

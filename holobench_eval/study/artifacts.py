@@ -130,16 +130,20 @@ class FolderMemory:
         write_atomically(self._path(name), buffer.getvalue())
 
     def log(self, row: Mapping[str, float | int | str]) -> None:
-        """Append to ``training.csv``; a row of the same round and step takes the place of an older one."""
-        place = _place(row)
-        rows = [old for old in self.rows() if not place or _place(old) != place]
+        """Add to ``training.csv``, in the order of round and step; what is said of one of these twice is merged."""
+        new = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in row.items()}
+        place, rows = _place(row), self.rows()
+        known = next((old for old in rows if place and _place(old) == place), None)
+        if known is None:
+            rows.append(new)
+        else:
+            known |= new
+        if all(one.get(name, "").isdigit() for one in rows for name in ("round", "step")):
+            rows.sort(key=lambda one: (int(one["round"]), int(one["step"])))
         text = io.StringIO()
-        columns = list(dict.fromkeys(key for one in (*rows, row) for key in one))
-        writer = csv.DictWriter(text, columns, lineterminator="\n", restval="")
+        writer = csv.DictWriter(text, list(dict.fromkeys(key for one in rows for key in one)), lineterminator="\n")
         writer.writeheader()
-        writer.writerows(
-            [*rows, {key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()}]
-        )
+        writer.writerows([{key: value or "" for key, value in one.items()} for one in rows])
         write_atomically(self.place / LOG, text.getvalue().encode())
 
     def rows(self) -> list[dict[str, str]]:

@@ -20,7 +20,7 @@ from .loop import Rounds, train_in_the_loop
 from .networks import Network
 from .objective import Objective
 from .offset import best_offset
-from .retrieval import Image, Retrieval, retrieve
+from .retrieval import Image, Retrieval, check_region, retrieve
 
 if TYPE_CHECKING:
     from ...display.training import TrainingBench, TrainingImage
@@ -32,7 +32,7 @@ class HIL:
     """Phases retrieved through a network that learned, from captures, what the display makes of an ideal image.
 
     network: the approximator (Section 4.3.1) or a baseline of Table 1. loss: Eq. 20 (None: the one the network is
-    published with). training: Algorithm 1. retrieval: Eq. 22. seed: of weights and order, besides the study's.
+    published with). training: Algorithm 1. retrieval: Eq. 22. seed: of the weights, besides the study's.
     start: Wirtinger holography, where Algorithm 1 and every retrieval begin; stopped early, since a converged phase is
     full of wraps, and what a display makes of those cannot be told from the ideal image.
     offsets: constant phases that are tried on the display for the start, evenly over 2 pi, with captures of the first
@@ -55,6 +55,7 @@ class HIL:
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Train the approximator on captures of the display; what ``solve`` and ``predict`` need of it."""
+        check_region(bench.spec.region.shape, self.retrieval)
         approximator = self._approximator(bench)
         offset = best_offset(bench, self.start, self.offsets)
 

@@ -123,7 +123,7 @@ def train_in_the_loop(
         fresh = []
         for image in settings.shown(bench.images, number):
             fresh.append(show(image, number, "round"))
-            if number >= saved["round"]:
+            if number > saved["round"]:
                 bench.log(round=number, step=0, images=len(fresh))
         samples = [*samples, *fresh] if settings.keep_captures else fresh
         if number == 1:
@@ -150,8 +150,8 @@ def refine(
         sums = {name: sums.get(name, 0.0) + value for name, value in losses.items()}
         if (step + 1) % STEPS_BETWEEN_SAVES == 0 or step + 1 == steps.stop:
             counted = (step - steps.start) % STEPS_BETWEEN_SAVES + 1
-            bench.save("approximator", {"round": number, "step": step + 1, "state": approximator.state_dict()})
             bench.log(round=number, step=step + 1, **{name: value / counted for name, value in sums.items() if value})
+            bench.save("approximator", {"round": number, "step": step + 1, "state": approximator.state_dict()})
             sums = {}
 
 

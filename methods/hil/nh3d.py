@@ -18,7 +18,7 @@ from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
 from .loop import Rounds, train_in_the_loop
 from .networks import Network
-from .retrieval import Image, Retrieval, retrieve
+from .retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
     from ...display.contract import DisplaySpec
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class HILNH3D:
     """Ideal amplitude to captured amplitude by a U-Net, L1; one round of captures of Wirtinger holograms; retrieval for
-    the squared error of amplitude. seed: of weights and order, besides the study's.
+    the squared error of amplitude. seed: of the weights, besides the study's.
     """
 
     network: Network = Network(name="unet")
     training: Rounds = Rounds(rounds=1)
-    retrieval: Retrieval = Retrieval(perceptual=0.0, ms_ssim=0.0, adversarial=0.0)
+    retrieval: SquaredErrorRetrieval = SquaredErrorRetrieval()
     start: Wirtinger = Wirtinger(iterations=50)
     seed: int = 0
 
@@ -45,6 +45,7 @@ class HILNH3D:
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Train the network on captures of the display; what ``solve`` and ``predict`` need of it."""
+        check_region(bench.spec.region.shape, self.retrieval)
         approximator = self._approximator(bench.spec)
 
         def begin(image: TrainingImage) -> Tensor:

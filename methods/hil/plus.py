@@ -10,9 +10,10 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import torch
+from annotated_types import Interval
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -25,7 +26,7 @@ from ..wirtinger import Wirtinger
 from .loop import Rounds, Sample, train_in_the_loop
 from .networks import Network
 from .objective import load_moments
-from .retrieval import Image, Retrieval, retrieve
+from .retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
     from ...display.contract import DisplaySpec
@@ -44,6 +45,10 @@ class PlusApproximator:
     """
 
     def __init__(self, spec: DisplaySpec, network: Network | None, seed: int) -> None:
+        if network is not None and (network.dropout or network.name == "pix2pix"):
+            raise UserError(
+                "hil_plus: a residual network has no dropout, whose random numbers a resumed training lacks"
+            )
         channels = len(spec.wavelengths)
         self.model = DisplayModel(spec)
         with torch.random.fork_rng(devices=[]):
@@ -51,7 +56,7 @@ class PlusApproximator:
             self.network = None if network is None else network.generator(3 * channels, channels)
         groups: list[dict[str, Any]] = [{"params": list(self.model.parameters()), "lr": MODEL_RATE}]
         if self.network is not None:
-            last = [layer for layer in self.network.modules() if isinstance(layer, nn.Conv2d)][-1]
+            last = [one for one in self.network.modules() if isinstance(one, nn.Conv2d | nn.ConvTranspose2d)][-1]
             nn.init.zeros_(last.weight)
             groups.append({"params": list(self.network.parameters()), "lr": NETWORK_RATE})
         self._optimiser = torch.optim.Adam(groups, betas=BETAS)
@@ -115,18 +120,26 @@ def predicted_capture(model: DisplayModel, network: nn.Module | None, phase: Ten
 
 
 @dataclass(frozen=True)
+class FieldRetrieval(SquaredErrorRetrieval):
+    """More and larger steps than through a network: the model stays right far from where it was trained."""
+
+    iterations: Annotated[int, Interval(ge=0, le=100_000)] = 100
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.05
+
+
+@dataclass(frozen=True)
 class HILPlus:
     """Hardware in the loop with the aberration field as a field; see this file's first lines.
 
     network: a generator that adds to what the display model predicts; none by default, since it gained nothing on
     held-out images (22.09 dB without, 21.90 dB with it after a first round of 64 captures). training: Algorithm 1.
     retrieval: Eq. 22, of which the squared error alone is used. start: Wirtinger holography, stopped while its phase is
-    still smooth: a converged phase is full of wraps that descent does not get out of. seed: of weights and order.
+    still smooth: a converged phase is full of wraps that descent does not get out of. seed: of the network's weights.
     """
 
     network: Network | None = None
     training: Rounds = Rounds()
-    retrieval: Retrieval = Retrieval(iterations=100, step=0.05, perceptual=0.0, ms_ssim=0.0, adversarial=0.0)
+    retrieval: FieldRetrieval = FieldRetrieval()
     start: Wirtinger = Wirtinger(iterations=5)
     seed: int = 0
 
@@ -137,6 +150,7 @@ class HILPlus:
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Learn the display from captures; what ``solve`` and ``predict`` need of it."""
+        check_region(bench.spec.region.shape, self.retrieval)
         approximator = PlusApproximator(bench.spec, self.network, self.seed)
 
         def begin(image: TrainingImage) -> Tensor:

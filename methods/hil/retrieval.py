@@ -57,6 +57,15 @@ def matched(image: Tensor, target: Tensor) -> Tensor:
     return image * (overlap / image.square().sum((-2, -1), keepdim=True).clamp_min(1e-12))
 
 
+@dataclass(frozen=True)
+class SquaredErrorRetrieval(Retrieval):
+    """``Retrieval`` for the squared error alone, for methods without a judge."""
+
+    perceptual: Weight = 0.0
+    ms_ssim: Weight = 0.0
+    adversarial: Annotated[float, Interval(ge=0, le=0)] = 0.0
+
+
 class PictureLoss:
     """Eq. 22 for one target ``(C, h, w)``, of which everything that does not change is computed once.
 

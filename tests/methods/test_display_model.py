@@ -257,7 +257,7 @@ def detuned(spec: DisplaySpec) -> DisplayModel:
     draw = torch.Generator().manual_seed(4)
     with torch.no_grad():
         for value in model.parameters():
-            value += 0.1 * torch.randn(value.shape, dtype=torch.float64, generator=draw)
+            value.add_(0.1 * torch.randn(value.shape, dtype=torch.float64, generator=draw))
     return model
 
 

@@ -227,7 +227,7 @@ def test_values_of_any_name_stay_in_their_folder(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["one"]
 
 
-def test_a_logged_row_takes_the_place_of_an_older_one_of_its_round_and_step(tmp_path: Path) -> None:
+def test_a_logged_row_is_merged_with_an_older_one_of_its_round_and_step(tmp_path: Path) -> None:
     memory = FolderMemory(tmp_path)
     for row in ({"round": 1, "step": 10, "l1": 0.5}, {"round": 1, "fidelity": 20.0}, {"note": "x"}, {"note": "y"}):
         memory.log(row)
@@ -235,8 +235,8 @@ def test_a_logged_row_takes_the_place_of_an_older_one_of_its_round_and_step(tmp_
         memory.log(again)
     rows = [{key: value for key, value in row.items() if value} for row in memory.rows()]
     assert rows == [
-        {"note": "x"},
-        {"note": "y"},
         {"round": "1", "step": "10", "l1": "0.25"},
         {"round": "1", "fidelity": "21"},
+        {"note": "x"},
+        {"note": "y"},
     ]

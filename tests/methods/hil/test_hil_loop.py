@@ -234,14 +234,12 @@ def test_a_training_killed_at_any_other_moment_has_the_same_rows(whole: Outcome,
         assert in_order(resumed[at].memory) == whole.memory.story, whole.memory.fate.passed[at]
 
 
-@pytest.mark.xfail(strict=True, reason="refine keeps the approximator before it logs the steps")
 def test_a_training_killed_between_keeping_the_approximator_and_its_row_has_the_same_rows(
     whole: Outcome, resumed: dict[int, Outcome]
 ) -> None:
     assert all(in_order(resumed[at].memory) == whole.memory.story for at in kept_but_not_logged(whole))
 
 
-@pytest.mark.xfail(strict=True, reason="a resumed round logs its captures again, after its steps")
 def test_the_rows_of_a_resumed_training_are_in_order(whole: Outcome, resumed: dict[int, Outcome]) -> None:
     assert all(in_order(outcome.memory) == outcome.memory.story for outcome in resumed.values())
 
@@ -260,7 +258,6 @@ def test_a_training_killed_again_and_again_ends_the_same(whole: Outcome) -> None
     assert bench.captures == whole.captures
 
 
-@pytest.mark.xfail(strict=True, reason="the row of a round's fidelity takes the place of the one of its last losses")
 def test_the_log_in_a_folder_has_the_losses_and_the_fidelity_of_every_round(tmp_path: Path) -> None:
     memory = FolderMemory(tmp_path)
     bench = training_bench(SPEC, Memory())
@@ -315,7 +312,7 @@ SHORT: dict[str, Any] = {
     "start": Wirtinger(iterations=2),
 }
 JUDGED = Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.1)
-METHODS = {
+METHODS: dict[str, Any] = {
     "hil": HIL(**{**SHORT, "retrieval": JUDGED}, loss=Objective(perceptual=0.0), offsets=2),
     "hil_nh3d": HILNH3D(**{**SHORT, "network": Network("unet", levels=2, width=4)}),
     "hil_plus": HILPlus(**SHORT),

@@ -150,16 +150,19 @@ def test_a_trained_method_says_so_and_has_neither_camera_nor_privilege(name: str
         ("hil", {"training": {"rounds": 0}}, "rounds"),
         ("hil", {"retrieval": {"l2": -1}}, "l2"),
         ("hil_plus", {"with_network": True}, "with_network"),
-        pytest.param(
-            *("hil_nh3d", {"training": {"step": 3}}, "steps"),
-            marks=pytest.mark.xfail(strict=True, reason="unknown keys of nested parameters are ignored"),
-        ),
+        ("hil_nh3d", {"training": {"step": 3}}, "steps"),
+        ("hil_plus", {"retrieval": {"adversarial": 0.5}}, "adversarial"),
     ],
 )
 def test_a_wrong_parameter_is_one_line_that_names_it(name: str, params: dict[str, Any], word: str) -> None:
     with pytest.raises(UserError, match=word) as caught:
         registry.build("methods", name, params)
     assert "\n" not in str(caught.value)
+
+
+def test_a_method_keeps_its_own_defaults_for_parameters_that_are_not_given() -> None:
+    method = registry.build("methods", "hil_plus", {"retrieval": {"iterations": 5}})
+    assert (method.retrieval.perceptual, method.retrieval.step) == (0.0, 0.05)
 
 
 def test_the_constant_phase_is_the_one_whose_captures_are_closest(learned: dict[str, Mapping[str, Any]]) -> None:

@@ -28,7 +28,8 @@ def _no_lpips(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def only(term: str, weight: float = 1.0, **settings: Any) -> Retrieval:
-    return Retrieval(**{**dict.fromkeys(TERMS, 0.0), term: weight}, **settings)
+    weights: dict[str, Any] = {**dict.fromkeys(TERMS, 0.0), term: weight}
+    return Retrieval(**weights, **settings)
 
 
 def double_judge(channels: int = 1) -> Judge:
@@ -88,7 +89,8 @@ def test_the_gradient_of_a_term_equals_finite_differences(term: str) -> None:
 
 def test_the_loss_is_the_weighted_sum_of_its_terms() -> None:
     target, image = pair(channels=3)
-    judge, weights = double_judge(3), {"perceptual": 2.0, "ms_ssim": 0.5, "l2": 7.0, "adversarial": 0.3}
+    weights: dict[str, Any] = {"perceptual": 2.0, "ms_ssim": 0.5, "l2": 7.0, "adversarial": 0.3}
+    judge = double_judge(3)
     alone = [weights[term] * PictureLoss(target, only(term), judge)(image)[0] for term in TERMS]
     together = PictureLoss(target, Retrieval(**weights), judge)(image)[0]
     assert float(together) == pytest.approx(float(torch.stack(alone).sum()), rel=1e-9)
