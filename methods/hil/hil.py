@@ -14,13 +14,13 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
 from .loop import Rounds, train_in_the_loop
 from .networks import Network
 from .objective import Objective
 from .offset import best_offset
 from .retrieval import Image, Retrieval, check_region, retrieve
+from .start import SmoothStart
 
 if TYPE_CHECKING:
     from ...display.training import TrainingBench, TrainingImage
@@ -33,8 +33,7 @@ class HIL:
 
     network: the approximator (Section 4.3.1) or a baseline of Table 1. loss: Eq. 20 (None: the one the network is
     published with). training: Algorithm 1. retrieval: Eq. 22. seed: of the weights, besides the study's.
-    start: Wirtinger holography, where Algorithm 1 and every retrieval begin; stopped early, since a converged phase is
-    full of wraps, and what a display makes of those cannot be told from the ideal image.
+    start: Wirtinger holography, where Algorithm 1 and every retrieval begin; stopped early, see ``SmoothStart``.
     offsets: constant phases that are tried on the display for the start, evenly over 2 pi, with captures of the first
     training images; the one of the least error is kept. An ideal image does not depend on it, and so nor does the
     network's input, but unmodulated light interferes with the image.
@@ -44,14 +43,14 @@ class HIL:
     loss: Objective | None = None
     training: Rounds = Rounds()
     retrieval: Retrieval = Retrieval()
-    start: Wirtinger = Wirtinger(iterations=8)
+    start: SmoothStart = SmoothStart()
     offsets: Annotated[int, Interval(ge=1, le=64)] = 8
     seed: int = 0
 
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = 2
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Train the approximator on captures of the display; what ``solve`` and ``predict`` need of it."""

@@ -21,7 +21,7 @@ from holobench_eval.methods.hil.nh3d import HILNH3D
 from holobench_eval.methods.hil.objective import Objective
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.hil.retrieval import Image, Retrieval
-from holobench_eval.methods.wirtinger import Wirtinger
+from holobench_eval.methods.hil.start import SmoothStart
 from holobench_eval.study.artifacts import FolderMemory
 
 SPEC = small_spec(size=24, region=16)
@@ -309,7 +309,7 @@ SHORT: dict[str, Any] = {
     "network": Network(levels=2, width=4),
     "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
     "retrieval": Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0),
-    "start": Wirtinger(iterations=2),
+    "start": SmoothStart(iterations=2),
 }
 JUDGED = Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.1)
 METHODS: dict[str, Any] = {

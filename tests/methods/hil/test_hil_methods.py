@@ -21,12 +21,12 @@ from holobench_eval.methods.hil.nh3d import HILNH3D
 from holobench_eval.methods.hil.objective import Objective
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.hil.retrieval import Image, Retrieval
-from holobench_eval.methods.wirtinger import Wirtinger
+from holobench_eval.methods.hil.start import SmoothStart
 
 SPEC = small_spec(48, 40, colours=3)
 SHORT: dict[str, Any] = {
     "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
-    "start": Wirtinger(iterations=2),
+    "start": SmoothStart(iterations=2),
 }
 PLAIN = Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0)
 SMALL = Network(levels=2, width=4)
