@@ -36,9 +36,9 @@ class Rounds:
 
     rounds: Annotated[int, Interval(ge=1, le=100)] = 3
     images: Annotated[int, Interval(ge=1)] | None = None
-    refine_images: Annotated[int, Interval(ge=1)] | None = 12
+    refine_images: Annotated[int, Interval(ge=1)] | None = 6
     steps: Steps = 900
-    refine_steps: Steps = 300
+    refine_steps: Steps = 200
     keep_captures: bool = True
 
     def shown(self, images: Sequence[TrainingImage], number: int) -> list[TrainingImage]:
@@ -98,9 +98,10 @@ def train_in_the_loop(
     start: Callable[[TrainingImage], Tensor],
     search: Search,
     settings: Rounds,
+    before: Sequence[Sample] = (),
 ) -> None:
     """Algorithm 1. start: the phase of an image that the first round shows (D = Id, so Wirtinger holography) and that
-    every later retrieval begins with."""
+    every later retrieval begins with. before: samples that every round learns from, beside its own."""
 
     def begin(image: TrainingImage) -> Tensor:
         return bench.kept(f"start {image.item}", lambda: {"phase": start(image)})["phase"]
@@ -118,14 +119,14 @@ def train_in_the_loop(
         return Sample(made["phase"], made["capture"], image.target, bench.light(image))
 
     saved = bench.load("approximator") or {"round": 0, "step": 0}
-    samples: list[Sample] = []
+    samples = list(before)
     for number in range(1, settings.rounds + 1):
         fresh = []
         for image in settings.shown(bench.images, number):
             fresh.append(show(image, number, "round"))
             if number > saved["round"]:
                 bench.log(round=number, step=0, images=len(fresh))
-        samples = [*samples, *fresh] if settings.keep_captures else fresh
+        samples = [*(samples if settings.keep_captures else before), *fresh]
         if number == 1:
             approximator.expose(samples)
         if number == max(1, saved["round"]) and saved["round"]:
@@ -167,6 +168,11 @@ def fidelity(approximator: Approximator, samples: Sequence[Sample]) -> dict[str,
         rows.append([_psnr(a, b) for a, b in (*pairs, (matched(predicted, capture), capture))])
     means = torch.tensor(rows).mean(0).tolist()
     return dict(zip(("predicted_psnr", "captured_psnr", "fidelity_psnr"), means, strict=True))
+
+
+def matched_psnr(image: Tensor, target: Tensor) -> float:
+    """PSNR [dB] of an image ``(C, h, w)`` at the brightness of its target."""
+    return _psnr(matched(image, target), target)
 
 
 def _psnr(image: Tensor, target: Tensor) -> float:
