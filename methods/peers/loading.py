@@ -1,0 +1,21 @@
+"""Import the packages of peers, which the extra ``peers`` installs."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from ...errors import UserError
+
+
+def load(module: str) -> Any:
+    """A module of a peer's package. UserError, in one line, where the package is absent or does not start."""
+    package = module.partition(".")[0]
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name != package:
+            raise UserError(f"{package} cannot be imported: {error}") from error
+        raise UserError(f"{package} is not installed; pip install 'holobench_eval[peers]'") from error
+    except ImportError as error:
+        raise UserError(f"{package} cannot be imported: {error}") from error

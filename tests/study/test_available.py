@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from fake_study import solves, write_config
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+NEEDY = '''
+
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Needy(Toy):
+    """Runs where a file says so."""
+
+    def available(self):
+        return None if Path(__file__).with_name("here").exists() else "no lens; buy one"
+'''
+
+
+def needy(tmp_path: Path) -> Callable[[], None]:
+    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy"))
+    plugins = tmp_path / "plugins.py"
+    plugins.write_text(plugins.read_text() + NEEDY)
+
+    def compute() -> None:
+        study = load_study(config)
+        run(study, plan(study), tmp_path / "out", Serial(), Lines(lambda _: None), 1, tmp_path / "artifacts")
+
+    return compute
+
+
+def test_a_method_that_cannot_run_here_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+    compute = needy(tmp_path)
+    with pytest.raises(UserError, match=r"^method 'plugins.py:Needy' cannot run here: no lens; buy one$"):
+        compute()
+    assert solves(tmp_path) == []
+
+
+def test_what_was_computed_needs_no_method_any_more(tmp_path: Path) -> None:
+    compute = needy(tmp_path)
+    (tmp_path / "here").touch()
+    compute()
+    (tmp_path / "here").unlink()
+    compute()
+    assert len(solves(tmp_path)) == 6
