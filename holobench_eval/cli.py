@@ -256,10 +256,20 @@ def show(
     panel: Annotated[tuple[int, int] | None, typer.Option(help="Rows and columns in pixels.")] = None,
     output: Annotated[Path | None, typer.Option(help="Picture to write.")] = None,
 ) -> None:
-    """Draw what a display does to a hologram, stage by stage."""
-    from .report.sheet import draw_sheet
+    """Draw what a display does to a hologram, stage by stage, and list its effects."""
+    from rich.markup import escape
+    from rich.table import Table
 
-    print(draw_sheet(profile, panel, output))
+    from .report.sheet import draw_sheet
+    from .study.listing import effects
+
+    path, table = draw_sheet(profile, panel, output), Table(title=f"effects of {profile}", title_justify="left")
+    for heading in ("effect", "", "parametric model"):
+        table.add_column(heading)
+    for name, text, modelled in effects(profile):
+        table.add_row(name, escape(text), "has it" if modelled else "lacks it")
+    _console().print(table)
+    print(path)
 
 
 @app.command()

@@ -91,13 +91,15 @@ class MethodEntry:
     """A method of a study.
 
     name: registered name or ``path/to/file.py:Class``; label: its name in tables; params: every parameter of
-    the method, defaults filled in; profiles: the displays it is shown on, a subset of the study's.
+    the method, defaults filled in; profiles: the displays it is shown on, a subset of the study's; captures: the most
+    that the display allows a method with a camera for one target (None: no limit).
     """
 
     name: Text
     label: str = ""
     params: Mapping[str, Any] = field(default_factory=dict)
     profiles: tuple[str, ...] = ()
+    captures: Annotated[int, Interval(ge=1)] | None = None
 
 
 @dataclass(frozen=True)
@@ -306,10 +308,12 @@ def _entry(study: Study, document: Document, index: int) -> MethodEntry:
         if profile not in study.display.sources:
             message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
             raise document.error((*where, "profiles", number), message)
-    params = params_of(method)
+    if entry.captures is not None and (not getattr(method, "camera", False) or study.measure == "prediction"):
+        message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
+        raise document.error((*where, "captures"), message)
     profiles = tuple(p for p in study.display.sources if p in entry.profiles or not entry.profiles)
     label = entry.label or entry.name.rpartition(":")[2]
-    return MethodEntry(entry.name, label, params, profiles)
+    return replace(entry, label=label, params=params_of(method), profiles=profiles)
 
 
 def _check_labels(study: Study, document: Document) -> None:
@@ -332,7 +336,7 @@ def _check_twins(study: Study, document: Document) -> None:
     """Two labels for one and the same cell would be one measurement printed as two."""
     for index, entry in enumerate(study.methods):
         for other in study.methods[:index]:
-            same = (entry.name, entry.params) == (other.name, other.params)
+            same = (entry.name, entry.params, entry.captures) == (other.name, other.params, other.captures)
             if same and set(entry.profiles) & set(other.profiles):
                 message = f"methods[{index}] has the method, parameters and display of '{other.label}'; remove one"
                 raise document.error(("methods", index), message)

@@ -32,6 +32,11 @@ GAIN_GRID, SOURCE_GRID = 4, 24
 MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "spherical")
 """Zernike polynomials of the aberration, see ``optics.zernike``."""
 FIRST_CROSSTALK = 0.3
+FORM = frozenset(
+    {"look_up_table", "gain_map", "crosstalk", "beam", "fringes", "wavefront", "tilt", "zero_order", "drift", *MODES}
+)
+"""Effects (``display.effects``) that the model has a term for. All others of a bench lie outside its form, the light
+from between the pixels among them as far as it is not simply unmodulated."""
 
 
 class DisplayModel(nn.Module):

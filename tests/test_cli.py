@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.cli import main
+from holobench_eval.report import sheet
 
 PLUGINS = """
 import hashlib
@@ -158,3 +159,13 @@ def test_help_needs_no_heavy_import() -> None:
     code = "import sys, holobench_eval.cli; print(sorted({'torch', 'numpy', 'pydantic', 'dask'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_display_is_shown_with_its_effects_and_what_the_parametric_model_lacks(
+    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sheet, "draw_sheet", lambda *_: Path("stages.png"))
+    assert holoeval(monkeypatch, "show", "leto-dusty") == 0
+    shown = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if line.startswith("│")}
+    assert "has it" in shown["look_up_table"]
+    assert "lacks it" in shown["plane_dust"]

@@ -228,6 +228,7 @@ class MeteredBench:
         self._budget = budget
         self._learned = learned
         self._captures = 0
+        self._kept: Tensor | None = None
 
     @property
     def spec(self) -> DisplaySpec:
@@ -238,6 +239,16 @@ class MeteredBench:
     def captures(self) -> int:
         """Captures taken so far."""
         return self._captures
+
+    @property
+    def budget(self) -> int | None:
+        """Captures that the display allows in all, None for no limit; a method can plan its schedule for it."""
+        return self._budget
+
+    @property
+    def kept(self) -> Tensor | None:
+        """The best hologram so far, ``(C, H, W)`` [rad]: what the display scores if the budget ends. See ``keep``."""
+        return self._kept
 
     @property
     def learned(self) -> Mapping[str, Any]:
@@ -275,6 +286,16 @@ class MeteredBench:
         check_phase(phase, self.spec, self._label)
         self._captures += 1
         return self._session.capture(phase)
+
+    def keep(self, phase: Tensor) -> None:
+        """Hand in the best hologram so far, ``(C, H, W)`` or ``(1, C, H, W)`` [rad], in the place of an earlier one.
+
+        It is scored if ``capture`` then ends the solution with a BudgetError. A copy is kept; CellError for a phase
+        that no display can show.
+        """
+        one = phase[0] if phase.ndim == 4 and len(phase) == 1 else phase
+        check_phase(one, self.spec, self._label)
+        self._kept = one.detach().cpu().clone()
 
     def rectify(self, capture: Capture) -> Tensor:
         """A capture in the target's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency."""

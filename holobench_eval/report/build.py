@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from ..study.store import write_atomically
-from . import section_training, sections
+from . import leaderboard, section_diagnosis, section_training, sections
 from .description import Description, counts, describe, environment, method_parameters, rules, setup
 from .figures import Figures, draw_figures
 from .findings import findings
@@ -18,7 +18,7 @@ from .markdown import render
 from .results import Results
 from .section_training import Trained
 from .statistics import RESAMPLES
-from .tables import csv_text, read_records, records_frame
+from .tables import MEMORY_COLUMN, csv_text, read_records, records_frame
 
 if TYPE_CHECKING:
     from ..config import Study
@@ -80,6 +80,10 @@ def _numbers(results: Results) -> dict[str, Any]:
         "findings": findings(results),
         "headline": results.headline,
         "headline_tables": each(sections.headline),
+        "stopped": {condition: leaderboard.stopped(results, condition) for condition in results.conditions},
+        "leaderboards": each(leaderboard.leaderboard),
+        "tracks": leaderboard.tracks(results),
+        "leaderboard_reading": leaderboard.reading(results),
         "privileged": bool(results.layout.privileged),
         "lpips": any(metric.startswith("lpips") for metric in metrics),
         "mofd": "mofd" in metrics,
@@ -90,6 +94,7 @@ def _numbers(results: Results) -> dict[str, Any]:
         "domain_tables": each(sections.domains),
         "geometry_tables": each(sections.geometry),
         "blur_tables": each(sections.blur),
+        "memory": MEMORY_COLUMN in results.table,
         "light_tables": each(sections.light_and_time),
         "target_tables": each(sections.per_target),
         "holes": sections.holes(results),
@@ -131,12 +136,15 @@ def _training(layout: Layout, trained: Sequence[Trained]) -> dict[str, Any]:
         "training_table": section_training.summary(layout, trained),
         "training_rounds": section_training.rounds(trained),
         "training_doubts": section_training.doubts(trained),
+        "diagnoses": section_diagnosis.diagnoses(trained),
+        "missing": section_diagnosis.missing(trained),
     }
 
 
 def _pictures(figures: Figures) -> dict[str, Any]:
     return {
         "charts": figures.charts,
+        "frontiers": figures.frontiers,
         "comparisons": figures.comparisons,
         "stages": figures.stages,
         "training_figures": figures.trainings,

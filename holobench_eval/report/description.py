@@ -158,12 +158,17 @@ def _distinct(frame: pd.DataFrame, column: str) -> str:
 def method_parameters(results: Results, records: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
     """(label, registered name, parameters) of every method, in the order of the tables."""
     found = {
-        record["label"]: (record["cell"]["method"], plain(record["cell"]["params"]))
+        record["label"]: (record["cell"]["method"], plain(record["cell"]["params"]) + _allowed(record["cell"]))
         for record in records
         if record["cell"]["condition"] != REFERENCE
     }
     order = dict.fromkeys(results.table.loc[results.table["condition"] != REFERENCE, "method"])
     return [(label, *found[label]) for label in order]
+
+
+def _allowed(cell: Mapping[str, Any]) -> str:
+    """The most captures that the display allows for a target, where the study limits them."""
+    return f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
 
 
 def rules(results: Results) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Charts of the headline metric: quality with intervals, quality against computing time, and every target's value."""
+"""Charts of the headline metric: quality with intervals, and every target's value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .figure_style import COLOURS, GREY, MARKERS, PALE, new_figure, save, style
+from .figure_style import COLOURS, GREY, PALE, new_figure, save, style
 from .scores import Score
 
 WIDTH = 900
@@ -50,11 +50,6 @@ class Chart:
     def colour(self, label: str) -> str:
         """The method's colour, the same in every chart; ceilings are grey."""
         return GREY if label in self.privileged else COLOURS[self._place(label) % len(COLOURS)]
-
-    def marker(self, label: str) -> str:
-        """The method's marker, the same in every chart; methods that must share a colour differ in it."""
-        place = self._place(label)
-        return MARKERS[(place + place // len(COLOURS)) % len(MARKERS)]
 
     def name(self, label: str) -> str:
         """The method's label, marked when it is the ceiling."""
@@ -122,38 +117,6 @@ def _bars(axes: Axes, rows: pd.DataFrame, chart: Chart) -> None:
     axes.set_yticks(places, [chart.name(label) for label in labels], parse_math=False)
     axes.invert_yaxis()
     axes.tick_params(axis="y", length=0)
-
-
-def quality_against_time(path: Path, table: pd.DataFrame, chart: Chart) -> None:
-    """Headline metric against seconds per target (logarithmic), a panel per condition, a marker per method."""
-    score = chart.score.key
-    timed = (table["seconds"] > 0) & np.isfinite(table[score])
-    shown = table[table["method"].isin(chart.methods) & timed]
-    conditions = list(dict.fromkeys(shown["condition"]))
-    with style():
-        figure, panels = _panels(conditions, [300] * len(conditions), footer=30)
-        for axes, condition in zip(panels, conditions, strict=True):
-            rows = shown[shown["condition"] == condition]
-            for label in rows["method"]:
-                row = rows[rows["method"] == label]
-                axes.errorbar(
-                    row["seconds"],
-                    row[score],
-                    yerr=_offsets(row, score),
-                    fmt=chart.marker(label),
-                    color=chart.colour(label),
-                    markersize=8,
-                    markerfacecolor="white" if label in chart.privileged else chart.colour(label),
-                    capsize=3,
-                    label=chart.name(label),
-                )
-            axes.set_xscale("log")
-            axes.set_ylabel(chart.axis.replace(", of ", "\nof "))
-            axes.grid(color="#E5E5E5", linewidth=0.6)
-            axes.set_axisbelow(True)
-            axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-        panels[-1].set_xlabel("computing time per target [s], logarithmic")
-        save(figure, path)
 
 
 def target_dots(path: Path, values: Mapping[str, pd.DataFrame], chart: Chart) -> None:

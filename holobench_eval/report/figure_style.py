@@ -15,7 +15,6 @@ DPI = 100
 
 # Okabe & Ito's palette without its yellow, which is too faint for marks on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6A3D9A", "#7F5539")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
 GREY = "#666666"
 PALE = "#BBBBBB"
 

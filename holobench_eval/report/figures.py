@@ -12,7 +12,8 @@ import pandas as pd
 
 from ..study.plan import REFERENCE
 from ..study.store import Store
-from .figure_charts import Chart, quality_against_time, quality_bars, target_dots
+from . import frontiers
+from .figure_charts import Chart, quality_bars, target_dots
 from .figure_comparison import draw_comparison, tile_size
 from .figure_style import slugs
 from .figure_training import draw_trainings
@@ -44,6 +45,7 @@ class Figures:
     """The figures of a report by kind, and the thumbnails that were wanted and not there."""
 
     charts: list[Drawn]
+    frontiers: list[Drawn]
     comparisons: list[Drawn]
     stages: list[Drawn]
     trainings: list[Drawn]
@@ -63,11 +65,17 @@ def draw_figures(results: Results, trained: Sequence[Trained], output: Path) -> 
         for drawn in _comparison(results, output, condition, stem, absent)
     ]
     number = itertools.count(1)
-    charts, captures, stages, trainings = (
-        [replace(drawn, number=next(number)) for drawn in kind]
-        for kind in (_charts(results, folder), comparisons, _stages(results, folder), _trainings(trained, folder))
+    kinds = (
+        _charts(results, folder),
+        [Drawn(f"{FOLDER}/{path.name}", caption) for path, caption in frontiers.draw(results, folder)],
+        comparisons,
+        _stages(results, folder),
+        _trainings(trained, folder),
     )
-    return Figures(charts, captures, stages, trainings, sorted(set(absent)))
+    charts, costs, captures, stages, trainings = (
+        [replace(drawn, number=next(number)) for drawn in kind] for kind in kinds
+    )
+    return Figures(charts, costs, captures, stages, trainings, sorted(set(absent)))
 
 
 def _charts(results: Results, folder: Path) -> list[Drawn]:
@@ -97,11 +105,6 @@ def _charts(results: Results, folder: Path) -> list[Drawn]:
     target_dots(folder / "quality-by-target.png", values, chart)
     dots = "A dot is a target, a line joins the same target across methods (a gap is a hole), a bar is the mean."
     drawn.append(Drawn(f"{FOLDER}/quality-by-target.png", f"{chart.axis}, of every target. {dots}"))
-    timed = table[(table["seconds"] > 0) & np.isfinite(table[score.key])]
-    if timed["method"].nunique() > 3:
-        quality_against_time(folder / "quality-time.png", table, chart)
-        time = f"{chart.axis}, against computing time per target, mean and 95 % interval."
-        drawn.append(Drawn(f"{FOLDER}/quality-time.png", time))
     return drawn
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..study.plan import REFERENCE
 from .results import Results
 from .scores import DOMAIN_NAMES, Score
 from .statistics import FEWEST, PairedTest
+from .tracks import CALIBRATED, ONLINE
 from .wording import words
 
 SIGNIFICANCE = 0.05
@@ -25,6 +28,7 @@ def findings(results: Results) -> list[tuple[str, list[str]]]:
             condition,
             [
                 *_best(results, condition),
+                *_best_online(results, condition),
                 *_incomplete(results, condition),
                 *_other_metrics(results, condition),
                 *_ceiling(results, condition),
@@ -51,17 +55,35 @@ def _margin(score: Score, test: PairedTest) -> str:
 
 
 def _best(results: Results, condition: str) -> list[str]:
-    ranking, score, baseline = results.ranking(condition), results.headline, results.layout.baseline
+    ranking, said = results.ranking(condition), results.layout.wording
     if not ranking:
         return ["No method has a score for every target, so none is ranked."]
-    best = ranking[0]
+    among = said.best.format(count=len(ranking)) if len(ranking) > 1 else said.only
+    if ONLINE in results.tracks:
+        among = f"Without the camera for the scored image, {among[0].lower()}{among[1:]}"
+    return _leading(results, condition, ranking, among)
+
+
+def _best_online(results: Results, condition: str) -> list[str]:
+    """The first of the track whose methods see the camera for the scored image."""
+    ranking = results.ranking(condition, tracks=(ONLINE,))
+    if not ranking:
+        return []
+    among = f"best of the {len(ranking)} ranked methods" if len(ranking) > 1 else "the only ranked method"
+    return _leading(results, condition, ranking, f"With the camera for the scored image (online track), {among}")
+
+
+def _leading(results: Results, condition: str, ranking: Sequence[str], among: str) -> list[str]:
+    """What the first of a ranking scores, and by how much it differs from the baseline (the baseline: from the next).
+
+    among: who was ranked, the beginning of the sentence.
+    """
+    score, baseline, best = results.headline, results.layout.baseline, ranking[0]
     row = results.row(best, condition)
     value = score.interval(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
-    said = results.layout.wording
-    among = said.best.format(count=len(ranking)) if len(ranking) > 1 else said.only
     sentence = f"{among}: {best}, {score.title} {value}{f' {score.unit}' if score.unit else ''} over {row['n']} targets"
     if best == baseline:
-        compared, intro = ranking[1:2], "; it is the baseline, and from it the next,"
+        compared, intro = list(ranking[1:2]), "; it is the baseline, and from it the next,"
     else:
         compared, intro = [best], f"; against the baseline {baseline}, which has"
     for test in results.against_baseline:
@@ -75,7 +97,7 @@ def _best(results: Results, condition: str) -> list[str]:
 
 def _incomplete(results: Results, condition: str) -> list[str]:
     plain = [label for label in results.methods(condition) if label not in results.layout.privileged]
-    holes = [label for label in plain if label not in results.complete(condition)]
+    holes = [label for label in plain if not results.whole(label, condition)]
     counts = [f"{label} ({int(results.row(label, condition)['n'])} of {len(results.targets)})" for label in holes]
     return [f"Not ranked, since they lack targets: {', '.join(counts)}."] if holes else []
 
@@ -102,6 +124,14 @@ def _ceiling(results: Results, condition: str) -> list[str]:
             sentences.append(
                 f"The ceiling {label} (privileged: it may differentiate through the bench) scores "
                 f"{score.with_unit(value)}, {score.with_unit(gap, signed=True)} from {ranking[0]}."
+            )
+    for track in (CALIBRATED, ONLINE):
+        best = results.ranking(condition, tracks=(track,))[:1]
+        closed = [value for label in best if np.isfinite(value := results.closed(label, condition))]
+        if closed:
+            sentences.append(
+                f"Of the way from the baseline {results.layout.baseline} to the ceiling, the best method of the "
+                f"{track} track, {best[0]}, goes {100 * closed[0]:z.0f} %."
             )
     return sentences
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from .. import registry
 from ..study.plan import displays, scored_dataset
+from .tracks import CALIBRATED, CEILING, ONLINE, OPEN_LOOP
 from .wording import Wording, plain, wording
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class Layout:
     note: a paragraph that the study wants beside its tables. measure: ``picture`` or ``prediction``; holograms: whose
     captures are predicted, with parameters. learned_display: the condition that is a trained network (None: benches).
     trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
+    camera: labels of methods that may capture the scored image while they solve.
     """
 
     title: str
@@ -60,6 +62,20 @@ class Layout:
     learned_display: str | None = None
     trained: frozenset[str] = frozenset()
     training: TrainingSet | None = None
+    camera: frozenset[str] = frozenset()
+
+    def track(self, label: str) -> str:
+        """The track that a method competes in."""
+        if label in self.privileged:
+            return CEILING
+        if label in self.camera:
+            return ONLINE
+        return CALIBRATED if label in self.trained else OPEN_LOOP
+
+    @property
+    def spends_captures(self) -> bool:
+        """Whether some method takes captures, for its training or while it solves."""
+        return bool(self.trained or self.camera)
 
     @property
     def wording(self) -> Wording:
@@ -91,7 +107,11 @@ def layout_of(study: Study) -> Layout:
     reported = study.reported
     names = {source: place.name for source, place in displays(study).items()}
     methods = {entry.label: registry.find("methods", entry.name, study.folder) for entry in study.methods}
-    trained = frozenset(label for label, method in methods.items() if getattr(method, "trains", False))
+
+    def marked(attribute: str) -> frozenset[str]:
+        return frozenset(label for label, method in methods.items() if getattr(method, attribute, False))
+
+    trained = marked("trains")
     probe = study.holograms
     return Layout(
         title=study.title,
@@ -100,7 +120,7 @@ def layout_of(study: Study) -> Layout:
         seed=study.seed,
         headline=study.headline,
         baseline=study.baseline,
-        privileged=frozenset(label for label, method in methods.items() if getattr(method, "privileged", False)),
+        privileged=marked("privileged"),
         reported=reported.rows if reported else {},
         reported_source=reported.source if reported else "",
         reported_beside=names[reported.beside] if reported and reported.beside else None,
@@ -110,6 +130,7 @@ def layout_of(study: Study) -> Layout:
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,
         training=_training_set(study) if trained or study.display.learned else None,
+        camera=marked("camera"),
     )
 
 

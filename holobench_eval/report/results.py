@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,8 +14,9 @@ from ..errors import UserError, suggest
 from ..study.plan import FLOORS, REFERENCE
 from .layout import Layout
 from .scores import Score, parse
-from .statistics import Array, PairedTest, holm, paired_test
+from .statistics import Array, Estimate, PairedTest, bootstrap_mean, holm, paired_test
 from .tables import DONE, per_target, score_columns, table_from_records
+from .tracks import CEILING, OFFLINE, TRACKS
 
 
 @dataclass(frozen=True)
@@ -76,19 +77,61 @@ class Results:
             return np.full(len(self.targets), np.nan)
         return per_target(rows, key or self.headline.key).reindex(self.targets).to_numpy(dtype=np.float64)
 
-    def complete(self, condition: str, key: str | None = None) -> list[str]:
-        """Unprivileged methods with a value for every target: the only means that may be ranked."""
+    def whole(self, label: str, condition: str, key: str | None = None) -> bool:
+        """Whether a method has a value for every target: only then may its mean be compared."""
+        return not np.isnan(self.values(label, condition, key)).any()
+
+    def complete(self, condition: str, key: str | None = None, tracks: Sequence[str] = OFFLINE) -> list[str]:
+        """Methods of the tracks with a value for every target: the only means that may be ranked together.
+
+        Methods that see the camera for the scored image are not among the others, and are asked for by name.
+        """
         return [
             label
             for label in self.methods(condition)
-            if label not in self.layout.privileged and not np.isnan(self.values(label, condition, key)).any()
+            if self.layout.track(label) in tracks and self.whole(label, condition, key)
         ]
 
-    def ranking(self, condition: str, key: str | None = None) -> list[str]:
-        """Complete unprivileged methods, best mean first."""
+    def ranking(self, condition: str, key: str | None = None, tracks: Sequence[str] = OFFLINE) -> list[str]:
+        """Complete methods of the tracks, best mean first."""
         score = parse(key) if key else self.headline
         sign = -1 if score.higher_is_better else 1
-        return sorted(self.complete(condition, key), key=lambda label: sign * self.values(label, condition, key).mean())
+        return sorted(
+            self.complete(condition, key, tracks),
+            key=lambda label: sign * self.values(label, condition, key).mean(),
+        )
+
+    @cached_property
+    def tracks(self) -> list[str]:
+        """The tracks that have rows, in their order."""
+        found = {self.layout.track(label) for condition in self.conditions for label in self.methods(condition)}
+        return [track for track in TRACKS if track in found]
+
+    def ceiling(self, condition: str) -> str | None:
+        """The best complete privileged method."""
+        return next(iter(self.ranking(condition, tracks=(CEILING,))), None)
+
+    def gain(self, label: str, condition: str) -> Estimate | None:
+        """Headline score minus that of the baseline, target by target; None without a complete pair of rows."""
+        baseline = self.layout.baseline
+        if baseline not in self.methods(condition) or not self.whole(baseline, condition):
+            return None
+        if not self.whole(label, condition):
+            return None
+        return bootstrap_mean(self.values(label, condition) - self.values(baseline, condition))
+
+    def closed(self, label: str, condition: str) -> float:
+        """How much of the way from the baseline's mean to the ceiling's a method goes; NaN where there is no way.
+
+        For PSNR, in dB: (method - baseline) / (ceiling - baseline). 0 is the baseline, 1 the ceiling.
+        """
+        ceiling = self.ceiling(condition)
+        gained = self.gain(label, condition)
+        most = self.gain(ceiling, condition) if ceiling else None
+        sign = 1 if self.headline.higher_is_better else -1
+        if gained is None or most is None or sign * most.mean <= 0:
+            return float("nan")
+        return gained.mean / most.mean
 
     @cached_property
     def floors(self) -> list[str]:

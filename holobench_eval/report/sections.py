@@ -14,8 +14,9 @@ from .markdown import code, table
 from .results import Results
 from .scores import DOMAINS, Score
 from .statistics import PairedTest
-from .tables import DONE
+from .tables import DONE, MEMORY_COLUMN
 
+MEMORY = "memory [MiB]"
 LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd")
 
 
@@ -172,6 +173,7 @@ def light_and_time(results: Results, condition: str) -> Markup:
     """Captures, computing time and the figures that describe a capture and are no image metric."""
     figures = [score for score in results.scores if not score.domain and not score.key.startswith("refine_")]
     effort, sensor = _effort(results, " per target"), results.layout.learned_display is None
+    effort |= {MEMORY_COLUMN: MEMORY} if MEMORY_COLUMN in results.table else {}
     rows = []
     for name in results.methods(condition):
         row, cells = results.row(name, condition), results.cells(name, condition)

@@ -20,17 +20,23 @@ from ..study.plan import FLOORS, REFERENCE
 from .layout import Layout
 from .scores import order_scores, parse
 from .statistics import bootstrap_mean
+from .tracks import CEILING
 
 TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
 LEARNED_COLUMN = "learned_sha256"
 TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)
 """Of studies with a method that was trained; others have no such columns."""
+MEMORY_COLUMN = "memory_mib"
+STOPPED_COLUMN = "stopped"
+"""Of studies in which a solution's memory was measured, or the display stopped a method; others lack them."""
+TRACK_COLUMN = "track"
+"""Which reports of earlier versions lack, and with it the columns that are computed from it."""
 MEASURED_COLUMNS = ("captures", "seconds", "registration_residual_px", "saturated")
 IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol")
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
 _REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
-_NOT_SCORES = _REQUIRED | set(TRAINING_COLUMNS)
+_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, STOPPED_COLUMN, TRACK_COLUMN}
 DONE = "done"
 
 
@@ -43,7 +49,7 @@ def _rounded(value: Any) -> float:
     return float("nan") if value is None else float(f"{float(value):.6g}")
 
 
-def _row(record: Mapping[str, Any], identity: str) -> dict[str, Any]:
+def _row(record: Mapping[str, Any], identity: str, layout: Layout) -> dict[str, Any]:
     cell = record["cell"]
     text = {
         "method": record["label"],
@@ -51,14 +57,16 @@ def _row(record: Mapping[str, Any], identity: str) -> dict[str, Any]:
         "condition": cell["condition"],
         "target": cell["target"],
         "state": record["state"],
-        "reason": " ".join(str(record.get("reason", "")).split()),
+        "reason": _one_line(record.get("reason", "")),
+        STOPPED_COLUMN: _one_line(record.get("stopped", "")),
+        TRACK_COLUMN: "" if cell["condition"] == REFERENCE else layout.track(record["label"]),
         "cell": identity,
         **{key: cell.get(key, "") for key in IDENTITY_COLUMNS[1:]},
     }
     scores = record.get("scores", {}) if record["state"] == DONE else {}
     numbers = {
         "repeat": cell.get("repeat", 0),
-        **{key: record.get(key) for key in MEASURED_COLUMNS},
+        **{key: record.get(key) for key in (*MEASURED_COLUMNS, MEMORY_COLUMN)},
         **scores,
     }
     clash = set(scores) & _NOT_SCORES
@@ -66,6 +74,10 @@ def _row(record: Mapping[str, Any], identity: str) -> dict[str, Any]:
         raise UserError(f"record {identity}: score named like a column of records.csv: {', '.join(sorted(clash))}")
     row = {key: str(value) for key, value in text.items()} | {key: _rounded(value) for key, value in numbers.items()}
     return row | _training(record)
+
+
+def _one_line(text: object) -> str:
+    return " ".join(str(text).split())
 
 
 def _training(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,13 +94,16 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
 
     records: as ``study.store.Store.load`` gives them, one for every planned cell, those without a score included.
     """
-    rows = [_row(record, digest(record["cell"])) for record in records]
+    rows = [_row(record, digest(record["cell"]), layout) for record in records]
     frame = pd.DataFrame(rows)
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(column for column in frame.columns if column not in _NOT_SCORES) or [layout.headline]
     columns = ["method", "name", "condition", "target", "repeat", "state", "reason"]
+    measured = [*MEASURED_COLUMNS, *([MEMORY_COLUMN] if frame[MEMORY_COLUMN].notna().any() else [])]
     training = TRAINING_COLUMNS if layout.trained else ()
-    frame = frame.reindex(columns=[*columns, *scores, *MEASURED_COLUMNS, *training, *IDENTITY_COLUMNS])
+    stopped = [STOPPED_COLUMN] if frame[STOPPED_COLUMN].any() else []
+    order = [*columns, *scores, *measured, *training, *stopped, TRACK_COLUMN, *IDENTITY_COLUMNS]
+    frame = frame.reindex(columns=order)
     return _sorted(frame, layout)
 
 
@@ -133,7 +148,9 @@ def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     groups = dict(list(frame.groupby(["method", "condition"], sort=False)))
     scores = score_columns(frame)
     rows = [_table_row(groups[pair], pair, scores, layout) for pair in row_order(frame, layout)]
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    targets = len({*layout.targets, *frame["target"]})
+    return _ranked(table, targets, layout) if TRACK_COLUMN in table else table
 
 
 def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str], layout: Layout) -> dict[str, Any]:
@@ -149,8 +166,36 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
     if LEARNED_COLUMN in done:
         row |= {key: done[key].mean() for key in TRAINING_COLUMNS if key != LEARNED_COLUMN}
         row[LEARNED_COLUMN] = " ".join(sorted(set(done[LEARNED_COLUMN]) - {""}))
+    if MEMORY_COLUMN in done:
+        row[MEMORY_COLUMN] = done[MEMORY_COLUMN].median()  # a method's first solution also loads libraries
+    if TRACK_COLUMN in rows:
+        row |= {"total_captures": total_captures(done), TRACK_COLUMN: rows[TRACK_COLUMN].iloc[0], "rank": np.nan}
     published = layout.published(label, condition)
     return row | {f"reported_{name}": published.get(name, np.nan) for name in layout.reported_metrics}
+
+
+def total_captures(done: pd.DataFrame) -> float:
+    """Every capture behind the done cells of a row: those of the training once, and those of every target.
+
+    Repeats are averaged within a target, since only the measurement is repeated. NaN for no cells.
+    """
+    if done.empty:
+        return float("nan")
+    trained = done["training_captures"].mean() if LEARNED_COLUMN in done else 0.0
+    return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())
+
+
+def _ranked(table: pd.DataFrame, targets: int, layout: Layout) -> pd.DataFrame:
+    """The table with the place of every row among those of its display and track, by its mean headline score.
+
+    Only rows with every target are ranked, and neither ceiling nor floor; equal means share the better place.
+    """
+    score = parse(layout.headline)
+    if score.key in table:
+        whole = (table["n"] == targets) & table[score.key].notna() & ~table[TRACK_COLUMN].isin(("", CEILING))
+        groups = table[whole].groupby(["condition", TRACK_COLUMN])[score.key]
+        table.loc[whole, "rank"] = groups.rank(method="min", ascending=not score.higher_is_better)
+    return table
 
 
 def csv_text(frame: pd.DataFrame) -> str:
@@ -171,7 +216,7 @@ def read_records(text: str) -> pd.DataFrame:
         raise UserError(
             f"records.csv lacks the columns {', '.join(sorted(lacking))}; it was written by another version"
         )
-    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN}
+    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, STOPPED_COLUMN, TRACK_COLUMN}
     for column in frame.columns:
         if column not in text_columns:
             frame[column] = [float(value) if value else np.nan for value in frame[column]]

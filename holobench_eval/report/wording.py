@@ -36,15 +36,17 @@ class Wording:
     """The words of one kind of study.
 
     scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
-    figures. best, only: how the first of several, or the only, ranked method is introduced; other: the same for
-    another metric. procedure: what is done; caution: what the figures do not say; displays: what the displays are;
-    floor, instead: the reference images and the heading of their column. looked_at: heading of the pictures; picture:
-    what a tile of the comparison is. geometry, blur, effort: first sentences of these sections. seeds: what is random.
+    figures; each: what a method makes for one target. best, only: how the first of several, or the only, ranked method
+    is introduced; other: the same for another metric. procedure: what is done; caution: what the figures do not say;
+    displays: what the displays are; floor, instead: the reference images and the heading of their column. looked_at:
+    heading of the pictures; picture: what a tile of the comparison is. geometry, blur, effort: first sentences of these
+    sections. seeds: what is random.
     """
 
     scored: str = "capture"
     truth: str = "target"
     axis: str = ""
+    each: str = "hologram"
     best: str = "Best of the {count} ranked methods"
     only: str = "The only ranked method"
     other: str = "By {metrics} the best is {label}, not {best}."
@@ -119,6 +121,7 @@ PREDICTION = replace(
     scored="prediction",
     truth="capture",
     axis=", of predictions against captures",
+    each="prediction",
     best="Of the {count} ranked methods the captures are predicted most closely by",
     only="The only ranked method",
     other="By {metrics} the closest predictions are those of {label}, not of {best}.",

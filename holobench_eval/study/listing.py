@@ -45,6 +45,16 @@ def profiles() -> Iterator[tuple[str, str]]:
         yield name, f"version {profile.version}: {profile.description}"
 
 
+def effects(source: str) -> Iterator[tuple[str, str, bool]]:
+    """Name and description of every effect of a display profile, and whether the parametric model has a term for it."""
+    from ..display import load_profile
+    from ..display.effects import effects as effects_of
+    from ..methods.display_model import FORM
+
+    for effect in effects_of(load_profile(source)):
+        yield effect.name, effect.text, effect.name in FORM
+
+
 def metrics() -> Iterator[tuple[str, str]]:
     """Name of every metric, the domains of its columns, and why it cannot be computed here if it cannot."""
     from ..metrics import catalogue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -12,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from torch import Tensor
 
 from .. import registry
-from ..errors import CellError
+from ..errors import BudgetError, CellError
 from ..metrics import floor_captures, match, score
-from . import timings
+from . import effort, timings
 from .artifacts import Artifact
 from .bench import Condition, workbench
 from .images import write_capture, write_phase, write_thumbnail
@@ -23,7 +22,7 @@ from .plan import Cell
 from .store import Record, Store, file_name
 
 if TYPE_CHECKING:
-    from ..display.workbench import Shot
+    from ..display.workbench import MeteredBench, Shot
 
 MOST_SATURATED = 0.001
 """Largest fraction of saturated samples with which a capture is scored (protocol v1, step 1)."""
@@ -38,17 +37,23 @@ def picture(job: Job) -> Measure:
     method = registry.build("methods", first.method, dict(first.params), setting.folder)
     target, learned = target_of(first, place, setting.folder), job.learned(task.preparation)
     handle = job.bench(first, place).for_method(
-        method, task.label, target, item=first.target, repeat=first.repeat, learned=learned.state if learned else None
+        method,
+        task.label,
+        target,
+        item=first.target,
+        repeat=first.repeat,
+        budget=first.captures,
+        learned=learned.state if learned else None,
     )
     given = target[None].clone()  # what a method does to its target must not reach the score
-    started = time.perf_counter()
-    solved = method.solve(given, handle)
-    elapsed = time.perf_counter() - started
+    watch = effort.start()
+    solved, stopped = _within_budget(method, given, handle)
+    taken = watch.stop()
     if not isinstance(solved, Tensor) or tuple(solved.shape[:2]) != tuple(given.shape[:2]):
         found = tuple(solved.shape) if isinstance(solved, Tensor) else type(solved).__name__
         raise CellError(f"{task.label}: solve returned {found}, not a phase ({given.shape[0]}, {given.shape[1]}, H, W)")
     phase = solved.detach().cpu()[0]
-    seconds = timings.keep(timings.key(task, setting.threads, setting.workers), elapsed, setting.retime)
+    taken = timings.keep(timings.key(task, setting.threads, setting.workers), taken, setting.retime)
 
     def show(cell: Cell, place: Condition) -> Record:
         shot = job.bench(cell, place).photograph(
@@ -64,13 +69,25 @@ def picture(job: Job) -> Measure:
             label=task.label,
             scores=scores | {"efficiency": shot.efficiency},
             captures=handle.captures,
-            seconds=seconds,
+            seconds=taken.seconds,
+            memory_mib=taken.memory_mib,
             registration_residual_px=shot.residual,
             saturated=shot.saturated,
             learned=_account(learned),
+            stopped=stopped,
         )
 
     return show
+
+
+def _within_budget(method: Any, target: Tensor, handle: MeteredBench) -> tuple[Any, str]:
+    """What ``solve`` returns and an empty line; its best hologram so far and why, if the display ended its captures."""
+    try:
+        return method.solve(target, handle), ""
+    except BudgetError as over:
+        if handle.kept is None:
+            raise
+        return handle.kept[None], str(over)
 
 
 def prediction(job: Job) -> Measure:
@@ -89,14 +106,14 @@ def prediction(job: Job) -> Measure:
     handle = workbench(place, cell.seed).for_method(
         method, task.label, target, item=cell.target, repeat=cell.repeat, learned=learned.state if learned else None
     )
-    started = time.perf_counter()
+    watch = effort.start()
     predicted = method.predict(phase[None].clone(), handle)
-    elapsed = time.perf_counter() - started
+    taken = watch.stop()
     if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *wanted.shape):
         found = tuple(predicted.shape) if isinstance(predicted, Tensor) else type(predicted).__name__
         raise CellError(f"{task.label}: predict returned {found}, not an image {(1, *wanted.shape)}")
     image = factors.view(-1, 1, 1) * predicted.detach().cpu()[0]
-    seconds = timings.keep(timings.key(task, setting.threads, setting.workers), elapsed, setting.retime)
+    taken = timings.keep(timings.key(task, setting.threads, setting.workers), taken, setting.retime)
 
     def compare(cell: Cell, _: Condition) -> Record:
         _save(job, cell, image, phase)
@@ -106,7 +123,8 @@ def prediction(job: Job) -> Measure:
             state="done",
             label=task.label,
             scores=score(image, wanted, lpips_weights=setting.lpips_weights),
-            seconds=seconds,
+            seconds=taken.seconds,
+            memory_mib=taken.memory_mib,
             registration_residual_px=shot.residual,
             saturated=shot.saturated,
             learned=_account(learned),

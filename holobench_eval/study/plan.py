@@ -42,7 +42,8 @@ class Cell:
     repeat, seed: names of the noise; harness_sha256: code of optics, bench, registration and metrics
     (``identity.harness_digest``); metrics: name and version of every metric that can be computed here; measure: what
     is scored, ``picture`` or ``prediction``; holograms: whose captures are predicted (empty for pictures); prepared:
-    what the method and the display had to learn first (``Preparation.id``, empty for nothing).
+    what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the most that
+    the display allows while the target is solved (None: no limit).
     """
 
     method: str
@@ -66,11 +67,15 @@ class Cell:
     measure: Literal["picture", "prediction"] = "picture"
     holograms: Mapping[str, Any] = field(default_factory=dict)
     prepared: tuple[str, ...] = ()
+    captures: int | None = None
 
     def description(self) -> dict[str, Any]:
-        """The cell as plain JSON values."""
+        """The cell as plain JSON values; without ``captures`` where there is no limit."""
         lists = {name: list(getattr(self, name)) for name in ("panel", "metrics", "prepared")}
-        return {**asdict(self), **lists}
+        plain = {**asdict(self), **lists}
+        if self.captures is None:
+            del plain["captures"]
+        return plain
 
     @cached_property
     def id(self) -> str:
@@ -187,6 +192,7 @@ class _Ground:
         repeat: int,
         made: Made,
         prepared: tuple[str, ...] = (),
+        captures: int | None = None,
     ) -> Cell:
         """A cell; ``target`` is a name and its digest, ``made`` says by what the picture is made."""
         study = self.study
@@ -215,6 +221,7 @@ class _Ground:
             measure=study.measure,
             holograms=probe if study.measure == "prediction" else {},
             prepared=prepared,
+            captures=captures,
         )
 
     def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[tuple[str, str]]) -> Iterator[Task]:
@@ -226,7 +233,10 @@ class _Ground:
             for target in targets:
                 for repeat in range(self.study.repeats):
                     cells = (
-                        self.cell(target, place, place.name, repeat, made, _ids(own, place.learned)) for place in group
+                        self.cell(
+                            target, place, place.name, repeat, made, _ids(own, place.learned), entry.captures
+                        )
+                        for place in group
                     )
                     yield Task(entry.label, tuple(cells), group, own)
 

@@ -112,7 +112,7 @@ def _row(label: str, tasks: list[Task], limit: int | None, store: Store, threads
     states = [record.state if (record := store.read(cell.id)) else "missing" for cell in cells]
     unsolved = [task for task in tasks if store.missing(task.cells)]
     known = [timings.known(timings.key(task, threads, workers)) for task in tasks if not task.is_floor]
-    timed = [seconds for seconds in known if seconds is not None]
+    timed = [effort.seconds for effort in known if effort is not None]
     return Row(
         label=label,
         conditions=len({cell.condition for cell in cells}),

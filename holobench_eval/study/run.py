@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from . import provenance
 from .artifacts import Artifacts
+from .available import refuse_unavailable
 from .cell import work
 from .executors import Executor
 from .job import Job, Setting
@@ -82,6 +83,7 @@ def run(
         if retrain:
             forget(plan, store, Artifacts(artifacts))
         missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed))
+        refuse_unavailable(plan, missing, study.folder)
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)
         if missing or not described:

@@ -20,6 +20,9 @@ from .plan import Cell, Plan
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
 """``missing`` is the state of a planned cell that has no record; ``Store.load`` gives it and no file holds it."""
 
+ADDED = frozenset({"memory_mib", "stopped"})
+"""What records of earlier versions lack."""
+
 TEMPORARY = ".writing-"
 """How the name of a file begins that is not whole yet."""
 
@@ -29,10 +32,12 @@ class Record:
     """What was measured in a cell.
 
     cell: its description; state: ``done``, or why there is no score in ``reason``; scores: flat metric names
-    to numbers; captures: camera captures the method used; seconds: wall time of the solution; label: the
-    method's name in tables; registration_residual_px: rms error of the registration, in pixels of the scored
-    region; saturated: fraction of saturated samples; learned: sha256, captures and seconds of the training that the
-    method needed first. None: does not apply, as to a floor cell.
+    to numbers; captures: camera captures the method used; seconds: wall time of the solution; memory_mib: the most
+    resident memory that it took beyond what was there before it [MiB]; label: the method's name in tables;
+    registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
+    saturated samples; learned: sha256, captures and seconds of the training that the method needed first; stopped: why
+    the display ended the solution, whose best hologram so far was scored (empty: it did not). None: does not apply, as
+    to a floor cell.
     """
 
     cell: dict[str, Any]
@@ -42,9 +47,11 @@ class Record:
     scores: dict[str, float] = field(default_factory=dict)
     captures: int = 0
     seconds: float | None = None
+    memory_mib: float | None = None
     registration_residual_px: float | None = None
     saturated: float | None = None
     learned: dict[str, Any] | None = None
+    stopped: str = ""
 
     @property
     def id(self) -> str:
@@ -162,7 +169,7 @@ class Store:
 def _checked(path: Path, identity: str, content: Any) -> Record:
     """The record in a file, after checking that it is one, and the one that the file's name says."""
     names = {item.name for item in fields(Record)}
-    if not isinstance(content, dict) or set(content) != names:
+    if not isinstance(content, dict) or set(content) | ADDED != names:
         raise UserError(f"{path}: not a record of this version; delete the file and run the study again")
     record = Record(**content)
     if not isinstance(record.cell, dict) or digest(record.cell) != identity:

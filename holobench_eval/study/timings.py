@@ -1,6 +1,6 @@
-"""The time a solution takes is measured once on a machine and then kept.
+"""The time and the memory a solution takes are measured once on a machine and then kept.
 
-Wall time is the one number of a table that differs from run to run. So that the same command on the same
+They are the only numbers of a table that differ from run to run. So that the same command on the same
 machine gives the same table, and a run that was killed and resumed gives the table of one that was not, the
 first measurement of every solution is kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``)
 ``/holobench_eval/timings/`` and later runs report it. ``holoeval run --retime`` measures again. Where the
@@ -13,12 +13,14 @@ import json
 import math
 import os
 import platform
+from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from .effort import Effort
 from .identity import digest
 from .plan import Task
 from .store import write_atomically
@@ -46,7 +48,7 @@ def key(task: Task, threads: int, workers: int) -> str:
     cell, place = task.cells[0], task.conditions[0]
     return digest(
         {
-            "method": [cell.method, cell.method_sha256, dict(cell.params)],
+            "method": [cell.method, cell.method_sha256, dict(cell.params), *([cell.captures] if cell.captures else [])],
             "target": [cell.target_sha256, dict(cell.dataset_params)],
             "display": [repr(place.spec), place.digest, cell.exposure],
             "noise": [cell.seed, cell.repeat],
@@ -58,23 +60,26 @@ def key(task: Task, threads: int, workers: int) -> str:
     )
 
 
-def known(name: str) -> float | None:
-    """The first measurement under a name [s], None if there is none."""
+def known(name: str) -> Effort | None:
+    """The first measurement under a name, None if there is none; of an earlier version, without memory."""
     try:
         content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
-        seconds = float(content["seconds"])
+        seconds, memory = float(content["seconds"]), content.get("memory_mib")
+        effort = Effort(seconds, None if memory is None else float(memory))
     except (OSError, ValueError, TypeError, KeyError):
         return None
-    return seconds if math.isfinite(seconds) and seconds >= 0 else None
+    sizes = [effort.seconds, *([] if effort.memory_mib is None else [effort.memory_mib])]
+    return effort if all(math.isfinite(size) and size >= 0 for size in sizes) else None
 
 
-def keep(name: str, seconds: float, again: bool = False) -> float:
-    """Note a measurement [s] and return the one to report: the first, or this one when it is measured again."""
+def keep(name: str, effort: Effort, again: bool = False) -> Effort:
+    """Note a measurement and return the one to report: the first, or this one when it is measured again."""
     first = None if again else known(name)
-    if first is not None:
+    if first is not None and (first.memory_mib is not None or effort.memory_mib is None):
         return first
+    kept = effort if first is None else Effort(first.seconds, effort.memory_mib)
     try:
-        write_atomically(folder() / f"{name}.json", json.dumps({"seconds": seconds}).encode())
+        write_atomically(folder() / f"{name}.json", json.dumps(asdict(kept)).encode())
     except OSError:
-        return seconds
-    return seconds
+        return kept
+    return kept

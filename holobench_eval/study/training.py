@@ -8,7 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__, registry
+from ..display.effects import effects
+from ..display.estimates import joined
 from ..display.training import TrainingBench, TrainingImage
+from ..display.truth import truth
+from ..display.workbench import Workbench
 from ..errors import CellError
 from .artifacts import Artifacts
 from .bench import workbench
@@ -44,8 +48,9 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
     method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
     images = _images(needed)
     split = len(images) - needed.held_out
+    place = workbench(needed.place, needed.seed)
     bench = TrainingBench(
-        workbench(needed.place, needed.seed),
+        place,
         needed.method,
         images[:split],
         images[split:],
@@ -66,7 +71,22 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
         "harness_sha256": harness_digest(),
         "made": now(),
     }
-    artifacts.write(needed, state, facts)
+    artifacts.write(needed, state, facts | diagnosis(method, state, place))
+
+
+def diagnosis(method: object, state: Mapping[str, Any], place: Workbench) -> dict[str, list[Any]]:
+    """What a method says of the display it learned, beside the truth, for methods that say something.
+
+    estimates: see ``display.estimates.joined``; missing: effects of the bench that the form of the method's model has
+    no term for, each in words, if the method says what its ``form`` is.
+    """
+    estimates, form = getattr(method, "estimates", None), getattr(method, "form", None)
+    found: dict[str, list[Any]] = {}
+    if estimates is not None:
+        found["estimates"] = joined(estimates(state, place.spec), truth(place.bench))
+    if form is not None:
+        found["missing"] = [one.text for one in effects(place.bench.profile) if one.name not in form]
+    return found
 
 
 def _images(needed: Preparation) -> list[TrainingImage]:

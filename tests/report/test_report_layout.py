@@ -24,6 +24,10 @@ class Honest:
 @dataclass(frozen=True)
 class Knowing(Honest):
     privileged: ClassVar[bool] = True
+
+@dataclass(frozen=True)
+class Seeing(Honest):
+    camera: ClassVar[bool] = True
 """
 CONFIG = """
 title: Two methods
@@ -33,6 +37,7 @@ targets: {dataset: "plugins.py:Cards"}
 methods:
   - {name: "plugins.py:Honest", label: honest}
   - {name: "plugins.py:Knowing", label: knowing, profiles: [leto-aged]}
+  - {name: "plugins.py:Seeing", label: seeing, profiles: [ideal]}
 headline: ssim_linear
 reported: {source: "a paper, table 3", rows: {honest: {psnr: 17.6}}}
 """
@@ -47,10 +52,12 @@ def study(tmp_path):
 
 def test_a_layout_holds_what_the_config_orders(study):
     layout = layout_of(study)
-    assert layout.pairs == (("honest", "ideal"), ("honest", "leto-aged"), ("knowing", "leto-aged"))
+    assert layout.pairs == (("honest", "ideal"), ("honest", "leto-aged"), ("knowing", "leto-aged"), ("seeing", "ideal"))
     assert layout.targets == ("zebra", "apple")
     assert (layout.title, layout.seed, layout.baseline, layout.headline) == ("Two methods", 7, "honest", "ssim_linear")
     assert layout.privileged == {"knowing"}
+    assert layout.camera == {"seeing"}
+    assert [layout.track(label) for label in layout.methods] == ["open loop", "ceiling", "online"]
     assert layout.reported_metrics == ("psnr",)
     assert layout.reported_source == "a paper, table 3"
 

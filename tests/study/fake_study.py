@@ -116,9 +116,16 @@ class FakeBench:
         self.spec, self.bench = spec, self
 
     def for_method(
-        self, method: Any, label: str, target: Tensor, item: str, repeat: int, learned: Any = None
+        self,
+        method: Any,
+        label: str,
+        target: Tensor,
+        item: str,
+        repeat: int,
+        budget: int | None = None,
+        learned: Any = None,
     ) -> MeteredBench:
-        return MeteredBench(cast(Workbench, self), label, target, (item, repeat), method, learned=learned)
+        return MeteredBench(cast(Workbench, self), label, target, (item, repeat), method, budget, learned)
 
     def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
         shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000
@@ -128,8 +135,8 @@ class FakeBench:
     def exposure(self, target: Tensor) -> tuple[float, ...]:
         return (1.0,) * len(target)
 
-    def session(self, *names: object, exposure: tuple[float, ...]) -> FakeSession:
-        return FakeSession(self.spec, names)
+    def session(self, *names: object, exposure: tuple[float, ...] = ()) -> FakeSession:
+        return FakeSession(self.spec, tuple(name for name in names if not isinstance(name, Tensor)))
 
     def rectified(self, capture: Tensor, target: Tensor) -> Tensor:
         return capture

@@ -8,6 +8,7 @@ from fake_study import write_config
 
 from holobench_eval.config import load_study
 from holobench_eval.study import timings
+from holobench_eval.study.effort import Effort
 from holobench_eval.study.plan import Task, plan
 
 
@@ -17,32 +18,45 @@ def task(tmp_path: Path) -> Task:
 
 
 def test_the_first_measurement_is_the_one_reported() -> None:
-    assert timings.keep("a", 2.5) == 2.5
-    assert timings.keep("a", 9.0) == 2.5
-    assert timings.known("a") == 2.5
+    assert timings.keep("a", Effort(2.5, 40.0)) == Effort(2.5, 40.0)
+    assert timings.keep("a", Effort(9.0, 50.0)) == Effort(2.5, 40.0)
+    assert timings.keep("a", Effort(9.0, None)) == Effort(2.5, 40.0)
+    assert timings.known("a") == Effort(2.5, 40.0)
 
 
 def test_measuring_again_replaces_it() -> None:
-    timings.keep("a", 2.5)
-    assert timings.keep("a", 9.0, again=True) == 9.0
-    assert timings.keep("a", 1.0) == 9.0
+    timings.keep("a", Effort(2.5, 40.0))
+    assert timings.keep("a", Effort(9.0, 50.0), again=True) == Effort(9.0, 50.0)
+    assert timings.keep("a", Effort(1.0, 10.0)) == Effort(9.0, 50.0)
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{}", '{"seconds": "x"}', '{"seconds": -1}', '{"seconds": NaN}', "\xff"])
+def test_a_time_that_was_kept_without_memory_stays_and_gets_the_first_memory() -> None:
+    timings.folder().mkdir(parents=True)
+    (timings.folder() / "a.json").write_text('{"seconds": 2.5}')
+    assert timings.keep("a", Effort(9.0)) == Effort(2.5)
+    assert timings.keep("a", Effort(9.0, 40.0)) == Effort(2.5, 40.0)
+    assert timings.keep("a", Effort(9.0, 50.0)) == Effort(2.5, 40.0)
+
+
+DAMAGED = ["", "[]", "{}", '{"seconds": "x"}', '{"seconds": -1}', '{"seconds": NaN}', "\xff"]
+DAMAGED += ['{"seconds": 1, "memory_mib": -1}', '{"seconds": 1, "memory_mib": [2]}']
+
+
+@pytest.mark.parametrize("content", DAMAGED)
 def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
-    timings.keep("a", 2.5)
+    timings.keep("a", Effort(2.5))
     (timings.folder() / "a.json").write_text(content, encoding="latin-1")
     assert timings.known("a") is None
-    assert timings.keep("a", 3.0) == 3.0
+    assert timings.keep("a", Effort(3.0)) == Effort(3.0)
 
 
-def test_without_a_folder_to_write_to_the_measured_time_is_reported(
+def test_without_a_folder_to_write_to_what_was_measured_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert timings.keep("a", 2.5) == 2.5
-    assert timings.keep("a", 3.5) == 3.5
+    assert timings.keep("a", Effort(2.5)) == Effort(2.5)
+    assert timings.keep("a", Effort(3.5)) == Effort(3.5)
 
 
 def test_threads_workers_and_the_method_make_another_solution(task: Task) -> None:

@@ -39,10 +39,13 @@ class Illumination:
             centre = (2 * torch.rand(2, generator=draw, dtype=torch.float64) - 1) * self.offset
             amplitude *= torch.exp(-((y - centre[0]) ** 2 + (x - centre[1]) ** 2) / (2 * self.beam_sigma**2))
         amplitude *= 1 + self.fringes * self._fringes(geometry)
-        phase = self.phase_rms * geometry.smooth_map(2.5, "wavefront")
-        phase = phase + 2 * math.pi * (self.tilt[0] * y + self.tilt[1] * x)
+        phase = self.wavefront(geometry) + 2 * math.pi * (self.tilt[0] * y + self.tilt[1] * x)
         amplitude /= amplitude.pow(2).mean().sqrt()
         return torch.polar(amplitude, phase).to(torch.complex64)
+
+    def wavefront(self, geometry: Geometry) -> Tensor:
+        """Smooth phase error ``(H, W)`` [rad], without the tilt."""
+        return self.phase_rms * geometry.smooth_map(2.5, "wavefront")
 
     def _fringes(self, geometry: Geometry) -> Tensor:
         """Two fringe systems in [-1, 1]; the finer the shorter the wavelength, as between two plane surfaces."""

@@ -1,0 +1,57 @@
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+from holobench_eval.display import load_profile
+from holobench_eval.display.workbench import MeteredBench
+from holobench_eval.errors import CellError
+
+PANEL = (96, 128)
+
+
+@pytest.fixture
+def handle():
+    spec = load_profile("ideal").scaled(PANEL).spec()
+    return MeteredBench(SimpleNamespace(spec=spec), "mine", torch.ones(3, *spec.region.shape), ("t", 0), budget=7)
+
+
+def test_nothing_is_kept_at_first(handle):
+    assert handle.kept is None
+
+
+def test_the_last_hologram_handed_in_is_kept_as_it_was(handle):
+    phase = torch.rand(3, *PANEL, requires_grad=True)
+    before = phase.detach().clone()
+    handle.keep(torch.zeros(3, *PANEL))
+    handle.keep(phase)
+    with torch.no_grad():
+        phase.zero_()
+    assert torch.equal(handle.kept, before)
+    assert not handle.kept.requires_grad
+
+
+def test_a_batch_of_one_is_kept_as_its_hologram(handle):
+    handle.keep(torch.ones(1, 3, *PANEL))
+    assert handle.kept.shape == (3, *PANEL)
+
+
+@pytest.mark.parametrize(
+    ("phase", "message"),
+    [
+        (torch.full((3, *PANEL), float("nan")), "mine: phase holds 36864 values that are NaN"),
+        (torch.zeros(2, 3, *PANEL), r"mine: phase is \(2, 3, 96, 128\)"),
+        (torch.zeros(3, 10, 10), r"mine: phase is \(3, 10, 10\)"),
+    ],
+)
+def test_what_no_display_can_show_is_not_kept(handle, phase, message):
+    handle.keep(torch.ones(3, *PANEL))
+    with pytest.raises(CellError, match=message):
+        handle.keep(phase)
+    assert torch.equal(handle.kept, torch.ones(3, *PANEL))
+
+
+def test_a_method_may_know_its_budget_and_not_change_it(handle):
+    assert handle.budget == 7
+    with pytest.raises(AttributeError):
+        handle.budget = 8

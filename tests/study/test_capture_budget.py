@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_study import write_config
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study import timings
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
+from holobench_eval.study.store import Store
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+METHODS = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+
+
+@dataclass(frozen=True)
+class Greedy:
+    \"\"\"Captures for ever; hands in a phase of ``good`` first and of 9 after every other capture.\"\"\"
+
+    good: float = 2.0
+    keeps: bool = True
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        phase = torch.full((target.shape[1], *bench.spec.shape), self.good)
+        while True:
+            if self.keeps:
+                bench.keep(phase)
+            bench.capture(phase)
+            phase.fill_(9.0)  # what was handed in is a copy
+            self = Greedy(self.good, keeps=False)
+
+
+@dataclass(frozen=True)
+class Modest:
+    \"\"\"Takes as many captures as it may, and no more.\"\"\"
+
+    value: float = 2.0
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        phase = torch.full((*target.shape[:2], *bench.spec.shape), self.value)
+        for _ in range(bench.budget or 1):
+            bench.capture(phase[0])
+        return phase
+"""
+
+
+def study_of(folder: Path, *methods: str) -> Path:
+    (folder / "camera.py").write_text(METHODS)
+    return write_config(folder, tuple(f"{{name: camera.py:{method}}}" for method in methods), count=1)
+
+
+def records(config: Path, output: Path) -> list[dict[str, Any]]:
+    study = load_study(config)
+    made = run(study, plan(study), output, Serial(), Lines(lambda line: None), threads=1, artifacts=output / "a")
+    return [record for record in made.records if record["cell"]["condition"] != "reference"]
+
+
+def test_a_method_over_its_budget_is_stopped_and_its_best_hologram_so_far_is_scored(tmp_path: Path) -> None:
+    config = study_of(tmp_path, "Greedy, captures: 3", "Modest, captures: 3")
+    greedy, modest = records(config, tmp_path / "out")
+    assert (greedy["state"], greedy["captures"]) == ("done", 3)
+    assert greedy["stopped"] == "Greedy has used its 3 captures"
+    assert greedy["scores"] == modest["scores"]
+    assert (modest["captures"], modest["stopped"]) == (3, "")
+
+
+def test_a_method_that_kept_nothing_fails_when_its_budget_ends(tmp_path: Path) -> None:
+    config = study_of(tmp_path, "Greedy, captures: 2, params: {keeps: false}")
+    (record,) = records(config, tmp_path / "out")
+    assert record["state"] == "failed"
+    assert record["reason"] == "BudgetError: Greedy has used its 2 captures"
+
+
+def test_a_budget_makes_another_cell_and_no_budget_leaves_its_name_as_it_was(tmp_path: Path) -> None:
+    free, tight = "Modest", "Modest, label: tight, captures: 2"
+    cells = {task.label: task.cells[0] for task in plan(load_study(study_of(tmp_path, free, tight))).tasks}
+    assert "captures" not in cells["Modest"].description()
+    assert cells["tight"].description() == {**cells["Modest"].description(), "captures": 2}
+    assert cells["tight"].id != cells["Modest"].id
+
+
+def test_a_time_is_kept_for_each_budget(tmp_path: Path) -> None:
+    task = plan(load_study(study_of(tmp_path, "Modest"))).tasks[-1]
+    keys = {
+        timings.key(replace(task, cells=(replace(task.cells[0], captures=captures),)), 1, 1)
+        for captures in (None, 2, 3)
+    }
+    assert len(keys) == 3
+
+
+@pytest.mark.parametrize(
+    ("method", "message"),
+    [
+        ('"plugins.py:Toy", captures: 3', r":6:\d+: .*plugins.py:Toy' takes no captures .*remove 'captures'"),
+        ("camera.py:Modest, captures: 0", r":6:\d+: .*captures"),
+        ("camera.py:Modest, captures: many", r":6:\d+: .*captures"),
+    ],
+)
+def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path: Path, method: str, message: str) -> None:
+    (tmp_path / "camera.py").write_text(METHODS)
+    with pytest.raises(UserError, match=message):
+        load_study(write_config(tmp_path, (f"{{name: {method}}}",), count=1))
+
+
+def test_one_method_with_the_same_budget_twice_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="remove one"):
+        load_study(study_of(tmp_path, "Modest, captures: 2", "Modest, label: again, captures: 2"))
+
+
+def test_a_record_from_before_there_were_budgets_is_read(tmp_path: Path) -> None:
+    (record,) = records(study_of(tmp_path, "Modest"), tmp_path / "out")
+    (cell,) = plan(load_study(tmp_path / "study.yaml")).tasks[-1].cells
+    store = Store(tmp_path / "out")
+    old = json.loads(store.path(cell.id).read_text())
+    del old["stopped"]
+    store.path(cell.id).write_text(json.dumps(old))
+    found = store.read(cell.id)
+    assert found is not None
+    assert (found.scores, found.stopped) == (record["scores"], "")
