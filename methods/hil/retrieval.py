@@ -37,13 +37,14 @@ class Retrieval:
     perceptual: LPIPS where its weights are found, else the weight-free feature distance (``mofd``), of sRGB pictures;
     the paper's weight is 1, and it gives none of the other three. ms_ssim, l2: of linear light. adversarial: the
     verdict of ``judge.Judge``. A term of weight 0 is not computed.
-    iterations, step: the paper takes 300 of 0.001 rad; step is cosine-decayed to zero here. No iteration leaves the
+    iterations, step: the paper takes 300 of 0.001 rad; step is cosine-decayed to zero here. Twice this step lost
+    0.6 dB on captures of dead leaves: the network is to be believed near its start alone. No iteration leaves the
     start as it is.
     threshold: stop when the mean squared error of the predicted picture is below.
     """
 
     iterations: Annotated[int, Interval(ge=0, le=100_000)] = 60
-    step: Annotated[float, Interval(gt=0, le=10)] = 0.015
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.0075
     perceptual: Weight = 1.0
     ms_ssim: Weight = 1.0
     l2: Weight = 10.0

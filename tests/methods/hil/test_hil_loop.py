@@ -119,6 +119,21 @@ def test_a_round_learns_from_all_captures_so_far_or_from_its_own(keep_captures: 
     assert (captures[0] <= captures[1] <= captures[2]) == keep_captures
 
 
+@pytest.mark.parametrize("keep_captures", [True, False])
+def test_samples_from_before_are_learned_from_in_every_round(keep_captures: bool) -> None:
+    memory = Memory()
+    bench, approximator = training_bench(SPEC, memory), Scale(memory.fate)
+    earlier = [Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (5, 6)]
+    rounds = Rounds(2, refine_images=1, steps=5, refine_steps=10, keep_captures=keep_captures)
+    train_in_the_loop(bench, approximator, begin, search, rounds, earlier)
+    assert approximator.exposed == [5]
+    learned_from = [value for value, _ in approximator.trained_on]
+    for seen in (learned_from[:5], learned_from[5:]):
+        assert {20.0, 24.0} <= set(seen)
+    assert len(set(learned_from[5:])) == (6 if keep_captures else 3)
+    assert bench.captures == 3 + 1 + 2
+
+
 def test_every_capture_is_learned_from_equally_often_and_not_in_the_order_it_was_taken() -> None:
     memory = Memory()
     approximator = run(training_bench(SPEC, memory, images=6), Rounds(1, steps=18), memory)

@@ -1,0 +1,83 @@
+"""What a learned display model says about its display: numbers with units, free of the model's gauge freedoms."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from ...display.estimates import (
+    Estimate,
+    disc,
+    estimate,
+    focusing,
+    reach,
+    stroke,
+    undiffracted,
+    zernike_waves,
+)
+from ...optics.phase import TAU
+from ...optics.zernike import NAMES, zernike
+from ..display_model import FORM, KNOTS, MODES, DisplayModel, enlarged
+
+if TYPE_CHECKING:
+    from ...display.contract import DisplaySpec
+
+
+class Diagnosed:
+    """A trained method whose state ``model`` is that of a ``DisplayModel``."""
+
+    form: ClassVar[frozenset[str]] = FORM
+
+    def estimates(self, learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
+        """What the model that was learned says of the display ``spec``."""
+        return diagnose(learned["model"], spec)
+
+
+@torch.no_grad()
+def diagnose(state: Mapping[str, Tensor], spec: DisplaySpec) -> list[Estimate]:
+    """The quantities of ``display.estimates`` in the state of a ``DisplayModel`` for the display ``spec``.
+
+    Learned from images, the model leaves these open, and so the estimates do not depend on them:
+
+    - slope of the table against gain, gain map against its mean: the driven phase is read, table times mean gain, at
+      the knots between the two at the wrap, which are seen through crosstalk alone;
+    - a constant in the table, in the angle of the beam and in the undiffracted light: the constant that the law of
+      the stroke leaves is taken off the phase of the undiffracted light;
+    - mean amplitude of the beam against brightness: their product is the light;
+    - curvature of the beam against defocus and astigmatism: they are added (``display.estimates.focusing``).
+    """
+    model = DisplayModel(spec)
+    model.load_state_dict(dict(state))
+    return [one for colour in range(len(spec.wavelengths)) for one in (*_panel(model, colour), *_optics(model, colour))]
+
+
+def _panel(model: DisplayModel, colour: int) -> list[Estimate]:
+    levels = torch.arange(1, KNOTS - 1, dtype=torch.float64) / (KNOTS - 1)
+    gain = torch.exp(enlarged(model.gain, model.spec.shape)[colour]).double().mean()
+    law = stroke(levels, (TAU * levels + model.table[colour, 1:-1]) * gain)
+    ratio = complex(*model.undiffracted[colour].tolist())
+    beam = torch.exp(2 * enlarged(model.amplitude, model.spec.shape)[colour]).mean()
+    light = float(beam * torch.exp(model.brightness[colour])) * (1 + abs(ratio) ** 2)
+    turned = ratio * cmath.exp(-1j * TAU * law.offset)
+    return [
+        estimate("lut_exponent", colour, law.exponent),
+        estimate("phase_gain", colour, law.gain),
+        estimate("crosstalk", colour, float(torch.exp(model.crosstalk[colour]))),
+        *undiffracted(turned, colour),
+        estimate("light", colour, light),
+    ]
+
+
+def _optics(model: DisplayModel, colour: int) -> list[Estimate]:
+    spec, (y, x) = model.spec, disc()
+    modes = torch.stack([zernike(NAMES[name], y, x) for name in MODES])
+    lens = focusing(
+        enlarged(model.angle, spec.shape)[colour],
+        reach(spec.wavelengths[colour], spec.distance, spec.pitch, spec.pupil),
+    )
+    waves = zernike_waves(model.aberration[colour].double() @ modes + lens)
+    return [estimate(name, colour, waves[name]) for name in MODES]

@@ -1,0 +1,26 @@
+"""Calibration of an interpretable model of the display: what is measured is also a diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from ..display_model import DisplayModel
+from .approximator import ModelApproximator, Rates
+from .diagnosis import Diagnosed
+from .diagnosis import Diagnosed
+from .method import Calibrated
+
+if TYPE_CHECKING:
+    from ...display.contract import DisplaySpec
+
+
+@dataclass(frozen=True)
+class ParametricModel(Diagnosed, Calibrated):
+    """``DisplayModel`` learned from speckle-like patterns, natural holograms and holograms it made itself."""
+
+    RATES: ClassVar[Rates] = Rates(model=3e-2)
+
+    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
+        """A display that is as the nominal model says, but for a little crosstalk."""
+        return ModelApproximator(DisplayModel(spec), None, self.RATES)

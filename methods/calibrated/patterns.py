@@ -1,0 +1,57 @@
+"""Speckle-like patterns: holograms of nothing, whose captures tell what a panel does to a phase.
+
+Natural holograms are smooth and their images mostly follow from the ideal model. A random phase visits every level of
+the look-up table in every neighbourhood, and its speckle carries every spatial frequency, so that a dozen captures
+tell look-up table, phase gain, crosstalk, unmodulated light and aberrations apart.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from ...display.training import TrainingImage
+from ..hil.loop import Sample
+
+if TYPE_CHECKING:
+    from ...display.training import TrainingBench
+
+LENGTHS = (2.0, 4.0, 8.0, 16.0)
+"""Correlation lengths [px] that the patterns go through in turn: wraps from everywhere to a few long edges."""
+GRAY = 0.25
+"""Of the constant picture that the camera is exposed for; speckle peaks stay below its saturation."""
+
+
+def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
+    """``count`` patterns, captured, one capture each."""
+    spec = bench.spec
+    gray = torch.full((len(spec.wavelengths), *spec.region.shape), GRAY)
+    samples = []
+    for number in range(count):
+        image = TrainingImage(f"pattern-{number:02d}", gray)
+        made = bench.kept(f"pattern {number}", lambda number=number, image=image: _shown(bench, number, image))
+        samples.append(Sample(made["phase"], made["capture"], gray, bench.light(image)))
+    return samples
+
+
+def _shown(bench: TrainingBench, number: int, image: TrainingImage) -> dict[str, Any]:
+    length = LENGTHS[number % len(LENGTHS)]
+    phase = random_phase(len(image.target), bench.spec.shape, length, bench.generator("pattern", number))
+    return {"phase": phase, "capture": bench.photograph(phase, image, "pattern")}
+
+
+def random_phase(colours: int, shape: tuple[int, int], length: float, draw: torch.Generator) -> Tensor:
+    """Phase ``(colours, *shape)`` [rad] in (-pi, pi] of circular Gaussian noise behind a Gaussian filter.
+
+    length: the filter's standard deviation [px]. Every value is equally likely, and the phase has vortices, as fully
+    developed speckle has (Goodman, Speckle Phenomena in Optics, section 4.8).
+    """
+    reach = int(3 * length)
+    size = (shape[0] + 2 * reach, shape[1] + 2 * reach)
+    noise = torch.randn((2 * colours, 1, *size), generator=draw)
+    taps = torch.exp(-(torch.arange(-reach, reach + 1) / length).square() / 2)
+    smooth = functional.conv2d(functional.conv2d(noise, taps.view(1, 1, -1, 1)), taps.view(1, 1, 1, -1))
+    return torch.atan2(smooth[:colours, 0], smooth[colours:, 0])

@@ -1,0 +1,115 @@
+"""Where optimisation with the camera begins, what it keeps and how it ends: all by captured errors, colour by colour.
+
+A captured error is one draw of the camera's noise. The least of many is lucky as well as good, so what is kept in the
+end is decided between few holograms with fresh frames.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from .descent import Best
+from .hil.retrieval import matched
+from .wirtinger import Wirtinger
+
+if TYPE_CHECKING:
+    from ..display.workbench import MeteredBench
+
+LEAST_SHARE = 4
+"""Neither the search for a start nor the decision at the end takes more than one capture in so many."""
+
+
+def captured_error(capture: Tensor, target: Tensor) -> Tensor:
+    """Mean squared error ``(C,)`` of a capture ``(C, h, w)``, matched in brightness and clipped as it is scored."""
+    return (matched(capture, target).clamp(0, 1) - target).square().mean((-2, -1))
+
+
+class Camera:
+    """The captures of one image, of which each may improve the hologram that is kept.
+
+    target: ``(C, h, w)`` linear light. fallback: ``(C, H, W)`` [rad], kept until a capture shows a better one.
+    captures: the most to take in all. The bench always knows the hologram of the least captured error so far, so that
+    the display may end the solution at any moment.
+    """
+
+    def __init__(self, bench: MeteredBench, target: Tensor, fallback: Tensor, captures: int) -> None:
+        self.left = captures
+        self._bench, self._target = bench, target
+        self._best = Best(fallback)
+        bench.keep(fallback)
+
+    @property
+    def best(self) -> Tensor:
+        """The phase ``(C, H, W)`` [rad] of the least captured error so far, which may be a lucky one."""
+        return self._best.phase
+
+    def show(self, phase: Tensor, frames: int = 1) -> Tensor:
+        """The mean of so many captures of a phase ``(C, H, W)`` [rad], ``(C, h, w)`` linear light."""
+        capture = torch.stack([self._frame(phase) for _ in range(frames)]).mean(0)
+        error = captured_error(capture, self._target)
+        if bool((error < self._best.loss).any()):
+            self._best.update(error, phase)
+            self._bench.keep(self._best.phase)
+        return capture
+
+    def settle(self, phases: Sequence[Tensor], frames: int) -> Tensor:
+        """The phase ``(C, H, W)`` of least mean error in ``frames`` new captures of each; fewer where fewer are left.
+
+        Without a capture for each it is the best so far.
+        """
+        errors = torch.zeros(len(phases), len(self._target))
+        rounds = min(frames, self.left // len(phases))
+        for _ in range(rounds):
+            errors += torch.stack([captured_error(self._frame(phase), self._target) for phase in phases])
+        if not rounds:
+            return self.best.clone()
+        chosen = errors.argmin(0).tolist()
+        settled = torch.stack([phases[index][colour] for colour, index in enumerate(chosen)])
+        self._bench.keep(settled)
+        return settled
+
+    def _frame(self, phase: Tensor) -> Tensor:
+        capture = self._bench.rectify(self._bench.capture(phase.detach()))
+        self.left -= 1
+        return capture
+
+
+@dataclass(frozen=True)
+class CameraStart:
+    """Holograms that are tried on the display, of which the one with the least captured error goes on.
+
+    converged: Wirtinger holography. early: the same stopped early, with so many constant phases (``offsets``, evenly
+    over 2 pi) added: a panel blurs the wraps of a converged phase, and unmodulated light interferes with the image
+    (Chakravarthula et al. 2020, Eq. 5 and 13), neither of which an ideal image depends on.
+    """
+
+    converged: Wirtinger = Wirtinger()
+    early: Wirtinger = Wirtinger(iterations=8)
+    offsets: Annotated[int, Interval(ge=1, le=64)] = 8
+
+    def nominal(self, target: Tensor, bench: MeteredBench) -> Tensor:
+        """The converged hologram ``(C, H, W)`` [rad] of a target ``(C, h, w)``, made without a capture."""
+        return self.converged.solve(target[None], bench)[0]
+
+    def search(self, target: Tensor, bench: MeteredBench, camera: Camera, nominal: Tensor) -> Tensor:
+        """Show the candidates, the converged one first; the best of each colour, ``(C, H, W)`` [rad]."""
+        offsets = min(self.offsets, camera.left // LEAST_SHARE - 1)
+        if offsets >= 0:
+            camera.show(nominal)
+        if offsets > 0:
+            early = self.early.solve(target[None], bench)[0]
+            for index in range(offsets):
+                camera.show(early + math.tau * index / offsets)
+        return camera.best.clone()
+
+
+def allowed(captures: int, bench: MeteredBench, images: int) -> int:
+    """Captures for each of so many images: as many as the method wants, within what the display allows for all."""
+    return captures if bench.budget is None else min(captures, bench.budget // images)

@@ -1,0 +1,89 @@
+"""Each hologram optimised with the camera: captures in the place of the simulated image, gradients of the ideal model.
+
+Chakravarthula, Tseng, Srivastava, Fuchs & Heide, "Learned hardware-in-the-loop phase retrieval for holographic
+near-eye displays", ACM Trans. Graph. 39(6), 186 (2020), Section 4.5; the camera in the loop of Peng, Choi, Padmanaban
+& Wetzstein, "Neural holography with camera-in-the-loop training", ACM Trans. Graph. 39(6), 185 (2020).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from ..metrics.base import gaussian_blur
+from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
+from .common import unit_field
+from .descent import cosine_decay
+from .hil.retrieval import matched
+
+if TYPE_CHECKING:
+    from ..display.contract import DisplaySpec
+    from ..display.workbench import MeteredBench
+
+MOMENTS = (0.6, 0.99)
+"""Adam's decay rates. Little momentum: the gradient is that of another display."""
+
+
+@dataclass(frozen=True)
+class OnlineCamera:
+    """Adam on the phase for the captured intensity in the region, all colours in one capture.
+
+    captures: in all, for the search of a start (see ``CameraStart``), one or more (``frames``, averaged) for each
+    step, and the decision at the end, which is between the converged Wirtinger hologram, the least captured error and
+    the last phase, with ``checks`` new captures of each. step: Adam's first step [rad], cosine-decayed to zero over
+    the captures, so that camera noise is averaged out. smoothing: width [px] of the Gaussian that the captured error
+    is filtered with: the ideal model knows least about the finest detail.
+
+    Where a display is ideal this is Wirtinger holography with more iterations.
+    """
+
+    captures: Annotated[int, Interval(ge=1, le=100_000)] = 200
+    frames: Annotated[int, Interval(ge=1, le=100)] = 1
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.08
+    smoothing: Annotated[float, Interval(ge=0, le=10)] = 0.7
+    start: CameraStart = CameraStart()
+    checks: Annotated[int, Interval(ge=1, le=100)] = 3
+
+    camera: ClassVar[bool] = True
+    privileged: ClassVar[bool] = False
+
+    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        return torch.stack([self._optimise(image, bench, len(target)) for image in target])
+
+    def _optimise(self, target: Tensor, bench: MeteredBench, images: int) -> Tensor:
+        """One image: target ``(C, h, w)`` to phase ``(C, H, W)``."""
+        nominal = self.start.nominal(target, bench)
+        camera = Camera(bench, target, nominal, allowed(self.captures, bench, images))
+        checks = min(self.checks, camera.left // (3 * LEAST_SHARE))
+        phase = self.start.search(target, bench, camera, nominal)
+        optimiser = torch.optim.Adam([phase], lr=self.step, betas=MOMENTS)
+        steps = (camera.left - 3 * checks) // self.frames
+        for number in range(steps):
+            capture = camera.show(phase, self.frames)
+            phase.grad = self._gradient(phase, capture, target, bench.spec)
+            optimiser.param_groups[0]["lr"] = cosine_decay(self.step, number / steps)
+            optimiser.step()
+        return camera.settle([nominal, camera.best, phase], checks) if checks else camera.best
+
+    def _gradient(self, phase: Tensor, capture: Tensor, target: Tensor, spec: DisplaySpec) -> Tensor:
+        """Slope ``(C, H, W)`` of the squared error of intensity, as ``wirtinger.Objective`` has it.
+
+        The field in the region has the amplitude of the capture and the phase of the ideal model.
+        """
+        image = matched(capture, target)
+        error = image - target
+        if self.smoothing:
+            error = gaussian_blur(error[None], self.smoothing)[0]
+        slope = error * image.clamp_min(0).sqrt()
+        gradients = []
+        for colour, one in enumerate(phase):
+            model, at_panel = spec.propagator(colour), unit_field(one)
+            direction = torch.sgn(spec.region.crop(model.forward(at_panel)))
+            returned = model.adjoint(spec.region.embed(slope[colour] * direction, model.shape))
+            gradients.append((at_panel.conj() * returned).imag)
+        return torch.stack(gradients)
