@@ -29,7 +29,7 @@ class Oracle:
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
-    step: Annotated[float, Interval(gt=0, le=10)] = 0.06
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.12
     start_iterations: Annotated[int, Interval(ge=1, le=100_000)] = 5
 
     camera: ClassVar[bool] = False

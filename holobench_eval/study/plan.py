@@ -233,9 +233,7 @@ class _Ground:
             for target in targets:
                 for repeat in range(self.study.repeats):
                     cells = (
-                        self.cell(
-                            target, place, place.name, repeat, made, _ids(own, place.learned), entry.captures
-                        )
+                        self.cell(target, place, place.name, repeat, made, _ids(own, place.learned), entry.captures)
                         for place in group
                     )
                     yield Task(entry.label, tuple(cells), group, own)

@@ -15,13 +15,12 @@ from ...optics.phasor import phasor
 from ..display_model import DisplayModel
 from ..hil.networks import draw_weights
 from .approximator import ModelApproximator, Rates, start_at_zero
-from .diagnosis import Diagnosed
 from .diagnosis import Diagnosed, diagnose
 from .method import Calibrated
 
 if TYPE_CHECKING:
-    from ...display.estimates import Estimate
     from ...display.contract import DisplaySpec
+    from ...display.estimates import Estimate
 
 
 class FinePanel(DisplayModel):

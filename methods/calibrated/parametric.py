@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, ClassVar
 from ..display_model import DisplayModel
 from .approximator import ModelApproximator, Rates
 from .diagnosis import Diagnosed
-from .diagnosis import Diagnosed
 from .method import Calibrated
 
 if TYPE_CHECKING:

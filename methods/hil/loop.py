@@ -36,7 +36,7 @@ class Rounds:
 
     rounds: Annotated[int, Interval(ge=1, le=100)] = 3
     images: Annotated[int, Interval(ge=1)] | None = None
-    refine_images: Annotated[int, Interval(ge=1)] | None = 6
+    refine_images: Annotated[int, Interval(ge=1)] | None = 4
     steps: Steps = 900
     refine_steps: Steps = 200
     keep_captures: bool = True

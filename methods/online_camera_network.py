@@ -1,0 +1,128 @@
+"""Algorithm 1 for a single image: a network learns the display around one hologram, which is retrieved through it.
+
+Chakravarthula, Tseng, Srivastava, Fuchs & Heide, "Learned hardware-in-the-loop phase retrieval for holographic
+near-eye displays", ACM Trans. Graph. 39(6), 186 (2020), Sections 4.4 and 4.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor, nn
+
+from ..metrics.base import gaussian_blur
+from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
+from .hil.approximator import NetworkApproximator
+from .hil.loop import Sample
+from .hil.networks import Network
+from .hil.objective import Objective
+from .hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+
+if TYPE_CHECKING:
+    from ..display.workbench import MeteredBench
+
+SMOOTHING = 0.7
+"""Width [px] of the Gaussian that what the network misses of the captures is filtered with."""
+
+
+class FromIdentity(nn.Module):
+    """An image and what a network adds to it: nothing at first, since Algorithm 1 begins with D = Id."""
+
+    def __init__(self, network: nn.Module) -> None:
+        super().__init__()
+        self.network = network
+        last = [one for one in network.modules() if isinstance(one, nn.Conv2d | nn.ConvTranspose2d)][-1]
+        nn.init.zeros_(last.weight)
+
+    def forward(self, ideal: Tensor) -> Tensor:
+        """``(B, C, h, w)`` linear light to the same."""
+        added: Tensor = self.network(ideal)
+        return ideal + added
+
+
+@dataclass(frozen=True)
+class ShortRetrieval(SquaredErrorRetrieval):
+    """A short way: what a network learned of one hologram does not hold far from it."""
+
+    iterations: Annotated[int, Interval(ge=0, le=100_000)] = 20
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.01
+
+
+@dataclass(frozen=True)
+class OnlineCameraNetwork:
+    """Rounds of captures, refinement of the image's own network with all of them, and retrieval through it, held.
+
+    captures: the most in all, as in ``OnlineCamera``, whose start, ``checks`` and decision at the end these are too.
+    rounds: K. neighbours: how many holograms near the present one are captured with it in every round, so that the
+    network sees how captures change; they differ from it by normal noise of ``perturbation`` [rad] rms. steps: of the
+    network's training in a round. network, loss: fresh weights for every image; of Eq. 20 the L1 term alone is worth
+    its time in so few steps. retrieval: Eq. 22, of which the squared error alone is used.
+
+    What the network still misses of a round's captures is added to its predictions, so that the retrieval starts from
+    what the camera saw, and only changes are left to the network.
+    """
+
+    captures: Annotated[int, Interval(ge=1, le=100_000)] = 100
+    rounds: Annotated[int, Interval(ge=1, le=10_000)] = 12
+    neighbours: Annotated[int, Interval(ge=0, le=1000)] = 3
+    perturbation: Annotated[float, Interval(gt=0, le=10)] = 0.1
+    steps: Annotated[int, Interval(ge=1, le=1_000_000)] = 30
+    network: Network = Network()
+    loss: Objective | None = Objective(perceptual=0, adversarial=0)
+    retrieval: ShortRetrieval = ShortRetrieval()
+    start: CameraStart = CameraStart()
+    checks: Annotated[int, Interval(ge=1, le=100)] = 3
+
+    camera: ClassVar[bool] = True
+    privileged: ClassVar[bool] = False
+
+    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        check_region(bench.spec.region.shape, self.retrieval)
+        pairs = enumerate(target)
+        return torch.stack([self._optimise(image, bench, len(target), index) for index, image in pairs])
+
+    def _optimise(self, target: Tensor, bench: MeteredBench, images: int, index: int) -> Tensor:
+        """One image: target ``(C, h, w)`` to phase ``(C, H, W)``."""
+        nominal = self.start.nominal(target, bench)
+        camera = Camera(bench, target, nominal, allowed(self.captures, bench, images))
+        checks = min(self.checks, camera.left // (3 * LEAST_SHARE))
+        draw = bench.generator("neighbours", index)
+        approximator, samples = self._fresh(bench, draw), list[Sample]()
+        phase = self.start.search(target, bench, camera, nominal)
+        for number in range(self.rounds):
+            if camera.left - 3 * checks <= self.neighbours:
+                break
+            shown = [phase, *(phase + self.perturbation * noise for noise in self._noise(phase, draw))]
+            fresh = [Sample(one, camera.show(one), target, bench.light) for one in shown]
+            samples += fresh
+            if number == 0:
+                approximator.expose(fresh)
+            for step in range(self.steps):
+                chosen = int(torch.randint(len(samples), (), generator=draw))
+                approximator.step(samples[chosen], step / self.steps)
+            phase = retrieve(corrected(approximator.image(bench.light), fresh), target, phase, self.retrieval)
+        return camera.settle([nominal, camera.best, phase], checks) if checks else camera.best
+
+    def _fresh(self, bench: MeteredBench, draw: torch.Generator) -> NetworkApproximator:
+        """An approximator that has seen nothing; D = Id."""
+        seed = int(torch.randint(2**31, (), generator=draw))
+        approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_judge=False, seed=seed)
+        if self.network.name != "identity":
+            approximator.trainer.generator = FromIdentity(approximator.trainer.generator)
+        return approximator
+
+    def _noise(self, phase: Tensor, draw: torch.Generator) -> Tensor:
+        return torch.randn((self.neighbours, *phase.shape), generator=draw)
+
+
+def corrected(display: Image, samples: Sequence[Sample]) -> Image:
+    """A display as it is predicted, with the mean of what the prediction misses of some captures added."""
+    with torch.no_grad():
+        missed = torch.stack([one.capture - display(one.phase) for one in samples]).mean(0)
+        missed = gaussian_blur(missed[None], SMOOTHING)[0]
+    return lambda phase: display(phase) + missed
