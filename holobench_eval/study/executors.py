@@ -20,7 +20,8 @@ class Executor(Protocol):
     """Runs a function over jobs.
 
     ``map`` takes a job from the iterable when it starts it, and yields (job, result) as results come, in any
-    order; a job whose worker was lost gives the exception instead of a result.
+    order; a job whose worker was lost gives the exception instead of a result. None in the place of a job: the next
+    waits for one that is at work, ask again when a result has been taken.
     """
 
     @property
@@ -28,7 +29,7 @@ class Executor(Protocol):
         """Jobs computed side by side."""
         ...
 
-    def map(self, function: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R | Exception]]:
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results of ``function`` over ``jobs``."""
         ...
 
@@ -39,10 +40,11 @@ class Serial:
 
     workers: int = 1
 
-    def map(self, function: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R | Exception]]:
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results in the order of the jobs."""
         for job in jobs:
-            yield job, function(job)
+            if job is not None:
+                yield job, function(job)
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Local:
 
     workers: int
 
-    def map(self, function: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R | Exception]]:
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results as they come. No more jobs are taken than there are workers."""
         import dask
         from distributed import Client, LocalCluster, as_completed
@@ -75,20 +77,18 @@ class Local:
             running: dict[Any, J] = {}
             completed = as_completed()  # type: ignore[no-untyped-call]
 
-            def start() -> None:
-                for job in waiting:
+            def fill() -> None:
+                while len(running) < self.workers and (job := next(waiting, None)) is not None:
                     future = client.submit(function, job, pure=False)
                     running[future] = job
                     completed.add(future)  # type: ignore[no-untyped-call]
-                    return
 
-            for _ in range(self.workers):
-                start()
+            fill()
             for future in completed:
                 job = running.pop(future)
                 error = future.exception()
                 yield job, error if error is not None else future.result()
-                start()
+                fill()
 
 
 def _bound_to_the_parent() -> Any:

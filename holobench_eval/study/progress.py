@@ -73,22 +73,22 @@ class Follower:
 
 @dataclass
 class Bar:
-    """A bar with the task in work, the cells done, the time left and the number of failures."""
+    """A bar with the task in work, the cells and trainings done, the time left and the number of failures."""
 
     progress: Progress
     bar: TaskID
     failures: int = 0
-    cells: tuple[int, int] = (0, 0)
+    missing: int = 0
     follower: Follower = field(default_factory=lambda: Follower(0.5))
 
     def planned(self, cells: int, missing: int) -> None:
         """Start at the cells that have a record already."""
-        self.cells = (cells, missing)
+        self.missing = missing
         self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
 
     def training(self, names: list[tuple[str, Path]]) -> None:
         """Show what is trained, and follow its log."""
-        self.progress.reset(self.bar, total=len(names), description="training")
+        self.progress.update(self.bar, total=self.missing + len(names), description="training")
         self.follower.start(names, lambda line: self.progress.update(self.bar, description=escape(line)))
 
     def trained(self, name: str, failure: str) -> None:
@@ -96,8 +96,7 @@ class Bar:
         if failure:
             self.progress.console.print(escape(_untrained(name, failure)), style="red", highlight=False, soft_wrap=True)
         self.progress.update(self.bar, advance=1)
-        if self.follower.ended(name):
-            self.planned(*self.cells)
+        self.follower.ended(name)
 
     def started(self, task: Task) -> None:
         """Name the task in work."""
@@ -141,7 +140,7 @@ class Lines:
     def trained(self, name: str, failure: str) -> None:
         """A line for every training that ended."""
         self.write(_untrained(name, failure) if failure else f"trained: {name}")
-        if self.follower.ended(name):
+        if self.follower.ended(name) and not self.done:
             self.begun = self.last = self.clock()
 
     def started(self, task: Task) -> None:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 from . import provenance
 from .artifacts import Artifacts
 from .available import refuse_unavailable
-from .cell import work
 from .executors import Executor
 from .job import Job, Setting
 from .plan import Plan, Task
+from .preparation import Preparation
+from .queue import Made, Step, queue, step
 from .store import Record, Store
-from .training import TrainingJob, train
+from .training import TrainingJob
 
 if TYPE_CHECKING:
     from ..config import Study
@@ -100,9 +101,20 @@ def run(
             retime=retime,
         )
         if missing:  # else no worker need be started
-            prepare(plan, missing, setting, executor, watch)
-            for job, result in executor.map(work, _jobs(plan, missing, setting, watch)):
-                watch.finished(_lost(job, result, store) if isinstance(result, Exception) else result)
+            untrained = _untrained(plan, missing, setting)
+            if untrained:
+                watch.training([(needed.name, Artifacts(artifacts).place(needed)) for needed in untrained])
+            unlearned = {needed.id for needed in untrained}
+            trainings = [TrainingJob(needed, artifacts, threads) for needed in untrained]
+            steps = queue(trainings, _jobs(plan, missing, setting), unlearned)
+            results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, watch))
+            for one, made in results:
+                if isinstance(one, TrainingJob):
+                    reason = made if isinstance(made, str) else Artifacts(artifacts).fail(one.needed, _error(made))
+                    unlearned.discard(one.needed.id)
+                    watch.trained(one.needed.name, reason)
+                else:
+                    watch.finished(made if isinstance(made, list) else _lost(one, _error(made), store))
             described = provenance.end(output, described)
         return Outcome(store.load(plan), described, len(missing))
 
@@ -116,8 +128,8 @@ def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
             store.path(cell.id).unlink(missing_ok=True)
 
 
-def prepare(plan: Plan, missing: frozenset[str], setting: Setting, executor: Executor, watch: Watch) -> None:
-    """Train what missing cells need and is not there; check what is there before anything is computed with it."""
+def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Preparation]:
+    """What missing cells need and is not there; what is there is checked before anything is computed with it."""
     wanted = {identity for cell in plan.cells if cell.id in missing for identity in cell.prepared}
     artifacts, waiting = Artifacts(setting.artifacts), []
     for needed in plan.preparations().values():
@@ -126,22 +138,28 @@ def prepare(plan: Plan, missing: frozenset[str], setting: Setting, executor: Exe
                 artifacts.load(needed)
             else:
                 waiting.append(needed)
-    if not waiting:
-        return
-    watch.training([(needed.name, artifacts.place(needed)) for needed in waiting])
-    jobs = (TrainingJob(needed, setting.artifacts, setting.threads) for needed in waiting)
-    for job, failure in executor.map(train, jobs):
-        reason = artifacts.fail(job.needed, failure) if isinstance(failure, Exception) else failure
-        watch.trained(job.needed.name, reason)
+    return waiting
 
 
-def _jobs(plan: Plan, missing: frozenset[str], setting: Setting, watch: Watch) -> Iterator[Job]:
-    """The tasks with missing cells; the watch is told of each when an executor takes it."""
+def _jobs(plan: Plan, missing: frozenset[str], setting: Setting) -> Iterator[Job]:
+    """The tasks with missing cells."""
     for task in plan.tasks:
         wanted = missing.intersection(cell.id for cell in task.cells)
         if wanted:
-            watch.started(task)
             yield Job(task, wanted, setting)
+
+
+def _told(steps: Iterator[Step | None], watch: Watch) -> Iterator[Step | None]:
+    """The same steps; the watch is told of each task when an executor takes it."""
+    for one in steps:
+        if isinstance(one, Job):
+            watch.started(one.task)
+        yield one
+
+
+def _error(made: Made | Exception) -> Exception:
+    """What is neither of the two results is an error."""
+    return made if isinstance(made, Exception) else TypeError(f"a worker returned {type(made).__name__}")
 
 
 def _lost(job: Job, error: Exception, store: Store) -> list[Record]:

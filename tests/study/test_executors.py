@@ -21,7 +21,7 @@ def compute(config: Path, output: Path, chosen: Executor) -> list[dict[str, Any]
 
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{**record, "seconds": None} for record in records]
+    return [{**record, "seconds": None, "memory_mib": None} for record in records]
 
 
 @pytest.mark.slow
@@ -31,7 +31,7 @@ def test_worker_processes_give_what_one_process_gives_but_for_the_cell_of_a_lost
 ) -> None:
     config = write_config(tmp_path)
     serial = compute(config, tmp_path / "serial", Serial())
-    monkeypatch.setattr(running, "work", lose_a_worker)
+    monkeypatch.setattr(running, "step", lose_a_worker)
     local = compute(config, tmp_path / "local", Local(2))
     lost = [record["state"] == "failed" for record in local]
     assert [record["cell"]["target"] for record, gone in zip(local, lost, strict=True) if gone] == ["gray 1"]

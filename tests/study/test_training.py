@@ -22,7 +22,7 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Follower, Lines
 from holobench_eval.study.run import run
 from holobench_eval.study.store import TEMPORARY
-from holobench_eval.study.training import train
+from holobench_eval.study.training import TrainingJob
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
@@ -113,7 +113,7 @@ def test_a_lost_worker_is_the_reason_of_a_training_that_fails(tmp_path: Path) ->
     class Losing(Serial):
         def map(self, function: Any, jobs: Any) -> Any:
             for job in jobs:
-                yield job, ConnectionError("the worker\n is gone") if function is train else function(job)
+                yield job, ConnectionError("the worker\n is gone") if isinstance(job, TrainingJob) else function(job)
 
     study = load_study(write(tmp_path))
     watch = Lines(lambda line: None)

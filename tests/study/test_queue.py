@@ -1,0 +1,49 @@
+"""The order in which trainings and cells are taken up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from holobench_eval.study.queue import queue
+
+
+@dataclass(frozen=True)
+class FakeCell:
+    prepared: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FakeJob:
+    name: str
+    needs: tuple[str, ...] = ()
+
+    @property
+    def cells(self) -> list[tuple[FakeCell, None]]:
+        return [(FakeCell(self.needs), None)]
+
+
+JOBS: Any = [FakeJob("a", ("one",)), FakeJob("b"), FakeJob("c", ("two",)), FakeJob("d", ("one", "two"))]
+TRAININGS: Any = ["one", "two"]
+
+
+def test_cells_that_wait_for_nothing_come_right_after_the_trainings() -> None:
+    steps = queue(TRAININGS, JOBS, {"one", "two"})
+    assert [next(steps) for _ in range(3)] == ["one", "two", JOBS[1]]
+
+
+def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_none_is_lost() -> None:
+    unlearned = {"one", "two"}
+    steps = queue(TRAININGS, JOBS, unlearned)
+    assert [next(steps) for _ in range(3)][-1] is JOBS[1]
+    assert next(steps) is None
+    unlearned.discard("two")
+    assert next(steps) is JOBS[2]
+    assert next(steps) is None
+    assert next(steps) is None
+    unlearned.discard("one")
+    assert list(steps) == [JOBS[0], JOBS[3]]
+
+
+def test_without_trainings_cells_keep_the_order_of_the_plan() -> None:
+    assert list(queue([], JOBS, set())) == JOBS
