@@ -38,7 +38,7 @@ class OnlineCamera:
     the captures, so that camera noise is averaged out. smoothing: width [px] of the Gaussian that the captured error
     is filtered with: the ideal model knows least about the finest detail.
 
-    Where a display is ideal this is Wirtinger holography with more iterations.
+    On an ideal display, and without smoothing, this is Wirtinger holography with more iterations.
     """
 
     captures: Annotated[int, Interval(ge=1, le=100_000)] = 200

@@ -67,10 +67,10 @@ class OnlineCameraNetwork:
     """
 
     captures: Annotated[int, Interval(ge=1, le=100_000)] = 100
-    rounds: Annotated[int, Interval(ge=1, le=10_000)] = 12
+    rounds: Annotated[int, Interval(ge=1, le=10_000)] = 18
     neighbours: Annotated[int, Interval(ge=0, le=1000)] = 3
     perturbation: Annotated[float, Interval(gt=0, le=10)] = 0.1
-    steps: Annotated[int, Interval(ge=1, le=1_000_000)] = 30
+    steps: Annotated[int, Interval(ge=1, le=1_000_000)] = 12
     network: Network = Network()
     loss: Objective | None = Objective(perceptual=0, adversarial=0)
     retrieval: ShortRetrieval = ShortRetrieval()

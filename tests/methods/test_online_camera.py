@@ -1,0 +1,159 @@
+from itertools import pairwise
+
+import pytest
+import torch
+from toy_camera import SPEC, Plug, ToyDisplay, picture
+
+from holobench_eval.methods.camera_start import Camera, CameraStart, captured_error
+from holobench_eval.methods.losses import intensity_l2
+from holobench_eval.methods.online_camera import OnlineCamera
+from holobench_eval.methods.wirtinger import Objective, Wirtinger
+from holobench_eval.study.contract import check_method
+
+FAULTY = {"aberration": 0.6, "unmodulated": 0.3}
+QUICK = CameraStart(converged=Wirtinger(iterations=60))
+
+
+def solved(display, target, budget=None, **params):
+    method = OnlineCamera(start=QUICK, **params)
+    handle = display.handle(method, target, budget)
+    return method.solve(target[None], handle)[0], handle
+
+
+def nominal(display, target):
+    return QUICK.nominal(target, display.handle(object(), target))
+
+
+def test_captures_correct_what_the_nominal_model_does_not_know():
+    display, target = ToyDisplay(**FAULTY, noise=0.01), picture()
+    phase, _ = solved(display, target, captures=100)
+    assert (display.error(phase, target) < 0.5 * display.error(nominal(display, target), target)).all()
+
+
+def test_on_an_ideal_display_it_is_wirtinger_holography_or_better():
+    display, target = ToyDisplay(), picture()
+    phase, _ = solved(display, target, captures=60)
+    assert (display.error(phase, target) <= display.error(nominal(display, target), target)).all()
+
+
+@pytest.mark.parametrize("faults", [{}, FAULTY])
+def test_strong_noise_does_not_make_it_worse_than_wirtinger_holography(faults):
+    display, target = ToyDisplay(**faults, noise=0.3), picture()
+    phase, _ = solved(display, target, captures=60)
+    assert (display.scored(phase, target) < 1.02 * display.scored(nominal(display, target), target)).all()
+
+
+def test_its_gradient_is_the_wirtinger_gradient_where_the_display_is_ideal():
+    display, target = ToyDisplay(), picture()
+    method, phase = OnlineCamera(smoothing=0), Wirtinger(iterations=5).solve(picture()[None], display.handle(0, target))
+    gradient = method._gradient(phase[0], display.image(phase[0]), target, SPEC)
+    for colour, found in enumerate(gradient):
+        objective = Objective(SPEC.propagator(colour), SPEC.region, target[colour][None], intensity_l2)
+        _, wanted = objective.evaluate(phase[:, colour])
+        assert torch.cosine_similarity(found.flatten(), wanted.flatten(), dim=0) > 0.9999
+
+
+@pytest.mark.parametrize("captures", [1, 3, 9, 20, 37])
+def test_it_stops_at_its_captures(captures):
+    display, target = ToyDisplay(**FAULTY), picture()
+    phase, handle = solved(display, target, captures=captures)
+    assert captures - 3 < handle.captures <= captures
+    assert phase.isfinite().all()
+
+
+def test_its_schedule_is_planned_for_the_budget_of_the_display():
+    display, target = ToyDisplay(**FAULTY, noise=0.01), picture()
+    within, handle = solved(display, target, budget=30, captures=200)
+    assert handle.captures == 30
+    assert torch.equal(within, solved(display, target, captures=30)[0])
+
+
+def test_frames_are_averaged_within_the_same_captures():
+    display, target = ToyDisplay(**FAULTY, noise=0.1), picture()
+    _, handle = solved(display, target, captures=50, frames=4)
+    assert 46 < handle.captures <= 50
+
+
+def test_a_batch_shares_the_budget():
+    display, targets = ToyDisplay(**FAULTY), torch.stack([picture(), picture(1)])
+    handle = display.handle(method := OnlineCamera(start=QUICK), targets[0], 41)
+    assert method.solve(targets, handle).shape == (2, 2, *SPEC.shape)
+    assert handle.captures == 40
+
+
+@pytest.mark.parametrize("at", [0, 1, 5, 12, 30, 39])
+def test_a_display_that_ends_the_captures_has_a_hologram_as_good_as_the_nominal_one(at):
+    display, target = ToyDisplay(**FAULTY), picture()
+    method = OnlineCamera(start=QUICK, captures=40)
+    plug = Plug(display.handle(method, target), at)
+    with pytest.raises(Exception, match="plug pulled"):
+        method.solve(target[None], plug)
+    assert (display.error(plug.kept, target) <= display.error(nominal(display, target), target)).all()
+
+
+def test_what_is_handed_in_gets_better_every_time(monkeypatch):
+    display, target, errors = ToyDisplay(**FAULTY), picture(), []
+    handle = display.handle(method := OnlineCamera(start=QUICK, captures=40), target)
+    monkeypatch.setattr(handle, "keep", lambda phase: errors.append(display.error(phase, target)))
+    method.solve(target[None], handle)
+    assert len(errors) > 5
+    assert all((later <= earlier + 1e-7).all() for earlier, later in pairwise(errors))
+
+
+def test_each_colour_keeps_its_own_best():
+    display, target = ToyDisplay(), picture()
+    good = nominal(display, target)
+    halves = [torch.stack([good[0], torch.zeros(SPEC.shape)]), torch.stack([torch.zeros(SPEC.shape), good[1]])]
+    camera = Camera(display.handle(OnlineCamera(), target), target, halves[0], 10)
+    for half in halves:
+        camera.show(half)
+    assert torch.equal(camera.best, good)
+    assert torch.equal(camera.settle(halves, 2), good)
+
+
+class Lucky(ToyDisplay):
+    """The first frame is without noise, and all later ones are not."""
+
+    def session(self, names, target):
+        return self
+
+    def capture(self, phase):
+        capture = super().capture(phase)
+        self.noise = 2.0
+        return capture
+
+
+def test_a_lucky_draw_is_found_out_by_fresh_frames():
+    display, target = Lucky(), picture()
+    good = nominal(display, target)
+    poor = good + 0.3 * torch.randn(good.shape, generator=torch.Generator().manual_seed(0))
+    camera = Camera(display.handle(OnlineCamera(), target), target, good, 20)
+    camera.show(poor)
+    camera.show(good)
+    assert torch.equal(camera.best, poor)
+    assert torch.equal(camera.settle([poor, good], 8), good)
+
+
+def test_the_start_has_the_offset_at_which_unmodulated_light_does_least_harm():
+    display, target = ToyDisplay(unmodulated=0.4), picture()
+    handle = display.handle(OnlineCamera(), target)
+    camera = Camera(handle, target, nominal(display, target), 200)
+    start = QUICK.search(target, handle, camera, nominal(display, target))
+    early = QUICK.early.solve(target[None], handle)[0]
+    tried = torch.stack([display.error(early + k * torch.pi / 4, target) for k in range(8)])
+    assert torch.allclose(display.error(start, target), tried.amin(0), rtol=1e-3)
+    assert (tried.amax(0) > 1.2 * tried.amin(0)).all()
+
+
+def test_the_captured_error_is_the_one_that_is_scored():
+    target = picture()
+    assert float(captured_error(3 * target, target).max()) < 1e-12
+    bright = target.clone()
+    bright[:, 20, 20] = 50
+    factor = (bright * target).sum((1, 2), True) / bright.square().sum((1, 2), True)
+    wanted = ((factor * bright).clamp(0, 1) - target).square().mean((1, 2))
+    assert torch.allclose(captured_error(bright, target), wanted)
+
+
+def test_it_keeps_the_contract_of_methods():
+    check_method(OnlineCamera(captures=16, start=CameraStart(converged=Wirtinger(iterations=12), offsets=2)))
