@@ -229,6 +229,7 @@ class MeteredBench:
         self._learned = learned
         self._captures = 0
         self._kept: Tensor | None = None
+        self._over = ""
 
     @property
     def spec(self) -> DisplaySpec:
@@ -249,6 +250,11 @@ class MeteredBench:
     def kept(self) -> Tensor | None:
         """The best hologram so far, ``(C, H, W)`` [rad]: what the display scores if the budget ends. See ``keep``."""
         return self._kept
+
+    @property
+    def over(self) -> str:
+        """Why the display refused a capture, empty if it refused none."""
+        return self._over
 
     @property
     def learned(self) -> Mapping[str, Any]:
@@ -282,7 +288,8 @@ class MeteredBench:
         if not self._camera:
             raise CellError(f"{self._label} took a capture, but declares no camera (camera = True)")
         if self._budget is not None and self._captures >= self._budget:
-            raise BudgetError(f"{self._label} has used its {self._budget} captures")
+            self._over = f"{self._label} has used its {self._budget} captures"
+            raise BudgetError(self._over)
         check_phase(phase, self.spec, self._label)
         self._captures += 1
         return self._session.capture(phase)

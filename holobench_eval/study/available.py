@@ -20,18 +20,30 @@ def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> Non
     """
     seen: set[str] = set()
     for task in plan.tasks:
-        cell = task.cells[0]
         if task.is_floor or not missing.intersection(one.id for one in task.cells):
             continue
-        made = canonical([cell.method, dict(cell.params)])
-        if made not in seen:
-            seen.add(made)
-            reason = _reason(cell, folder)
-            if reason is not None:
-                raise UserError(f"method '{cell.method}' cannot run here: {reason}")
+        for name, params in _used(task.cells[0]):
+            made = canonical([name, params])
+            if made not in seen:
+                seen.add(made)
+                reason = _reason(name, params, folder)
+                if reason is not None:
+                    raise UserError(f"method '{name}' cannot run here: {reason}")
 
 
-def _reason(cell: Cell, folder: Path) -> str | None:
-    method: Any = registry.build("methods", cell.method, dict(cell.params), folder)
-    reason: str | None = method.available() if hasattr(method, "available") else None
+def _used(cell: Cell) -> list[tuple[str, dict[str, Any]]]:
+    """Names and parameters of a cell's method and of the one whose holograms it predicts."""
+    used = [(cell.method, dict(cell.params))]
+    return [*used, (cell.holograms["name"], dict(cell.holograms["params"]))] if cell.holograms else used
+
+
+def _reason(name: str, params: dict[str, Any], folder: Path) -> str | None:
+    method: Any = registry.build("methods", name, params, folder)
+    ask = getattr(method, "available", None)
+    if not callable(ask):
+        return None
+    try:
+        reason: str | None = ask()
+    except Exception as error:  # a stranger's code
+        return " ".join(f"{type(error).__name__}: {error}".split())[:300]
     return reason

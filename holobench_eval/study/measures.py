@@ -81,13 +81,17 @@ def picture(job: Job) -> Measure:
 
 
 def _within_budget(method: Any, target: Tensor, handle: MeteredBench) -> tuple[Any, str]:
-    """What ``solve`` returns and an empty line; its best hologram so far and why, if the display ended its captures."""
+    """What ``solve`` returns and an empty line; its best hologram so far and why, if the display ended its captures,
+    whatever the method made of that."""
+    solved = None
     try:
-        return method.solve(target, handle), ""
-    except BudgetError as over:
-        if handle.kept is None:
+        solved = method.solve(target, handle)
+    except BudgetError:
+        if not handle.over or handle.kept is None:
             raise
-        return handle.kept[None], str(over)
+    if handle.over and handle.kept is not None:
+        solved = handle.kept[None]
+    return solved, handle.over
 
 
 def prediction(job: Job) -> Measure:
@@ -104,7 +108,13 @@ def prediction(job: Job) -> Measure:
     _refuse_saturated(shot)
     wanted, factors = match(shot.image, target)
     handle = workbench(place, cell.seed).for_method(
-        method, task.label, target, item=cell.target, repeat=cell.repeat, learned=learned.state if learned else None
+        method,
+        task.label,
+        target,
+        item=cell.target,
+        repeat=cell.repeat,
+        budget=0,  # the capture is what is to be predicted
+        learned=learned.state if learned else None,
     )
     watch = effort.start()
     predicted = method.predict(phase[None].clone(), handle)

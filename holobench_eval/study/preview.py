@@ -99,7 +99,7 @@ def training_table(rows: list[TrainingRow]) -> Table:
 
 def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int) -> list[Row]:
     """A row per method, the floor first."""
-    limits = {entry.label: entry.params.get("captures") for entry in study.methods}
+    limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     labels = dict.fromkeys(task.label for task in plan.tasks)
     return [
         _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, threads, workers)

@@ -52,12 +52,11 @@ class Follower:
         self.done.clear()
         threading.Thread(target=self._follow, args=(tell,), daemon=True).start()
 
-    def ended(self, name: str) -> bool:
-        """Follow this one no more; whether it was the last."""
+    def ended(self, name: str) -> None:
+        """Follow this one no more."""
         self.places.pop(name, None)
         if not self.places:
             self.done.set()
-        return not self.places
 
     def _follow(self, tell: Callable[[str], object]) -> None:
         while not self.done.wait(self.seconds):
@@ -121,11 +120,11 @@ class Lines:
     done: int = 0
     failures: int = 0
     follower: Follower = field(default_factory=lambda: Follower(15.0))
-    begun: float = field(init=False)
+    begun: float | None = field(default=None, init=False)
     last: float = field(init=False)
 
     def __post_init__(self) -> None:
-        self.begun = self.last = self.clock()
+        self.last = self.clock()
 
     def planned(self, cells: int, missing: int) -> None:
         """Say what there is to do."""
@@ -140,12 +139,12 @@ class Lines:
     def trained(self, name: str, failure: str) -> None:
         """A line for every training that ended."""
         self.write(_untrained(name, failure) if failure else f"trained: {name}")
-        if self.follower.ended(name) and not self.done:
-            self.begun = self.last = self.clock()
+        self.follower.ended(name)
 
     def started(self, task: Task) -> None:
         """Name the task in work, if the last line is old enough."""
         now = self.clock()
+        self.begun = now if self.begun is None else self.begun
         if now - self.last >= SECONDS_BETWEEN_LINES:
             self.last = now
             self.write(f"{self.done}/{self.total} cells, {self.failures} failed{self._left(now)}; now {_name(task)}")
@@ -159,7 +158,7 @@ class Lines:
                 self.write(_failure(record))
 
     def _left(self, now: float) -> str:
-        if not self.done:
+        if not self.done or self.begun is None:
             return ""
         return f", about {(now - self.begun) / self.done * (self.total - self.done):.0f} s left"
 

@@ -82,6 +82,7 @@ def run(
     store = Store(output)
     with store.locked():
         if retrain:
+            refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
             forget(plan, store, Artifacts(artifacts))
         missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed))
         refuse_unavailable(plan, missing, study.folder)

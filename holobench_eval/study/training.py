@@ -74,18 +74,21 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
     artifacts.write(needed, state, facts | diagnosis(method, state, place))
 
 
-def diagnosis(method: object, state: Mapping[str, Any], place: Workbench) -> dict[str, list[Any]]:
+def diagnosis(method: object, state: Mapping[str, Any], place: Workbench) -> dict[str, Any]:
     """What a method says of the display it learned, beside the truth, for methods that say something.
 
     estimates: see ``display.estimates.joined``; missing: effects of the bench that the form of the method's model has
-    no term for, each in words, if the method says what its ``form`` is.
+    no term for, each in words, if the method says what its ``form`` is; diagnosis_failed: why there is neither.
     """
     estimates, form = getattr(method, "estimates", None), getattr(method, "form", None)
-    found: dict[str, list[Any]] = {}
-    if estimates is not None:
-        found["estimates"] = joined(estimates(state, place.spec), truth(place.bench))
-    if form is not None:
-        found["missing"] = [one.text for one in effects(place.bench.profile) if one.name not in form]
+    found: dict[str, Any] = {}
+    try:
+        if estimates is not None:
+            found["estimates"] = joined(estimates(state, place.spec), truth(place.bench))
+        if form is not None:
+            found["missing"] = [one.text for one in effects(place.bench.profile) if one.name not in form]
+    except Exception as error:  # must not cost what was learned
+        found["diagnosis_failed"] = " ".join(f"{type(error).__name__}: {error}".split())[:300]
     return found
 
 

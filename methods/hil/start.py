@@ -9,6 +9,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ...errors import UserError
 from ..common import Bench
 from ..wirtinger import Wirtinger
 
@@ -30,6 +31,12 @@ class SmoothStart(Wirtinger):
 
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        if self.tolerance and (self.optimiser, self.loss) != ("adam", "intensity_l2"):
+            raise UserError(
+                "start: a tolerance is of the loss intensity_l2 and needs the optimiser adam; or set it to 0"
+            )
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]; each image has its own last iteration."""

@@ -17,5 +17,5 @@ def load(module: str) -> Any:
         if error.name != package:
             raise UserError(f"{package} cannot be imported: {error}") from error
         raise UserError(f"{package} is not installed; pip install 'holobench_eval[peers]'") from error
-    except ImportError as error:
+    except Exception as error:  # whatever a package does when it meets another version of what it needs
         raise UserError(f"{package} cannot be imported: {error}") from error

@@ -56,6 +56,35 @@ class Modest:
         for _ in range(bench.budget or 1):
             bench.capture(phase[0])
         return phase
+
+
+@dataclass(frozen=True)
+class Deaf:
+    \"\"\"Goes on after the display has ended it; hands in a phase of 2 and returns one of 9.\"\"\"
+
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        phase = torch.full((*target.shape[:2], *bench.spec.shape), 2.0)
+        bench.keep(phase)
+        try:
+            while True:
+                bench.capture(phase[0])
+        except Exception:
+            return phase.fill_(9.0)
+
+
+@dataclass(frozen=True)
+class Lying:
+    \"\"\"Says of itself that the display has ended it.\"\"\"
+
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        from holobench_eval.errors import BudgetError
+
+        bench.keep(torch.zeros(target.shape[1], *bench.spec.shape))
+        raise BudgetError("the best of all methods")
 """
 
 
@@ -77,6 +106,17 @@ def test_a_method_over_its_budget_is_stopped_and_its_best_hologram_so_far_is_sco
     assert greedy["stopped"] == "Greedy has used its 3 captures"
     assert greedy["scores"] == modest["scores"]
     assert (modest["captures"], modest["stopped"]) == (3, "")
+
+
+def test_a_method_that_does_not_heed_the_end_of_its_budget_is_stopped_all_the_same(tmp_path: Path) -> None:
+    deaf, modest = records(study_of(tmp_path, "Deaf, captures: 3", "Modest, captures: 3"), tmp_path / "out")
+    assert (deaf["stopped"], deaf["captures"]) == ("Deaf has used its 3 captures", 3)
+    assert deaf["scores"] == modest["scores"]
+
+
+def test_only_the_display_ends_a_budget(tmp_path: Path) -> None:
+    (record,) = records(study_of(tmp_path, "Lying"), tmp_path / "out")
+    assert (record["state"], record.get("stopped", "")) == ("failed", "")
 
 
 def test_a_method_that_kept_nothing_fails_when_its_budget_ends(tmp_path: Path) -> None:

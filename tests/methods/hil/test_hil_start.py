@@ -6,8 +6,10 @@ import pytest
 import torch
 from torch import Tensor
 
+from holobench_eval import registry
 from holobench_eval.display import load_profile, open_bench
 from holobench_eval.display.workbench import MeteredBench
+from holobench_eval.errors import UserError
 from holobench_eval.methods.hil.start import SmoothStart
 from holobench_eval.methods.losses import intensity_l2
 from holobench_eval.methods.wirtinger import Wirtinger
@@ -70,3 +72,9 @@ def test_tolerance_zero_is_wirtinger_holography(bench: MeteredBench) -> None:
     assert torch.equal(
         SmoothStart(iterations=6, tolerance=0).solve(target, bench), Wirtinger(iterations=6).solve(target, bench)
     )
+
+
+@pytest.mark.parametrize("other", [{"optimiser": "lbfgs"}, {"loss": "amplitude_l2"}])
+def test_a_tolerance_that_would_not_be_heeded_is_refused(other: dict[str, str]) -> None:
+    with pytest.raises(UserError, match="set it to 0"):
+        registry.build("methods", "hil", {"start": {"tolerance": 0.1, **other}})
