@@ -13,10 +13,10 @@ from torch import Tensor, nn
 from ... import seeds
 from ...optics.phasor import phasor
 from ..display_model import DisplayModel
-from ..hil.networks import draw_weights
-from .approximator import ModelApproximator, Rates, start_at_zero
+from .approximator import ModelApproximator, Rates
 from .diagnosis import Diagnosed, diagnose
 from .method import Calibrated
+from .networks import ColourByColour
 
 if TYPE_CHECKING:
     from ...display.contract import DisplaySpec
@@ -39,25 +39,16 @@ class FinePanel(DisplayModel):
 
 
 class Residual(nn.Module):
-    """Three convolutions at full resolution, of what is there and where it is.
-
-    Intensity, real and imaginary part ``(1, 3 C, h, w)`` to what is added to the intensity, ``(1, C, h, w)``. The
-    position, -1 to 1 on both axes, is given too: a camera's shading depends on it, and convolutions do not know it.
-    """
+    """Intensity, real and imaginary part ``(1, 3 C, h, w)`` to what is added to the intensity, ``(1, C, h, w)``."""
 
     def __init__(self, colours: int, width: int) -> None:
         super().__init__()
-        layers = [nn.Conv2d(3 * colours + 2, width, 3, padding=1), nn.ReLU()]
-        layers += [nn.Conv2d(width, width, 3, padding=1), nn.ReLU(), nn.Conv2d(width, colours, 3, padding=1)]
-        self.layers = start_at_zero(draw_weights(nn.Sequential(*layers), None))
+        self.network = ColourByColour(colours, 3, 1, width)
 
     def forward(self, seen: Tensor) -> Tensor:
         """See the class."""
-        height, width = seen.shape[-2:]
-        rows = torch.linspace(-1, 1, height).view(1, 1, -1, 1).expand(1, 1, height, width)
-        columns = torch.linspace(-1, 1, width).view(1, 1, 1, -1).expand(1, 1, height, width)
-        added: Tensor = self.layers(torch.cat([seen, rows, columns], 1).contiguous(memory_format=torch.channels_last))
-        return added
+        added: Tensor = self.network(seen.view(3, -1, *seen.shape[-2:]).transpose(0, 1))
+        return added.transpose(0, 1)
 
 
 @dataclass(frozen=True)

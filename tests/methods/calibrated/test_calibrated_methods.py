@@ -48,7 +48,7 @@ SHORT: dict[str, Any] = {
 METHODS: dict[str, Calibrated] = {
     "parametric_model": ParametricModel(**SHORT),
     "learned_kernel": LearnedKernel(**SHORT),
-    "cnn_prop_cnn": CNNPropCNN(levels=2, width=3, **SHORT),
+    "cnn_prop_cnn": CNNPropCNN(width=3, **SHORT),
     "hybrid_model": HybridModel(width=4, **SHORT),
 }
 names = pytest.mark.parametrize("name", METHODS)
@@ -258,7 +258,7 @@ def test_a_trained_method_says_so_and_has_neither_camera_nor_privilege(name: str
         ("parametric_model", {"patterns": -1}, "patterns"),
         ("parametric_model", {"search": {"adversarial": 0.5}}, "adversarial"),
         ("hybrid_model", {"width": 1}, "width"),
-        ("cnn_prop_cnn", {"levels": 0}, "levels"),
+        ("cnn_prop_cnn", {"width": 0}, "width"),
         ("learned_kernel", {"kernel": 3}, "kernel"),
         ("learned_kernel", {"training": {"step": 3}}, "steps"),
     ],

@@ -14,8 +14,9 @@ from holobench_eval.display.contract import DisplaySpec
 from holobench_eval.display.workbench import concentration
 from holobench_eval.methods.calibrated.approximator import ModelApproximator
 from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
-from holobench_eval.methods.calibrated.hybrid import HybridModel, Residual
+from holobench_eval.methods.calibrated.hybrid import HybridModel
 from holobench_eval.methods.calibrated.kernel import LearnedKernel
+from holobench_eval.methods.calibrated.networks import ColourByColour
 from holobench_eval.methods.calibrated.parametric import ParametricModel
 from holobench_eval.methods.calibrated.patterns import random_phase
 from holobench_eval.methods.hil.loop import Sample
@@ -105,11 +106,17 @@ def test_a_model_of_the_panel_learns_what_a_kernel_cannot(
     assert error(approximator, unseen) < part * error(kernel, unseen)
 
 
-def test_a_residual_sees_where_it_is() -> None:
-    residual = Residual(1, 4)
-    torch.nn.init.ones_(residual.layers[-1].weight)  # type: ignore[arg-type]
-    added = residual(torch.ones(1, 3, 20, 30))[0, 0, 3:-3, 3:-3].detach()
-    assert added.std() > 0
+def test_a_network_sees_where_it_is_and_no_colour_but_its_own() -> None:
+    network = ColourByColour(2, 3, 1, 4)
+    torch.nn.init.ones_(network.layers[-1].weight)  # type: ignore[arg-type]
+    seen = torch.ones(2, 3, 20, 30)
+    answer = network(seen).detach()
+    assert answer.shape == (2, 1, 20, 30)
+    assert answer[0, 0, 3:-3, 3:-3].std() > 0
+    seen[1, :, 5:9] = 2
+    changed = network(seen).detach()
+    assert torch.equal(changed[0], answer[0])
+    assert not torch.equal(changed[1], answer[1])
 
 
 def test_a_held_display_is_not_moved_by_later_steps() -> None:

@@ -1,0 +1,37 @@
+"""The small network of the methods that calibrate one."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+
+from ..hil.networks import draw_weights
+from .approximator import start_at_zero
+
+
+class ColourByColour(nn.Module):
+    """Three convolutions of 3 x 3 px at full resolution with ReLU between them, for each colour weights of its own.
+
+    Images ``(C, inputs, h, w)`` to ``(C, outputs, h, w)``, zeros before it has learned. The position, -1 to 1 on both
+    axes, is given too: illumination and shading depend on it, and convolutions do not know it. width: features a
+    colour.
+    """
+
+    def __init__(self, colours: int, inputs: int, outputs: int, width: int) -> None:
+        super().__init__()
+        features = [colours * count for count in (inputs + 2, width, width, outputs)]
+        first, second, last = (
+            nn.Conv2d(before, after, 3, padding=1, groups=colours) for before, after in pairwise(features)
+        )
+        self.layers = start_at_zero(draw_weights(nn.Sequential(first, nn.ReLU(), second, nn.ReLU(), last), None))
+
+    def forward(self, seen: Tensor) -> Tensor:
+        """See the class."""
+        colours, _, height, width = seen.shape
+        rows = torch.linspace(-1, 1, height).view(1, 1, -1, 1).expand(colours, 1, height, width)
+        columns = torch.linspace(-1, 1, width).view(1, 1, 1, -1).expand(colours, 1, height, width)
+        placed = torch.cat([seen, rows, columns], 1).flatten(0, 1)[None]
+        answer: Tensor = self.layers(placed.contiguous(memory_format=torch.channels_last))
+        return answer.view(colours, -1, height, width)
