@@ -208,8 +208,10 @@ def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_p
     tells("one: round 0, step 10, fidelity 20.5")
     time.sleep(0.05)
     assert len(told) == 3
-    assert not follower.ended("one")
-    assert follower.ended("two")
+    follower.ended("one")
+    assert not follower.done.is_set()
+    follower.ended("two")
+    assert follower.done.is_set()
 
 
 def test_a_run_says_what_it_trains_and_when_it_has(tmp_path: Path) -> None:
