@@ -7,6 +7,7 @@ tell look-up table, phase gain, crosstalk, unmodulated light and aberrations apa
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -32,7 +33,7 @@ def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
     samples = []
     for number in range(count):
         image = TrainingImage(f"pattern-{number:02d}", gray)
-        made = bench.kept(f"pattern {number}", lambda number=number, image=image: _shown(bench, number, image))
+        made = bench.kept(f"pattern {number}", partial(_shown, bench, number, image))
         samples.append(Sample(made["phase"], made["capture"], gray, bench.light(image)))
     return samples
 
