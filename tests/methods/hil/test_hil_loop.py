@@ -123,7 +123,9 @@ def test_a_round_learns_from_all_captures_so_far_or_from_its_own(keep_captures: 
 def test_samples_from_before_are_learned_from_in_every_round(keep_captures: bool) -> None:
     memory = Memory()
     bench, approximator = training_bench(SPEC, memory), Scale(memory.fate)
-    earlier = [Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (5.0, 6.0)]
+    earlier = [
+        Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (5.0, 6.0)
+    ]
     rounds = Rounds(2, refine_images=1, steps=5, refine_steps=10, keep_captures=keep_captures)
     train_in_the_loop(bench, approximator, begin, search, rounds, earlier)
     assert approximator.exposed == [5]
