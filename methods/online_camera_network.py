@@ -56,18 +56,17 @@ class ShortRetrieval(SquaredErrorRetrieval):
 class OnlineCameraNetwork:
     """Rounds of captures, refinement of the image's own network with all of them, and retrieval through it, held.
 
-    captures: the most in all, as in ``OnlineCamera``, whose start, ``checks`` and decision at the end these are too.
-    rounds: K. neighbours: how many holograms near the present one are captured with it in every round, so that the
-    network sees how captures change; they differ from it by normal noise of ``perturbation`` [rad] rms. steps: of the
-    network's training in a round. network, loss: fresh weights for every image; of Eq. 20 the L1 term alone is worth
-    its time in so few steps. retrieval: Eq. 22, of which the squared error alone is used.
+    captures: in all, as in ``OnlineCamera``, whose start, ``checks`` and decision at the end these are too; there are as
+    many rounds as they are enough for. neighbours: how many holograms near the present one are captured with it in
+    every round, so that the network sees how captures change; they differ from it by normal noise of ``perturbation``
+    [rad] rms. steps: of the network's training in a round. network, loss: fresh weights for every image; of Eq. 20 the
+    L1 term alone is worth its time in so few steps. retrieval: Eq. 22, of which the squared error alone is used.
 
     What the network still misses of a round's captures is added to its predictions, so that the retrieval starts from
     what the camera saw, and only changes are left to the network.
     """
 
     captures: Annotated[int, Interval(ge=1, le=100_000)] = 100
-    rounds: Annotated[int, Interval(ge=1, le=10_000)] = 18
     neighbours: Annotated[int, Interval(ge=0, le=1000)] = 3
     perturbation: Annotated[float, Interval(gt=0, le=10)] = 0.1
     steps: Annotated[int, Interval(ge=1, le=1_000_000)] = 12
@@ -94,14 +93,12 @@ class OnlineCameraNetwork:
         draw = bench.generator("neighbours", index)
         approximator, samples = self._fresh(bench, draw), list[Sample]()
         phase = self.start.search(target, bench, camera, nominal)
-        for number in range(self.rounds):
-            if camera.left - 3 * checks <= self.neighbours:
-                break
+        while camera.left - 3 * checks > self.neighbours:
             shown = [phase, *(phase + self.perturbation * noise for noise in self._noise(phase, draw))]
             fresh = [Sample(one, camera.show(one), target, bench.light) for one in shown]
-            samples += fresh
-            if number == 0:
+            if not samples:
                 approximator.expose(fresh)
+            samples += fresh
             for step in range(self.steps):
                 chosen = int(torch.randint(len(samples), (), generator=draw))
                 approximator.step(samples[chosen], step / self.steps)

@@ -16,6 +16,8 @@ from .markdown import escape, table
 from .section_training import Trained
 
 COLOURS = ("red", "green", "blue")
+MOST = 1e12
+"""No quantity is anywhere near; a larger number in a stranger's file is no estimate."""
 Row = Mapping[str, Any]
 
 
@@ -60,7 +62,7 @@ def _legible(row: Row) -> bool:
 
 
 def _known(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return type(value) in (int, float) and -MOST < value < MOST  # type: ignore[operator]  # NaN is neither
 
 
 def _table(rows: Sequence[Row]) -> Markup:

@@ -6,6 +6,7 @@ import fcntl
 import json
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -176,6 +177,20 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
         raise UserError(f"{path}: holds another cell than its name says; delete the file and run the study again")
     if record.state not in get_args(State) or not isinstance(record.scores, dict):
         raise UserError(f"{path}: unknown state '{record.state}'; delete the file and run the study again")
-    if not all(isinstance(value, int | float) for value in record.scores.values()):
-        raise UserError(f"{path}: a score is not a number; delete the file and run the study again")
+    numbers = [record.seconds, record.memory_mib, record.registration_residual_px, record.saturated]
+    if not all(_is_number(value) for value in (*record.scores.values(), *filter(_is_told, numbers), record.captures)):
+        raise UserError(f"{path}: a score or a measurement is not a number; delete the file and run the study again")
+    if not all(isinstance(text, str) for text in (record.label, record.reason, record.stopped)):
+        raise UserError(f"{path}: label, reason and stopped are texts; delete the file and run the study again")
+    if not (record.learned is None or isinstance(record.learned, dict)):
+        raise UserError(f"{path}: 'learned' is no mapping; delete the file and run the study again")
     return record
+
+
+def _is_told(value: object) -> bool:
+    return value is not None
+
+
+def _is_number(value: object) -> bool:
+    """A finite number that a table can hold; JSON has larger ones."""
+    return type(value) in (int, float) and abs(value) < sys.float_info.max  # type: ignore[arg-type, operator]

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from ... import seeds
 from ...optics.phasor import phasor
-from ..display_model import DisplayModel
+from ..display_model import FORM, DisplayModel
 from .approximator import ModelApproximator, Rates
 from .diagnosis import Diagnosed, diagnose
 from .method import Calibrated
@@ -61,6 +61,7 @@ class HybridModel(Diagnosed, Calibrated):
     width: Annotated[int, Interval(ge=2, le=256)] = 16
 
     RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
+    form: ClassVar[frozenset[str]] = FORM | {"fringes", "panel_dust", "roughness"}
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """A display as the nominal model says."""

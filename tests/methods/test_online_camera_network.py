@@ -26,7 +26,7 @@ def nominal(display, target):
 
 def test_rounds_of_captures_improve_the_hologram():
     display, target = ToyDisplay(**FAULTY, noise=0.01), picture()
-    started, _ = solved(display, target, rounds=1, retrieval=ShortRetrieval(iterations=0))
+    started, _ = solved(display, target, captures=20, retrieval=ShortRetrieval(iterations=0))
     phase, handle = solved(display, target)
     assert handle.captures <= 100
     assert (display.error(phase, target) < 0.8 * display.error(started, target)).all()
@@ -36,7 +36,7 @@ def test_rounds_of_captures_improve_the_hologram():
 @pytest.mark.parametrize(("faults", "noise"), [({}, 0.0), ({}, 0.3), (FAULTY, 0.3)])
 def test_neither_an_ideal_display_nor_noise_makes_it_worse_than_wirtinger_holography(faults, noise):
     display, target = ToyDisplay(**faults, noise=noise), picture()
-    phase, _ = solved(display, target, rounds=6)
+    phase, _ = solved(display, target, captures=42)
     assert (display.scored(phase, target) < 1.02 * display.scored(nominal(display, target), target)).all()
 
 

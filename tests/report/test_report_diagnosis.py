@@ -75,6 +75,7 @@ def test_methods_that_lack_the_same_are_told_once() -> None:
             "missing": [1],
         },
         {"estimates": [{"name": "x", "value": math.nan, "colour": 0}, {"name": "x", "value": True}]},
+        {"estimates": [{"name": "x", "value": 10**400, "colour": 0}]},
     ],
 )
 def test_provenance_of_strangers_shows_nothing_and_stops_nothing(facts: dict[str, object]) -> None:

@@ -46,10 +46,18 @@ def corrupt(text: str) -> dict[str, str]:
         "foreign": '{"a": 1}',
         "moved": json.dumps({**content, "cell": {**content["cell"], "repeat": 9}}),
         "state": json.dumps({**content, "state": "fine"}),
+        "huge": json.dumps({**content, "captures": 10**400}),
+        "infinite": text.replace('"seconds": null', '"seconds": 1e999'),
+        "truth": json.dumps({**content, "saturated": True}),
+        "label": json.dumps({**content, "label": None}),
+        "learned": json.dumps({**content, "learned": [1]}),
     }
 
 
-@pytest.mark.parametrize("fault", ["truncated", "empty", "list", "foreign", "moved", "state"])
+FAULTS = "truncated empty list foreign moved state huge infinite truth label learned".split()
+
+
+@pytest.mark.parametrize("fault", FAULTS)
 def test_a_damaged_record_is_named(tmp_path: Path, grid: Plan, fault: str) -> None:
     store, record = Store(tmp_path / "out"), record_of(grid)
     store.write(record)
