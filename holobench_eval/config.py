@@ -87,6 +87,20 @@ class Probe:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """A change of the displays at test time, by one value after another; methods were prepared without it.
+
+    condition: its kind, see ``display.conditions``; values: numbers, or names; count: so many siblings or draws in
+    their place; profiles: the displays that are changed, a subset of the study's.
+    """
+
+    condition: Text
+    values: tuple[float | Text, ...] = ()
+    count: Annotated[int, Interval(ge=1, le=10_000)] | None = None
+    profiles: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class MethodEntry:
     """A method of a study.
 
@@ -136,7 +150,7 @@ class Study:
 
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
     captures of ``holograms`` against those captures. note: a paragraph that the report prints beside its tables.
-    repeats: how often every cell is measured, with new noise; baseline: label that paired tests compare
+    repeats: how often every cell is measured, with new noise; sweeps: changes of the displays at test time; baseline: label that paired tests compare
     against (the first method when the config names none); headline: the column the report leads with.
     file, text: the config file as the user named it, and what is in it.
     """
@@ -148,6 +162,7 @@ class Study:
     measure: Literal["picture", "prediction"] = "picture"
     holograms: Probe = Probe()
     training: Training = Training()
+    sweeps: tuple[Sweep, ...] = ()
     note: str = ""
     seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
     repeats: Annotated[int, Interval(ge=1, le=1000)] = 1
@@ -184,6 +199,7 @@ def load_study(path: Path | str) -> Study:
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
     _check_profiles(study, document)
+    study = replace(study, sweeps=tuple(_sweep(study, document, index) for index in range(len(study.sweeps))))
     entries = tuple(_entry(study, document, index) for index in range(len(study.methods)))
     study = replace(study, methods=entries)
     _check_labels(study, document)
@@ -298,20 +314,53 @@ def _check_profiles(study: Study, document: Document) -> None:
         seen[name] = profile
 
 
+def _sweep(study: Study, document: Document, index: int) -> Sweep:
+    from .display.conditions import KINDS, altered, checked
+    from .display.profile import load_profile
+
+    sweep, where = study.sweeps[index], ("sweeps", index)
+    if study.display.learned or study.measure == "prediction":
+        raise document.error(where, "a sweep changes simulated displays, and scores pictures")
+    if sweep.condition not in KINDS:
+        near = suggest(sweep.condition, KINDS)
+        raise document.error((*where, "condition"), f"unknown condition '{sweep.condition}'; {near}")
+    countable = sweep.condition in ("sibling", "draw")
+    if bool(sweep.values) == (sweep.count is not None) or (sweep.count is not None and not countable):
+        raise document.error(where, "a sweep has values; one of siblings or draws may have a count in their place")
+    given = sweep.values or tuple(str(number) for number in range(1, (sweep.count or 0) + 1))
+    profiles = _subset(study, document, sweep.profiles, (*where, "profiles"))
+    values = [value for other in study.sweeps[:index] if other.condition == sweep.condition for value in other.values]
+    known = len(values)
+    for number, value in enumerate(given):
+        place: Keys = (*where, "values", number) if sweep.values else (*where, "count")
+        with _placed(document, place, place):
+            values.append(checked(sweep.condition, value))
+            for profile in profiles:
+                altered(load_profile(profile, folder=study.folder), sweep.condition, values[-1])
+        if values[-1] in values[:-1]:
+            raise document.error(place, f"{sweep.condition} {value} is listed twice")
+    return replace(sweep, values=tuple(values[known:]), count=None, profiles=profiles)
+
+
+def _subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:
+    """The named displays of the study, in its order; all for none."""
+    for number, profile in enumerate(named):
+        if profile not in study.display.sources:
+            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
+            raise document.error((*where, number), message)
+    return tuple(p for p in study.display.sources if p in named or not named)
+
+
 def _entry(study: Study, document: Document, index: int) -> MethodEntry:
     entry, where = study.methods[index], ("methods", index)
     with _placed(document, (*where, "name"), (*where, "params")):
         method = registry.build("methods", entry.name, dict(entry.params), study.folder)
         if study.measure == "prediction" and not hasattr(method, "predict"):
             raise UserError(f"method '{entry.name}' predicts no captures; measure: prediction needs methods that do")
-    for number, profile in enumerate(entry.profiles):
-        if profile not in study.display.sources:
-            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
-            raise document.error((*where, "profiles", number), message)
     if entry.captures is not None and (not getattr(method, "camera", False) or study.measure == "prediction"):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)
-    profiles = tuple(p for p in study.display.sources if p in entry.profiles or not entry.profiles)
+    profiles = _subset(study, document, entry.profiles, (*where, "profiles"))
     label = entry.label or entry.name.rpartition(":")[2]
     return replace(entry, label=label, params=params_of(method), profiles=profiles)
 

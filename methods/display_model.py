@@ -32,9 +32,7 @@ GAIN_GRID, SOURCE_GRID = 4, 24
 MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "spherical")
 """Zernike polynomials of the aberration, see ``optics.zernike``."""
 FIRST_CROSSTALK = 0.3
-FORM = frozenset(
-    {"look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES}
-)
+FORM = frozenset({"look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES})
 """Effects (``display.effects``) that the model has a term for. All others of a bench lie outside its form: fringes,
 of which ``SOURCE_GRID`` follows the coarser ones alone, and the light from between the pixels as far as it is not simply
 unmodulated among them."""

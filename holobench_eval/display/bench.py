@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from ..optics.convolution import multiply
+from ..optics.convolution import frequencies, multiply
 from ..optics.padding import padded_shape
 from ..optics.phase import blaze
 from ..optics.phasor import phasor, squared_modulus
@@ -16,6 +16,7 @@ from ..seeds import generator
 from .contract import Capture, DisplaySpec
 from .profile import Profile
 from .stages import Geometry, Relay
+from .stages.eye import eye_phase
 from .stages.propagation import sample_weights
 from .stages.quantise import straight_through_level
 from .stages.relay import box_filter, sample, sampling_grid
@@ -25,11 +26,13 @@ from .stages.relay import box_filter, sample, sampling_grid
 class ChannelMaps:
     """What is fixed for one colour channel: every random pattern drawn, every transfer function built.
 
-    lut_gain, amplitude and angle [rad] of the incident light: ``(H, W)``; still (spectrum of the light that no phase
-    changes), transfer, plane (transmission of the dust plane), last_transfer: padded.
+    added: phase [rad] that the display adds to every hologram; lut_gain; amplitude and angle [rad] of the incident
+    light: ``(H, W)``; still (spectrum of the light that no phase changes), transfer, plane (transmission of the dust
+    plane), last_transfer: padded.
     """
 
     geometry: Geometry
+    added: Tensor
     lut_gain: Tensor
     amplitude: Tensor
     angle: Tensor
@@ -83,6 +86,8 @@ class SimulatedBench:
         ramp = blaze(geometry.shape, profile.panel.blaze)
         demodulation = torch.polar(torch.ones_like(ramp), -ramp)
         incident = light.field(geometry) * profile.coherent_noise.panel(geometry) * demodulation
+        if profile.drift.days:
+            incident = incident * profile.drift.dust(geometry, profile.coherent_noise).to(incident.dtype)
         dust = profile.coherent_noise.plane(geometry)
         plane = None
         if dust is not None:
@@ -90,16 +95,22 @@ class SimulatedBench:
             plane[: geometry.shape[0], : geometry.shape[1]] = dust
         turning = 1 - profile.coherent_noise.plane_distance if plane is not None else 1.0
         padded, pupil, way = self._padded(), profile.panel.pupil, profile.propagation
+        transfer = way.transfer(geometry, padded, pupil, (0.0, turning))
+        if any(profile.eye.focus):
+            fy, fx = frequencies(padded, geometry.pitch)
+            seen = eye_phase(profile.eye.focus, fy, fx, geometry.wavelength, geometry.distance)
+            transfer = transfer * torch.polar(torch.ones_like(seen), seen).to(transfer.dtype)
         return ChannelMaps(
             geometry=geometry,
+            added=self.ramp + profile.lens.phase(geometry) if any(profile.lens.move) else self.ramp,
             lut_gain=profile.lut.gain_map(geometry),
             amplitude=incident.abs(),
             angle=incident.angle(),
             still=self._spectrum(self.unmodulated * incident),
-            transfer=way.transfer(geometry, padded, pupil, (0.0, turning)),
+            transfer=transfer,
             plane=plane,
             last_transfer=None if plane is None else way.transfer(geometry, padded, pupil, (turning, 1.0)),
-            laser_power=profile.drift.laser_power(geometry),
+            laser_power=profile.drift.laser_power(geometry) * light.power,
         )
 
     def _padded(self) -> tuple[int, int]:
@@ -118,7 +129,7 @@ class SimulatedBench:
         The carrier is off. The light that follows no phase is ``ChannelMaps.still``.
         """
         profile, maps = self.profile, self.channels[channel]
-        level = straight_through_level(phase + self.ramp, profile.panel.bits)
+        level = straight_through_level(phase + maps.added, profile.panel.bits)
         shown = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
         fine = profile.crosstalk.apply(shown, self.crosstalk).view(self.samples, self.samples, *shown.shape)
         return phasor(self.modulated * maps.amplitude, fine + maps.angle)

@@ -10,6 +10,9 @@ import torch
 from torch import Tensor
 
 from ..optics import AngularSpectrum
+from ..optics.convolution import frequencies
+from .stages.eye import eye_phase
+from .stages.lens import Matrix
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,8 @@ class DisplaySpec:
 
     Lengths are in metres. ``pupil`` is the diameter of the iris as a fraction of the panel's band 1/pitch
     (None: no iris). The blaze that an off-axis display adds to every phase, and the re-centring of its image,
-    belong to the display, so the nominal model is on axis for every method.
+    belong to the display, so the nominal model is on axis for every method. ``eye``: that of the viewer, where its
+    prescription is known; see ``stages.eye``.
     """
 
     name: str
@@ -54,6 +58,7 @@ class DisplaySpec:
     bits: int
     pupil: float | None
     region: Region
+    eye: Matrix = (0.0, 0.0, 0.0)
 
     def propagator(
         self, channel: int, dtype: torch.dtype = torch.complex64, device: torch.device | str = "cpu"
@@ -64,15 +69,21 @@ class DisplaySpec:
 
 @lru_cache(maxsize=16)
 def _propagator(spec: DisplaySpec, channel: int, dtype: torch.dtype, device: torch.device) -> AngularSpectrum:
-    return AngularSpectrum(
+    wavelength = spec.wavelengths[channel]
+    model = AngularSpectrum(
         shape=spec.shape,
         pitch=spec.pitch,
-        wavelength=spec.wavelengths[channel],
+        wavelength=wavelength,
         distance=spec.distance,
         pupil=spec.pupil,
         dtype=dtype,
         device=device,
     )
+    if any(spec.eye):
+        fy, fx = frequencies(model.padded_shape, spec.pitch, device)
+        seen = eye_phase(spec.eye, fy, fx, wavelength, spec.distance)
+        model.transfer = model.transfer * torch.polar(torch.ones_like(seen), seen).to(dtype)
+    return model
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,11 @@ from ..typed_yaml import check_keys, typed
 from ..yaml_source import load
 from .contract import DisplaySpec, Region
 from .stages import (
+    AddedLens,
     CoherentNoise,
     Crosstalk,
     Drift,
+    Eye,
     Flicker,
     Illumination,
     LookUpTable,
@@ -66,6 +68,7 @@ class Profile:
     description: str
     panel: Panel
     sampling: Annotated[int, Interval(ge=1, le=7)] = 1
+    lens: AddedLens = AddedLens()
     lut: LookUpTable = LookUpTable()
     crosstalk: Crosstalk = Crosstalk()
     aperture: PixelAperture | None = None
@@ -73,6 +76,7 @@ class Profile:
     illumination: Illumination = Illumination()
     coherent_noise: CoherentNoise = CoherentNoise()
     propagation: Propagation = field(default_factory=Propagation)
+    eye: Eye = Eye()
     zero_order: ZeroOrder = ZeroOrder()
     relay: Relay = Relay()
     sensor: Sensor = Sensor()
@@ -106,6 +110,7 @@ class Profile:
             bits=panel.bits,
             pupil=panel.pupil,
             region=Region(top, left, height, width),
+            eye=self.eye.focus if self.eye.known else (0.0, 0.0, 0.0),
         )
 
     def scaling_note(self, shape: tuple[int, int] | None) -> str:

@@ -71,10 +71,14 @@ class Simulation:
 
 @dataclass(frozen=True)
 class Workbench:
-    """A simulated bench and its calibration: one registration for all methods, made before any of them is shown."""
+    """A simulated bench and its calibration: one registration for all methods, made before any of them is shown.
+
+    registered_as: a bench whose registration holds for this one too, since no camera has moved (None: its own).
+    """
 
     bench: SimulatedBench
     seed: int
+    registered_as: Workbench | None = None
 
     @property
     def spec(self) -> DisplaySpec:
@@ -84,6 +88,8 @@ class Workbench:
     @cached_property
     def registration(self) -> Registration:
         """Camera geometry from circle-grid holograms (protocol, step 2). CellError when it cannot be trusted."""
+        if self.registered_as is not None:
+            return self.registered_as.registration
         grid = fiducial(self.spec.region.shape)
         target = grid.image.float().expand(len(self.spec.wavelengths), -1, -1)
         return register(self._fiducial(target), grid, self.bench.profile.residual_bound)
@@ -323,6 +329,11 @@ def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
         raise CellError(f"{who}phase holds {bad} values that are NaN or infinite; the display refuses it")
 
 
-def open_bench(profile: Profile, panel: tuple[int, int] | None = None, seed: int = 0) -> Workbench:
-    """The simulated bench of a profile on a panel of (rows, columns) pixels; ``seed`` names its noise."""
-    return Workbench(SimulatedBench(profile.scaled(panel)), seed)
+def open_bench(
+    profile: Profile, panel: tuple[int, int] | None = None, seed: int = 0, registered_as: Workbench | None = None
+) -> Workbench:
+    """The simulated bench of a profile on a panel of (rows, columns) pixels; ``seed`` names its noise.
+
+    registered_as: see ``Workbench``.
+    """
+    return Workbench(SimulatedBench(profile.scaled(panel)), seed, registered_as)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from ..study.store import write_atomically
-from . import leaderboard, section_diagnosis, section_training, sections
+from . import leaderboard, section_diagnosis, section_sweeps, section_training, sections, sweep_figures
 from .description import Description, counts, describe, environment, method_parameters, rules, setup
 from .figures import Figures, draw_figures
 from .findings import findings
@@ -18,6 +18,7 @@ from .markdown import render
 from .results import Results
 from .section_training import Trained
 from .statistics import RESAMPLES
+from .sweeps import sweeps
 from .tables import MEMORY_COLUMN, csv_text, read_records, records_frame
 
 if TYPE_CHECKING:
@@ -49,7 +50,12 @@ def write_report(
     write_atomically(output / "records.csv", csv_text(results.frame).encode())
     write_atomically(output / "table.csv", csv_text(results.table).encode())
     trained = section_training.trainings(layout, records, output)
-    context = _numbers(results) | _words(results, records, provenance, description) | _training(layout, trained)
+    context = (
+        _numbers(results)
+        | _changes(results)
+        | _words(results, records, provenance, description)
+        | _training(layout, trained)
+    )
     figures = draw_figures(results, trained, output)
     text = render(TEMPLATE, context | _pictures(figures))
     write_atomically(output / "report.md", text.encode())
@@ -102,6 +108,27 @@ def _numbers(results: Results) -> dict[str, Any]:
     }
 
 
+def _changes(results: Results) -> dict[str, Any]:
+    """The section on changes of the displays, empty for a study without them."""
+    every = sweeps(results)
+    told = [
+        (
+            section_sweeps.heading(sweep),
+            section_sweeps.introduction(sweep),
+            section_sweeps.scores(sweep),
+            section_sweeps.losses(sweep),
+            section_sweeps.sentences(sweep, every),
+        )
+        for sweep in every
+        if sweep.methods
+    ]
+    return {
+        "sweeps": told,
+        "claims": section_sweeps.claims(results, every),
+        "sweeps_missing": sweep_figures.missing(every),
+    }
+
+
 def _words(
     results: Results,
     records: Sequence[Mapping[str, Any]],
@@ -145,6 +172,7 @@ def _pictures(figures: Figures) -> dict[str, Any]:
     return {
         "charts": figures.charts,
         "frontiers": figures.frontiers,
+        "sweep_figures": figures.sweeps,
         "comparisons": figures.comparisons,
         "stages": figures.stages,
         "training_figures": figures.trainings,

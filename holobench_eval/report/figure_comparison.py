@@ -40,10 +40,11 @@ def tile_size(shape: tuple[int, ...]) -> tuple[int, int]:
     return shape[0] * factor, shape[1] * factor
 
 
-class _Page:
+class Page:
     """A page addressed in pixels from its top left corner: a picture for the tiles, a figure for the words."""
 
     def __init__(self, width: int, height: int) -> None:
+        """width, height in pixels."""
         self.pixels: Picture = np.ones((height, width, 3))
         self.figure: Figure = new_figure(width, height)
 
@@ -61,11 +62,24 @@ class _Page:
             inside[[0, -1], :] = value
             inside[:, [0, -1]] = value
 
+    def tile(self, left: int, top: int, size: tuple[int, int], tile: Tile) -> None:
+        """A capture with its caption below, or why there is none."""
+        tall, wide = size
+        if tile.picture is None:
+            self.place(left, top, size, np.full((1, 1, 3), 0.93))
+            words = textwrap.fill(tile.note, int(wide / CHARACTER) - 2, max_lines=6, placeholder="...")
+            self.text(left + wide / 2, top + tall / 2, words, fontsize=8, ha="center", va="center")
+            return
+        self.place(left, top, size, tile.picture)
+        self.text(left + wide / 2, top + tall + CAPTION / 2, tile.note, fontsize=8, ha="center", va="center")
+
     def text(self, x: float, y: float, words: str, **kwargs: Any) -> None:
+        """Words at a point."""
         height, width = self.pixels.shape[:2]
         self.figure.text(x / width, 1 - y / height, words, parse_math=False, **kwargs)
 
     def save(self, path: Path) -> None:
+        """Write the page."""
         self.figure.figimage(self.pixels, 0, 0, origin="upper", zorder=-1)
         save(self.figure, path)
 
@@ -88,7 +102,7 @@ def draw_comparison(
     row_height = tall + CAPTION + tall // 2 + 2 * GAP
     scale = Normalize(0, error_scale)
     with style():
-        page = _Page(SIDE + (1 + len(columns)) * (wide + GAP), HEADER + len(targets) * row_height + FOOTER)
+        page = Page(SIDE + (1 + len(columns)) * (wide + GAP), HEADER + len(targets) * row_height + FOOTER)
         page.text(SIDE, 14, title, fontsize=9, weight="bold", va="center")
         for index, heading in enumerate([truth, *(column.title for column in columns)]):
             words = "\n".join(textwrap.wrap(heading, int(wide / CHARACTER), max_lines=2, placeholder="..."))
@@ -104,7 +118,7 @@ def draw_comparison(
         page.save(path)
 
 
-def _draw_target(page: _Page, corner: tuple[int, int], target: Picture) -> None:
+def _draw_target(page: Page, corner: tuple[int, int], target: Picture) -> None:
     """The target, with a frame around the window that all tiles of its row enlarge."""
     left, top = corner
     tall, wide = tile_size(target.shape)
@@ -115,17 +129,13 @@ def _draw_target(page: _Page, corner: tuple[int, int], target: Picture) -> None:
     page.outline(left + crop.left * factor, top + crop.top * factor, (crop.height * factor, crop.width * factor))
 
 
-def _draw_tile(page: _Page, corner: tuple[int, int], tile: Tile, target: Picture, scale: Normalize) -> None:
+def _draw_tile(page: Page, corner: tuple[int, int], tile: Tile, target: Picture, scale: Normalize) -> None:
     """A capture, its caption, the enlarged window and the error map; or why there is no capture."""
     left, top = corner
     tall, wide = tile_size(target.shape)
+    page.tile(left, top, (tall, wide), tile)
     if tile.picture is None:
-        page.place(left, top, (tall, wide), np.full((1, 1, 3), 0.93))
-        words = textwrap.fill(tile.note, int(wide / CHARACTER) - 2, max_lines=6, placeholder="...")
-        page.text(left + wide / 2, top + tall / 2, words, fontsize=8, ha="center", va="center")
         return
-    page.place(left, top, (tall, wide), tile.picture)
-    page.text(left + wide / 2, top + tall + CAPTION / 2, tile.note, fontsize=8, ha="center", va="center")
     below, half = top + tall + CAPTION, (tall // 2, wide // 2 - 1)
     page.place(left, below, half, most_detailed(target).of(tile.picture))
     error = error_map(tile.picture, target)
@@ -139,7 +149,7 @@ def _coloured(error: NDArray[np.float64], scale: Normalize) -> Picture:
     return coloured
 
 
-def _colour_bar(page: _Page, scale: Normalize) -> None:
+def _colour_bar(page: Page, scale: Normalize) -> None:
     height, width = page.pixels.shape[:2]
     box = (SIDE / width, (FOOTER - 22) / height, min(420, width - 2 * SIDE) / width, 14 / height)
     mappable = ScalarMappable(scale, ERROR_COLOURS)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..study.plan import REFERENCE
 from ..study.store import Store
-from . import frontiers
+from . import frontiers, sweep_figures
 from .figure_charts import Chart, quality_bars, target_dots
 from .figure_comparison import draw_comparison, tile_size
 from .figure_style import slugs
@@ -21,6 +21,7 @@ from .gallery import Column, Picture, Tile, chunks, error_ceiling, error_map, lo
 from .results import Results
 from .section_training import Trained
 from .sections import label, leading_scores
+from .sweeps import sweeps
 from .tables import DONE
 
 FOLDER = "figures"
@@ -46,6 +47,7 @@ class Figures:
 
     charts: list[Drawn]
     frontiers: list[Drawn]
+    sweeps: list[Drawn]
     comparisons: list[Drawn]
     stages: list[Drawn]
     trainings: list[Drawn]
@@ -55,7 +57,7 @@ class Figures:
 def draw_figures(results: Results, trained: Sequence[Trained], output: Path) -> Figures:
     """Draw everything that the records allow into ``output/figures``; older figures of the same kinds go."""
     folder = output / FOLDER
-    for pattern in ("comparison-*.jpg", "quality-*.png", "training-*.png"):
+    for pattern in ("comparison-*.jpg", "sweep-*.jpg", "quality-*.png", "training-*.png"):
         for old in folder.glob(pattern):
             old.unlink()
     absent: list[str] = []
@@ -68,19 +70,37 @@ def draw_figures(results: Results, trained: Sequence[Trained], output: Path) -> 
     kinds = (
         _charts(results, folder),
         [Drawn(f"{FOLDER}/{path.name}", caption) for path, caption in frontiers.draw(results, folder)],
+        _sweeps(results, output, absent),
         comparisons,
         _stages(results, folder),
         _trainings(trained, folder),
     )
-    charts, costs, captures, stages, trainings = (
+    charts, costs, changes, captures, stages, trainings = (
         [replace(drawn, number=next(number)) for drawn in kind] for kind in kinds
     )
-    return Figures(charts, costs, captures, stages, trainings, sorted(set(absent)))
+    return Figures(charts, costs, changes, captures, stages, trainings, sorted(set(absent)))
+
+
+def _sweeps(results: Results, output: Path, absent: list[str]) -> list[Drawn]:
+    """Curves, and rows of the target in the middle of the ranking of targets."""
+    every, store = sweeps(results), Store(output)
+    pictures = {target: load_picture(store.target_thumbnail(target)) for target in results.targets}
+    known = {target: picture for target, picture in pictures.items() if picture is not None}
+    middle = None
+    if every and known:
+        name = _by_quality(results, results.conditions[0], list(known))[len(known) // 2]
+        middle = (name, known[name])
+
+    def take(label: str, condition: str, target: str) -> Tile:
+        return _tile(results, store, (label, condition, target), known[target].shape, absent)
+
+    drawn = sweep_figures.draw(every, output / FOLDER, take, middle)
+    return [Drawn(f"{FOLDER}/{path.name}", caption) for path, caption in drawn]
 
 
 def _charts(results: Results, folder: Path) -> list[Drawn]:
     score = results.headline
-    table = results.table[results.table["condition"] != REFERENCE]
+    table = results.table[results.table["condition"].isin(results.conditions)]
     if score.key not in table or not np.isfinite(table[score.key]).any():
         return []
     methods = tuple(dict.fromkeys(table["method"]))
@@ -164,12 +184,17 @@ def _selection(results: Results, condition: str, targets: dict[str, Picture]) ->
     most = int(min(TARGETS_SHOWN, max(2, PIXELS // row)))
     if len(targets) <= most:
         return list(targets)
+    return spread(_by_quality(results, condition, list(targets)), most)
+
+
+def _by_quality(results: Results, condition: str, targets: Sequence[str]) -> list[str]:
+    """Targets from worst to best by their mean over methods."""
     values = np.vstack([results.values(name, condition) for name in results.methods(condition)])
     known = np.isfinite(values)
     means = np.where(known, values, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     sign = 1 if results.headline.higher_is_better else -1
     quality = dict(zip(results.targets, sign * means, strict=True))
-    return spread(sorted(targets, key=lambda target: quality[target]), most)
+    return sorted(targets, key=lambda target: quality[target])
 
 
 def _tile(results: Results, store: Store, place: tuple[str, str, str], shape: Sequence[int], absent: list[str]) -> Tile:

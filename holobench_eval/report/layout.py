@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from .. import registry
-from ..study.plan import displays, scored_dataset
+from ..study.plan import changed, displays, scored_dataset
 from .tracks import CALIBRATED, CEILING, ONLINE, OPEN_LOOP
 from .wording import Wording, plain, wording
 
 if TYPE_CHECKING:
     from ..config import Study
+    from ..study.bench import Condition
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,19 @@ class TrainingSet:
 
 
 @dataclass(frozen=True)
+class Swept:
+    """A change of a display, by one value after another, and the conditions under which cells stand for it.
+
+    kind: of ``display.conditions``; before: the condition without the change; points: (value, condition) of every
+    other one, in the order of the config.
+    """
+
+    kind: str
+    before: str
+    points: tuple[tuple[float | str, str], ...]
+
+
+@dataclass(frozen=True)
 class Layout:
     """The rows of a study's tables.
 
@@ -43,7 +57,8 @@ class Layout:
     note: a paragraph that the study wants beside its tables. measure: ``picture`` or ``prediction``; holograms: whose
     captures are predicted, with parameters. learned_display: the condition that is a trained network (None: benches).
     trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
-    camera: labels of methods that may capture the scored image while they solve.
+    camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
+    of others.
     """
 
     title: str
@@ -63,6 +78,7 @@ class Layout:
     trained: frozenset[str] = frozenset()
     training: TrainingSet | None = None
     camera: frozenset[str] = frozenset()
+    sweeps: tuple[Swept, ...] = ()
 
     def track(self, label: str) -> str:
         """The track that a method competes in."""
@@ -97,6 +113,11 @@ class Layout:
         return tuple(dict.fromkeys(condition for _, condition in self.pairs))
 
     @property
+    def changed(self) -> frozenset[str]:
+        """Conditions that are a change of another."""
+        return frozenset(condition for sweep in self.sweeps for _, condition in sweep.points)
+
+    @property
     def reported_metrics(self) -> tuple[str, ...]:
         """Names of the published figures, in the order in which the config first names them."""
         return tuple(dict.fromkeys(name for row in self.reported.values() for name in row))
@@ -105,7 +126,8 @@ class Layout:
 def layout_of(study: Study) -> Layout:
     """The layout of a checked study. Reads its profiles and lists its dataset; computes nothing."""
     reported = study.reported
-    names = {source: place.name for source, place in displays(study).items()}
+    shown = displays(study)
+    names = {source: place.name for source, place in shown.items()}
     methods = {entry.label: registry.find("methods", entry.name, study.folder) for entry in study.methods}
 
     def marked(attribute: str) -> frozenset[str]:
@@ -115,7 +137,12 @@ def layout_of(study: Study) -> Layout:
     probe = study.holograms
     return Layout(
         title=study.title,
-        pairs=tuple((entry.label, names[source]) for entry in study.methods for source in entry.profiles),
+        pairs=tuple(
+            (entry.label, place.title)
+            for entry in study.methods
+            for source in entry.profiles
+            for place in changed(study, source, shown[source])
+        ),
         targets=tuple(scored_dataset(study).items()),
         seed=study.seed,
         headline=study.headline,
@@ -131,7 +158,17 @@ def layout_of(study: Study) -> Layout:
         trained=trained,
         training=_training_set(study) if trained or study.display.learned else None,
         camera=marked("camera"),
+        sweeps=tuple(_sweeps(study, shown)),
     )
+
+
+def _sweeps(study: Study, shown: Mapping[str, Condition]) -> Iterator[Swept]:
+    for sweep in study.sweeps:
+        for source in sweep.profiles:
+            places = changed(replace(study, sweeps=(sweep,)), source, shown[source])[1:]
+            points = tuple((place.change[1], place.title) for place in places if place.change)
+            if points:
+                yield Swept(sweep.condition, shown[source].name, points)
 
 
 def _training_set(study: Study) -> TrainingSet:

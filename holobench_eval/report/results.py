@@ -54,12 +54,22 @@ class Results:
 
     @cached_property
     def conditions(self) -> list[str]:
-        """Conditions that have rows, without the reference."""
-        return [name for name in dict.fromkeys(self.table["condition"]) if name != REFERENCE]
+        """Conditions that have rows, without the reference and without those that are a change of another."""
+        aside = {REFERENCE, *self.layout.changed}
+        return [name for name in dict.fromkeys(self.table["condition"]) if name not in aside]
 
     def methods(self, condition: str) -> list[str]:
         """Labels with a row under ``condition``, in the order of the table."""
         return list(self.table.loc[self.table["condition"] == condition, "method"])
+
+    def lost(self, label: str, before: str, condition: str) -> Estimate | None:
+        """Headline score before a change minus that after it, target by target, so that a loss is positive where higher
+        is better; None without a complete pair of rows."""
+        rows = [name for name in (before, condition) if label in self.methods(name) and self.whole(label, name)]
+        if len(rows) < 2:
+            return None
+        sign = 1 if self.headline.higher_is_better else -1
+        return bootstrap_mean(sign * (self.values(label, before) - self.values(label, condition)))
 
     def row(self, label: str, condition: str) -> pd.Series:
         """A row of the table."""

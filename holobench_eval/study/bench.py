@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+from collections import OrderedDict
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +11,15 @@ from ..errors import CellError, UserError
 
 if TYPE_CHECKING:
     from ..display import Workbench
+    from ..display.conditions import Value
     from ..display.contract import DisplaySpec
     from .preparation import Preparation
 
 Panel = tuple[int, int]
 LEARNED = "learned"
 """How a config names the display that is a trained network."""
+OPEN_PIXELS = 8 * 1080 * 1920
+"""Pixels of all benches that a process keeps open, at most."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Condition:
     source: the profile's name or path as the config gives it; folder: where a relative path starts; name,
     version, digest: those of the profile; spec: its nominal optics at the study's panel size; learned: what has to be
     prepared for a display that is a trained network (the other fields are those of the display it was trained on,
-    except for its name).
+    except for its name); change: kind and value of what has changed on it since methods were prepared (None: nothing).
     """
 
     source: str
@@ -36,6 +39,25 @@ class Condition:
     digest: str
     spec: DisplaySpec
     learned: Preparation | None = None
+    change: tuple[str, Value] | None = None
+
+    @property
+    def nominal(self) -> Condition:
+        """The display before the change."""
+        return replace(self, change=None)
+
+    @property
+    def title(self) -> str:
+        """Its name in tables, with the change."""
+        return self.name if self.change is None else f"{self.name}, {change_text(*self.change)}"
+
+
+def change_text(kind: str, value: Value) -> str:
+    """A change in words: ``drift 30 days``."""
+    from ..display.conditions import KINDS
+
+    shown = f"{value:g}" if isinstance(value, float) else value
+    return " ".join(part for part in (kind.replace("_", " "), shown, KINDS[kind].unit) if part)
 
 
 def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
@@ -51,21 +73,36 @@ def workbench(shown: Condition, seed: int) -> Workbench:
 
     CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
     """
-    opened = _opened(shown.source, shown.folder, shown.digest, shown.spec.shape, seed)
+    key = (shown.source, shown.folder, shown.digest, shown.spec.shape, shown.change, seed)
+    if key not in _open:
+        _open[key] = _opened(shown, seed)
+        while len(_open) > max(2, OPEN_PIXELS // (shown.spec.shape[0] * shown.spec.shape[1])):
+            _open.popitem(last=False)
+    _open.move_to_end(key)
+    opened = _open[key]
     if isinstance(opened, CellError):
         raise CellError(str(opened)) from opened
     return opened
 
 
-@lru_cache(maxsize=8)
-def _opened(source: str, folder: Path, digest: str, panel: Panel, seed: int) -> Workbench | CellError:
-    from ..display import load_profile, open_bench
+_open: OrderedDict[object, Workbench | CellError] = OrderedDict()
+"""Those used least recently come first."""
 
-    profile = load_profile(source, folder=folder)
-    if profile.digest != digest:
-        raise UserError(f"profile '{source}' has changed since the study was planned; start the run again")
-    opened = open_bench(profile, panel=panel, seed=seed)
+
+def _opened(shown: Condition, seed: int) -> Workbench | CellError:
+    from ..display import load_profile, open_bench
+    from ..display.conditions import KINDS, altered
+
+    profile = load_profile(shown.source, folder=shown.folder)
+    if profile.digest != shown.digest:
+        raise UserError(f"profile '{shown.source}' has changed since the study was planned; start the run again")
+    unmoved = None
     try:
+        if shown.change is not None:
+            if not KINDS[shown.change[0]].moves:
+                unmoved = workbench(shown.nominal, seed)
+            profile = altered(profile, *shown.change)
+        opened = open_bench(profile, shown.spec.shape, seed, unmoved)
         _ = opened.registration  # calibrated now, so that no method's time includes it
     except CellError as error:
         return error

@@ -43,7 +43,8 @@ class Cell:
     (``identity.harness_digest``); metrics: name and version of every metric that can be computed here; measure: what
     is scored, ``picture`` or ``prediction``; holograms: whose captures are predicted (empty for pictures); prepared:
     what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the most that
-    the display allows while the target is solved (None: no limit).
+    the display allows while the target is solved (None: no limit); change: kind and value of what has changed on the
+    display since methods were prepared for it (empty: nothing).
     """
 
     method: str
@@ -68,13 +69,16 @@ class Cell:
     holograms: Mapping[str, Any] = field(default_factory=dict)
     prepared: tuple[str, ...] = ()
     captures: int | None = None
+    change: Mapping[str, Any] = field(default_factory=dict)
 
     def description(self) -> dict[str, Any]:
-        """The cell as plain JSON values; without ``captures`` where there is no limit."""
+        """The cell as plain JSON values; without ``captures`` where there is no limit, and ``change`` where none is."""
         lists = {name: list(getattr(self, name)) for name in ("panel", "metrics", "prepared")}
         plain = {**asdict(self), **lists}
         if self.captures is None:
             del plain["captures"]
+        if not self.change:
+            del plain["change"]
         return plain
 
     @cached_property
@@ -88,7 +92,7 @@ class Task:
     """Cells that share one solution: a method solves a target once, and the phase is shown on each of the
     displays.
 
-    conditions: the display of each cell; the method meets the first one while it solves. A floor task has no
+    conditions: the display of each cell; the method meets the first one, before any change, while it solves. A floor task has no
     solution and one display, which gives the size of the scored region. preparation: what the method learns first.
     """
 
@@ -155,7 +159,8 @@ def plan(study: Study) -> Plan:
     first = next(iter(shown.values()))
     tasks = [ground.floor(first, target, targets[(i + 1) % len(targets)]) for i, target in enumerate(targets)]
     for entry in study.methods:
-        tasks += ground.solutions(entry, [shown[source] for source in entry.profiles], targets)
+        places = [place for source in entry.profiles for place in changed(study, source, shown[source])]
+        tasks += ground.solutions(entry, places, targets)
     made = Plan(tuple(tasks))
     check_unseen(made.preparations(), targets)
     return made
@@ -170,6 +175,24 @@ def displays(study: Study) -> dict[str, Condition]:
     needed = preparation(study, learned.method, learned.params, place)
     name = f"{learned.method.rpartition(':')[2]} trained on {place.name}"
     return {LEARNED: replace(place, name=name, learned=needed)}
+
+
+def changed(study: Study, source: str, place: Condition) -> list[Condition]:
+    """A display as methods were prepared for it, and after every change that the study's sweeps make to it."""
+    from ..display import load_profile
+    from ..display.conditions import KINDS, altered
+
+    changes = [
+        (sweep.condition, value)
+        for sweep in study.sweeps
+        if source in sweep.profiles
+        for value in sweep.values
+        if value != KINDS[sweep.condition].nominal
+    ]
+    profile = load_profile(place.source, folder=place.folder) if changes else None
+    eyes = [altered(profile, *change).spec().eye for change in changes] if profile else []
+    pairs = zip(changes, eyes, strict=True)
+    return [place, *(replace(place, change=one, spec=replace(place.spec, eye=eye)) for one, eye in pairs)]
 
 
 @dataclass(frozen=True)
@@ -222,6 +245,7 @@ class _Ground:
             holograms=probe if study.measure == "prediction" else {},
             prepared=prepared,
             captures=captures,
+            change=dict([place.change]) if place.change and condition != REFERENCE else {},
         )
 
     def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[tuple[str, str]]) -> Iterator[Task]:
@@ -229,11 +253,11 @@ class _Ground:
         cls = registry.find("methods", entry.name, self.study.folder)
         made = (entry.name, code_digest(cls), entry.params)
         for group in [(place,) for place in shown] if self.study.measure == "prediction" else _sharing(cls, shown):
-            own = preparation(self.study, entry.name, entry.params, group[0])
+            own = preparation(self.study, entry.name, entry.params, group[0].nominal)
             for target in targets:
                 for repeat in range(self.study.repeats):
                     cells = (
-                        self.cell(target, place, place.name, repeat, made, _ids(own, place.learned), entry.captures)
+                        self.cell(target, place, place.title, repeat, made, _ids(own, place.learned), entry.captures)
                         for place in group
                     )
                     yield Task(entry.label, tuple(cells), group, own)
@@ -268,11 +292,12 @@ def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ..
     """Displays grouped so that one solution serves a group.
 
     A method that neither captures nor trains nor looks into the bench knows only the nominal optics, so displays with
-    equal nominal optics get the same phase from it.
+    equal nominal optics get the same phase from it. One that was trained knows the display before any change. One that
+    captures or looks into the bench meets it as it is.
     """
-    if any(getattr(cls, property, False) for property in ("camera", "privileged", "trains")):
+    if any(getattr(cls, property, False) for property in ("camera", "privileged")):
         return [(place,) for place in shown]
-    groups: dict[Any, list[Condition]] = {}
+    trains, groups = getattr(cls, "trains", False), dict[Any, list[Condition]]()
     for place in shown:
-        groups.setdefault(replace(place.spec, name=""), []).append(place)
+        groups.setdefault(place.nominal if trains else replace(place.spec, name=""), []).append(place)
     return [tuple(group) for group in groups.values()]

@@ -50,7 +50,7 @@ def key(task: Task, threads: int, workers: int) -> str:
         {
             "method": [cell.method, cell.method_sha256, dict(cell.params), *([cell.captures] if cell.captures else [])],
             "target": [cell.target_sha256, dict(cell.dataset_params)],
-            "display": [repr(place.spec), place.digest, cell.exposure],
+            "display": [repr(place.spec), place.digest, cell.exposure, *([dict(cell.change)] if cell.change else [])],
             "noise": [cell.seed, cell.repeat],
             "learned": [cell.measure, *cell.prepared],
             "measure": cell.measure,

@@ -44,11 +44,15 @@ class CoherentNoise:
         return self._specks(geometry, self.plane_specks, "plane").to(torch.complex64)
 
     def _specks(self, geometry: Geometry, count: int, where: str) -> Tensor:
-        """Absorbing discs with soft edges; radii from a power law, many small and few large."""
+        draws = torch.rand(count, 4, generator=geometry.generator("specks", where), dtype=torch.float64)
+        return self.shade(geometry, draws)
+
+    def shade(self, geometry: Geometry, draws: Tensor) -> Tensor:
+        """Amplitude ``(H, W)`` behind absorbing discs with soft edges, of which each has four random numbers in [0, 1]:
+        row, column, radius (from a power law, many small and few large) and depth. ``(n, 4)``."""
         height, width = geometry.shape
         y, x = geometry.coordinates()
         amplitude = torch.ones(geometry.shape, dtype=torch.float64)
-        draws = torch.rand(count, 4, generator=geometry.generator("specks", where), dtype=torch.float64)
         for row, column, size, depth in draws.tolist():
             radius = max(self.speck_radius * (0.15 + 0.85 * size**3), 0.75 / height)
             distance = torch.sqrt((y - row + 0.5) ** 2 + (x - (column - 0.5) * width / height) ** 2)

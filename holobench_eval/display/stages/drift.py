@@ -8,16 +8,22 @@ from typing import Annotated
 
 import torch
 from annotated_types import Interval
+from torch import Tensor
 
+from .coherent_noise import CoherentNoise
 from .geometry import Geometry
 
 LONGEST = 3650
 """Days of a walk."""
+GATHERED = 365.0
+"""Days in which a panel has gathered the dust that its profile gives it; assumed."""
 
 
 @dataclass(frozen=True)
 class Drift:
     """Seeded random walks with daily steps; each rate is the rms change after one day.
+
+    Dust settles besides, a speck at a time, at the rate at which the panel's ``CoherentNoise.specks`` came.
 
     days since calibration; power: relative laser power; tilt [cycles per panel height]; gain: relative phase gain;
     pose: shift of the image [panel heights].
@@ -47,6 +53,12 @@ class Drift:
     def added_tilt(self, geometry: Geometry) -> tuple[float, float]:
         """Tilt of the beam today [cycles per panel height]."""
         return self.tilt * self.walk(geometry, "tilt y"), self.tilt * self.walk(geometry, "tilt x")
+
+    def dust(self, geometry: Geometry, noise: CoherentNoise) -> Tensor:
+        """Amplitude ``(H, W)`` behind the dust that has settled on the panel since calibration."""
+        settled = math.floor(self.days * noise.specks / GATHERED)
+        draw = geometry.generator("drift", "dust")
+        return noise.shade(geometry, torch.rand(LONGEST, 4, generator=draw, dtype=torch.float64)[:settled])
 
     def added_shift(self, geometry: Geometry) -> tuple[float, float]:
         """Shift of the image on the sensor today [panel heights]."""

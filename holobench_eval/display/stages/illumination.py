@@ -20,7 +20,8 @@ class Illumination:
     beam_sigma: 1/e half width of the *amplitude* ``exp(-r^2 / (2 sigma^2))``, None for a uniform beam;
     offset: largest offset of the beam's centre; fringes: amplitude modulation (0.06 is 6 %) of interference
     fringes, ``fringe_cycles`` a panel height; phase_rms: smooth phase error [rad];
-    tilt: light falls in at this angle [cycles per panel height], a shift of the picture.
+    tilt: light falls in at this angle [cycles per panel height], a shift of the picture; power: of the laser, relative
+    to what the camera's exposure was set for.
     """
 
     beam_sigma: Annotated[float, Interval(gt=0)] | None = None
@@ -29,9 +30,10 @@ class Illumination:
     fringe_cycles: Annotated[float, Interval(ge=0, le=200)] = 8.0
     phase_rms: Annotated[float, Interval(ge=0, le=6.3)] = 0.0
     tilt: tuple[float, float] = (0.0, 0.0)
+    power: Annotated[float, Interval(gt=0, le=100)] = 1.0
 
     def field(self, geometry: Geometry) -> Tensor:
-        """Complex incident field ``(H, W)`` of unit mean intensity."""
+        """Complex incident field ``(H, W)`` of unit mean intensity, whatever the power."""
         y, x = geometry.coordinates()
         amplitude = torch.ones(geometry.shape, dtype=torch.float64)
         if self.beam_sigma is not None:

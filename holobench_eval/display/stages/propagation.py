@@ -23,12 +23,15 @@ class Propagation:
     """What separates the light's way from the nominal one.
 
     distance_error, wavelength_error: relative; aberration: rms waves at 517 nm over the iris (or over the band
-    when there is none), by Zernike name (optics/zernike.py).
+    when there is none), by Zernike name (optics/zernike.py); pupil_shift: of the iris (rows, columns), and obstruction:
+    radius of an opaque disc in its middle, both relative to its radius.
     """
 
     distance_error: Annotated[float, Interval(ge=-0.5, le=0.5)] = 0.0
     wavelength_error: Annotated[float, Interval(ge=-0.1, le=0.1)] = 0.0
     aberration: Mapping[str, float] = field(default_factory=dict)
+    pupil_shift: tuple[float, float] = (0.0, 0.0)
+    obstruction: Annotated[float, Interval(ge=0, lt=1)] = 0.0
 
     def transfer(
         self, geometry: Geometry, padded: tuple[int, int], pupil: float | None, fraction: tuple[float, float]
@@ -44,9 +47,18 @@ class Propagation:
         phase = angular_spectrum_phase(f_squared, wavelength, distance)
         amplitude = (f_squared < 1 / wavelength**2).double()
         if fraction[0] == 0:
-            amplitude = amplitude * iris(fy, fx, geometry.pitch, pupil)
+            amplitude = amplitude * self.iris(fy, fx, geometry, pupil)
             phase = phase + self.pupil_phase(fy, fx, geometry, pupil)
         return torch.polar(amplitude, phase).to(torch.complex64)
+
+    def iris(self, fy: Tensor, fx: Tensor, geometry: Geometry, pupil: float | None) -> Tensor:
+        """Amplitude at spatial frequencies [1/m]; the obstruction is told of the whole band where there is no iris."""
+        radius = (pupil or 1.0) / (2 * geometry.pitch)
+        y, x = fy - self.pupil_shift[0] * radius, fx - self.pupil_shift[1] * radius
+        amplitude = iris(y, x, geometry.pitch, pupil)
+        if self.obstruction:
+            amplitude = amplitude * (1 - iris(y, x, geometry.pitch, self.obstruction * (pupil or 1.0)))
+        return amplitude
 
     def pupil_phase(self, fy: Tensor, fx: Tensor, geometry: Geometry, pupil: float | None) -> Tensor:
         """Aberration [rad] at spatial frequencies [1/m]; constant beyond the iris, where no light passes."""

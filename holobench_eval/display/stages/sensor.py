@@ -18,7 +18,7 @@ class Sensor:
 
     pitch [m]; bits of the converter; dark level [DN]; full_well and read_noise [electrons]; prnu: rms of the
     pixels' relative gain; vignetting: loss at the corner of the frame; nonlinearity: relative loss of response at
-    full scale; headroom: how many times the light of a perfectly reconstructed white pixel fills the well;
+    full scale; ambient: stray light on every pixel, relative to that of a perfectly reconstructed white one; headroom: how many times the light of a perfectly reconstructed white pixel fills the well;
     noise: False for an ideal camera that counts in fractions.
     """
 
@@ -30,6 +30,7 @@ class Sensor:
     prnu: Annotated[float, Interval(ge=0, le=0.2)] = 0.0
     vignetting: Annotated[float, Interval(ge=0, lt=1)] = 0.0
     nonlinearity: Annotated[float, Interval(ge=0, le=0.3)] = 0.0
+    ambient: Annotated[float, Interval(ge=0, le=10)] = 0.0
     headroom: Annotated[float, Interval(ge=1, le=1000)] = 8.0
     noise: bool = True
 
@@ -59,6 +60,8 @@ class Sensor:
         twenty electrons on.
         """
         charge = light * response * electrons
+        if self.ambient:
+            charge = charge + response * (self.ambient * self.full_well / self.headroom)
         if not self.noise:
             return (charge * self.counts_per_electron + self.dark).clamp(max=self.white)
         deviation = charge.clamp_min(0).add_(self.read_noise**2).sqrt_()
