@@ -150,8 +150,9 @@ class Study:
 
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
     captures of ``holograms`` against those captures. note: a paragraph that the report prints beside its tables.
-    repeats: how often every cell is measured, with new noise; sweeps: changes of the displays at test time; baseline: label that paired tests compare
-    against (the first method when the config names none); headline: the column the report leads with.
+    repeats: how often every cell is measured, with new noise; sweeps: changes of the displays at test time; baseline:
+    label that paired tests compare against (the first method when the config names none); headline: the column the
+    report leads with.
     file, text: the config file as the user named it, and what is in it.
     """
 

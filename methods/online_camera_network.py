@@ -56,8 +56,8 @@ class ShortRetrieval(SquaredErrorRetrieval):
 class OnlineCameraNetwork:
     """Rounds of captures, refinement of the image's own network with all of them, and retrieval through it, held.
 
-    captures: in all, as in ``OnlineCamera``, whose start, ``checks`` and decision at the end these are too; there are as
-    many rounds as they are enough for. neighbours: how many holograms near the present one are captured with it in
+    captures: in all, as in ``OnlineCamera``, whose start, ``checks`` and decision at the end these are too; there are
+    as many rounds as they are enough for. neighbours: how many holograms near the present one are captured with it in
     every round, so that the network sees how captures change; they differ from it by normal noise of ``perturbation``
     [rad] rms. steps: of the network's training in a round. network, loss: fresh weights for every image; of Eq. 20 the
     L1 term alone is worth its time in so few steps. retrieval: Eq. 22, of which the squared error alone is used.

@@ -63,7 +63,7 @@ def losses(sweep: Sweep) -> Markup:
         if worst is None:
             continue
         value, loss = worst
-        condition = dict((v, name) for v, name in sweep.swept.points)[value]
+        condition = dict(sweep.swept.points)[value]
         gained = sweep.gain(label, condition) if label != baseline else None
         row = [label, f"{shown(value)} {kind.unit}".strip(), _interval(sweep, loss)]
         row += [f"{slope.mean:+.3g} [{slope.low:+.3g}, {slope.high:+.3g}]" if slope else "–"] if kind.numeric else []
@@ -150,7 +150,7 @@ def _claim(sweep: Sweep, label: str, value: float | str, loss: Estimate) -> str:
         f"On {sweep.swept.before}, that {PAPER[sweep.swept.kind]} {verdict} for {label}: at worst ({where}) it loses "
         f"{score.interval(loss.mean, loss.low, loss.high)} {score.unit}"
     )
-    condition = dict((v, name) for v, name in sweep.swept.points)[value]
+    condition = dict(sweep.swept.points)[value]
     gained, before = sweep.gain(label, condition), sweep.gain(label, sweep.swept.before)
     other = sweep.loss(str(baseline), condition)
     if gained is None or before is None or other is None:

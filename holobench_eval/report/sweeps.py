@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,7 +95,7 @@ class Sweep:
                 if side * (float(value) - self.kind.nominal) >= 0
             )
             gains = [(reach, gained.mean) for reach, name in walk if (gained := self.gain(label, name)) is not None]
-            for (near, above), (far, below) in zip(gains, gains[1:], strict=False):
+            for (near, above), (far, below) in itertools.pairwise(gains):
                 if above > 0 >= below:
                     found.append(self.kind.nominal + side * (near + (far - near) * above / (above - below)))
                     break
@@ -120,7 +121,7 @@ class Sweep:
     def recovered(self, label: str, remedy: Sweep) -> dict[str, Estimate]:
         """Share of each loss that is got back under the same value of another kind, by value."""
         shares = {}
-        same = {value: condition for value, condition in remedy.swept.points}
+        same = dict(remedy.swept.points)
         for value, condition in self.swept.points:
             if value in same:
                 lost, left = self.loss(label, condition), remedy.loss(label, same[value])

@@ -92,7 +92,7 @@ class Task:
     """Cells that share one solution: a method solves a target once, and the phase is shown on each of the
     displays.
 
-    conditions: the display of each cell; the method meets the first one, before any change, while it solves. A floor task has no
+    conditions: the display of each cell; the method meets the first one while it solves. A floor task has no
     solution and one display, which gives the size of the scored region. preparation: what the method learns first.
     """
 

@@ -54,7 +54,7 @@ def corrupt(text: str) -> dict[str, str]:
     }
 
 
-FAULTS = "truncated empty list foreign moved state huge infinite truth label learned".split()
+FAULTS = ["truncated", "empty", "list", "foreign", "moved", "state", "huge", "infinite", "truth", "label", "learned"]
 
 
 @pytest.mark.parametrize("fault", FAULTS)

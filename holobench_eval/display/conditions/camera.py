@@ -10,15 +10,15 @@ from ..stages import Sensor
 
 STAGES = ("propagation", "relay", "sensor")
 FAR = 40.0
-"""mm; the paper's largest shift, at which the following are told. All are assumed: the paper describes no optics for it."""
+"""mm; the paper's largest shift, at which the following are told. All are assumed: no optics of it are described."""
 PUPIL, COMA, ASTIGMATISM = 0.25, 0.05, 0.05
 """Of the iris' radius, along the shift; rms waves, along the shift; rms waves, growing with its square."""
 PERSPECTIVE, REST, DARKER = 0.016, 0.02, 0.2
 """Relative change of scale over a panel height (a picture of 0.1 m seen from 0.5 m); shift of the picture that is left
 after the camera is aimed anew [panel heights]; vignetting at the corner, growing with the square of the shift."""
 MODEL = (
-    f"assumed, at {FAR:g} mm: iris decentred by {PUPIL:g} of its radius, {COMA:g} waves rms of coma, {ASTIGMATISM:g} of "
-    f"astigmatism, perspective of {PERSPECTIVE:g}, {100 * DARKER:.0f} % vignetting; the camera is aimed and registered anew"
+    f"assumed, at {FAR:g} mm: iris decentred by {PUPIL:g} of its radius, {COMA:g} waves rms of coma, {ASTIGMATISM:g} "
+    f"of astigmatism, perspective of {PERSPECTIVE:g}, {100 * DARKER:.0f} % vignetting; the camera is aimed anew"
 )
 
 SENSORS = {

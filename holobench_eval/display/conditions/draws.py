@@ -12,8 +12,9 @@ from ...seeds import generator, seed
 from ..profile import Profile
 
 STAGES = (
-    "seed", "sampling", "lut", "crosstalk", "aperture", "flicker", "illumination", "coherent_noise", "propagation", "zero_order",
-)  # fmt: skip
+    *("seed", "sampling", "lut", "crosstalk", "aperture", "flicker", "illumination", "coherent_noise", "propagation"),
+    "zero_order",
+)
 MODEL = (
     "every parameter of the table drawn evenly within its range, and every random pattern anew; pose, camera and what "
     "is public of the panel stay"

@@ -18,8 +18,8 @@ class Sensor:
 
     pitch [m]; bits of the converter; dark level [DN]; full_well and read_noise [electrons]; prnu: rms of the
     pixels' relative gain; vignetting: loss at the corner of the frame; nonlinearity: relative loss of response at
-    full scale; ambient: stray light on every pixel, relative to that of a perfectly reconstructed white one; headroom: how many times the light of a perfectly reconstructed white pixel fills the well;
-    noise: False for an ideal camera that counts in fractions.
+    full scale; ambient: stray light on every pixel, relative to that of a perfectly reconstructed white one; headroom:
+    how many times the light of such a pixel fills the well; noise: False for an ideal camera that counts in fractions.
     """
 
     pitch: Annotated[float, Interval(gt=0, lt=1e-3)] = 3.72e-6
