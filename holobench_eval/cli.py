@@ -117,7 +117,7 @@ def _run(
     with progress.watching(console) as watch:
         outcome = compute(study, grid, folder, chosen, watch, many, artifacts, **again)
     keep_training_records(grid, Artifacts(artifacts), folder)
-    _sheets(study, folder, outcome.computed > 0)
+    _sheets(study, folder)
     _report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
@@ -125,19 +125,21 @@ def _run(
     return outcome.failed
 
 
-def _sheets(study: Study, output: Path, anew: bool) -> None:
-    """Draw the stages of every display of a study beside its report, where they are missing or it was computed anew."""
+def _sheets(study: Study, output: Path) -> None:
+    """Draw the stages of every display of a study beside its report, where it is not there as this code draws it."""
     from .display import load_profile
-    from .report.sheet import save_sheet
+    from .report.sheet import drawn_from, save_sheet
     from .study.bench import condition, workbench
+    from .study.identity import digest, harness_digest
 
     for source in study.display.profiles:  # a learned display has no stages
         place = condition(source, study.display.panel, study.folder)
         path = output / "figures" / f"stages-{place.name}.png"
-        if anew or not path.exists():
+        source = digest([place.digest, list(place.spec.shape), study.seed, harness_digest()])
+        if drawn_from(path) != source:
             note = load_profile(source, study.folder).scaling_note(study.display.panel)
             try:
-                save_sheet(workbench(place, study.seed), note, path)
+                save_sheet(workbench(place, study.seed), note, path, source)
             except Exception as error:  # a picture must not cost the report
                 print(f"holoeval: no stage sheet of {place.name}: {error}", file=sys.stderr)
 

@@ -10,6 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import torch
 from matplotlib.axes import Axes
+from PIL import Image
 from torch import Tensor
 
 from ..datasets.charts import Charts
@@ -36,8 +37,20 @@ def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | N
     return save_sheet(open_bench(profile, shape), profile.scaling_note(shape), path)
 
 
-def save_sheet(workbench: Workbench, note: str, path: Path) -> Path:
-    """Write the sheet of an open bench; ``note`` says how its panel was scaled. A few seconds at 256 x 256."""
+def drawn_from(path: Path) -> str:
+    """What a sheet says it was drawn from, see ``save_sheet``; empty where there is none or it says nothing."""
+    try:
+        with Image.open(path) as picture:
+            return str(picture.info.get("Description", ""))
+    except (OSError, SyntaxError, ValueError):  # a damaged picture is drawn anew
+        return ""
+
+
+def save_sheet(workbench: Workbench, note: str, path: Path, source: str = "") -> Path:
+    """Write the sheet of an open bench; ``note`` says how its panel was scaled. A few seconds at 256 x 256.
+
+    source: what it is drawn from, kept in the file (PNG), so that it need not be drawn again.
+    """
     bench = workbench.bench
     with plt.rc_context({"font.size": 9, "axes.titlesize": 10}):
         figure, axes = plt.subplots(4, 4, figsize=(17, 15.5), layout="constrained")
@@ -46,7 +59,8 @@ def save_sheet(workbench: Workbench, note: str, path: Path) -> Path:
         _chart(axes.flat[12:], workbench)
     figure.suptitle(f"{bench.profile.name}, version {bench.profile.version}: {bench.profile.description}\n{note}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=100, metadata={"Software": None} if path.suffix == ".png" else None)
+    known = {"Software": None, **({"Description": source} if source else {})}
+    figure.savefig(path, dpi=100, metadata=known if path.suffix == ".png" else None)
     plt.close(figure)
     return path
 
