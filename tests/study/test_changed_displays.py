@@ -1,0 +1,103 @@
+"""Sweeps in a plan: what is solved once, what is solved under the change, and what names a cell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fake_study import write_config
+
+from holobench_eval.config import Study, load_study
+from holobench_eval.errors import UserError
+from holobench_eval.study.bench import condition, workbench
+from holobench_eval.study.plan import Task, plan
+
+SWEEPS = """sweeps:
+  - {condition: drift, values: [0, 30]}
+  - {condition: known_eye, values: ["-2"]}
+"""
+
+
+def study_with(folder: Path, sweeps: str, *methods: str) -> Study:
+    config = write_config(folder, methods or ("plugins.py:Toy",), count=1)
+    config.write_text(config.read_text() + sweeps)
+    return load_study(config)
+
+
+def solutions(study: Study) -> list[Task]:
+    return [task for task in plan(study).tasks if not task.is_floor]
+
+
+def test_a_blind_method_is_solved_once_for_all_changes_that_it_does_not_know(tmp_path: Path) -> None:
+    tasks = solutions(study_with(tmp_path, SWEEPS))
+    assert [[cell.condition for cell in task.cells] for task in tasks] == [
+        ["ideal", "ideal, drift 30 days"],
+        ["ideal, known eye -2"],
+    ]
+    assert tasks[1].conditions[0].spec.eye == pytest.approx((0.05, 0.05, 0))
+
+
+@pytest.mark.parametrize("method", ["plugins.py:Seeing", "oracle"])
+def test_a_method_that_sees_the_display_is_solved_under_every_change(tmp_path: Path, method: str) -> None:
+    assert [len(task.cells) for task in solutions(study_with(tmp_path, SWEEPS, method))] == [1, 1, 1]
+
+
+def test_a_trained_method_is_trained_once_before_any_change(tmp_path: Path) -> None:
+    grid = plan(study_with(tmp_path, SWEEPS, "parametric_model"))
+    assert len(grid.preparations()) == 1
+    assert {task.preparation.place.change for task in grid.tasks if task.preparation} == {None}
+
+
+def test_the_nominal_value_is_the_unchanged_cell(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    plain, swept = plan(study_with(tmp_path / "a", "")), plan(study_with(tmp_path / "b", SWEEPS))
+    assert {cell.id for cell in plain.cells} <= {cell.id for cell in swept.cells}
+    changed = [cell for cell in swept.cells if cell.change]
+    assert [dict(cell.change) for cell in changed] == [{"drift": 30.0}, {"known_eye": "-2"}]
+    assert all(cell.description()["change"] for cell in changed)
+    assert not any("change" in cell.description() for cell in plain.cells)
+
+
+def test_a_change_of_another_value_is_another_cell(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    one = plan(study_with(tmp_path / "a", "sweeps: [{condition: drift, values: [30]}]\n"))
+    other = plan(study_with(tmp_path / "b", "sweeps: [{condition: drift, values: [31]}]\n"))
+    assert len({cell.id for cell in one.cells} ^ {cell.id for cell in other.cells}) == 2
+
+
+def test_a_count_of_siblings_is_a_list_of_names(tmp_path: Path) -> None:
+    study = study_with(tmp_path, "sweeps: [{condition: sibling, count: 3}]\n")
+    assert study.sweeps[0].values == ("1", "2", "3")
+
+
+@pytest.mark.parametrize(
+    ("sweep", "message"),
+    [
+        ("{condition: drfit, values: [1]}", "unknown condition 'drfit'; did you mean 'drift'?"),
+        ("{condition: drift, values: [-1]}", "drift is a number from 0 to 3650, got -1"),
+        ("{condition: drift, values: [1, 2, 1.0]}", "drift 1.0 is listed twice"),
+        ("{condition: drift}", "a sweep has values"),
+        ("{condition: drift, count: 3}", "a sweep has values"),
+        ("{condition: sensor, values: [nikon]}", "unknown camera 'nikon'"),
+        ("{condition: eye, values: [blind]}", "prescription 'blind'"),
+        ("{condition: drift, values: [1], profiles: [leto]}", "'leto' is not in display.profiles"),
+    ],
+)
+def test_a_sweep_that_means_nothing_is_one_line_with_its_place(tmp_path: Path, sweep: str, message: str) -> None:
+    with pytest.raises(UserError, match=r"study.yaml:\d+:\d+: ") as refused:
+        study_with(tmp_path, f"sweeps:\n  - {sweep}\n")
+    assert message in str(refused.value)
+
+
+def test_a_display_is_opened_once_for_every_change(tmp_path: Path) -> None:
+    place = condition("ideal", (128, 128), tmp_path)
+    grid = plan(study_with(tmp_path, SWEEPS))
+    shown = {place.title: place for task in grid.tasks for place in task.conditions}
+    benches = {title: workbench(place, 5) for title, place in shown.items()}
+    assert workbench(shown["ideal"], 5) is benches["ideal"]
+    assert benches["ideal, drift 30 days"].bench.profile.drift.days == 30
+    assert benches["ideal, known eye -2"].registration is benches["ideal"].registration
+    assert benches["ideal, drift 30 days"].registration is not benches["ideal"].registration
+    assert place.change is None
