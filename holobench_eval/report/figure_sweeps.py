@@ -17,12 +17,11 @@ MARKS = "osD^vP*X"
 
 @dataclass(frozen=True)
 class Curve:
-    """A method along a sweep. mean, low, high: by point; NaN for what is not known."""
+    """A method along a sweep. mean: by point; reach: of each point's bar, down and up."""
 
     label: str
     mean: tuple[float, ...]
-    low: tuple[float, ...]
-    high: tuple[float, ...]
+    reach: tuple[tuple[float, float], ...]
     dashed: bool = False
 
 
@@ -67,12 +66,10 @@ def _panel(axes: Axes, panel: Panel, looks: dict[str, tuple[str, str]]) -> None:
         places = np.array(panel.places) + (index - (len(panel.curves) - 1) / 2) * (
             spread if panel.ticks is None else 0.07
         )
-        mean = np.array(curve.mean)
-        offsets = np.nan_to_num(np.stack([mean - curve.low, curve.high - mean]))
         axes.errorbar(
             places,
-            mean,
-            yerr=offsets,
+            curve.mean,
+            yerr=np.nan_to_num(np.array(curve.reach).T),
             color=GREY if curve.dashed else colour,
             marker=mark,
             markersize=5,

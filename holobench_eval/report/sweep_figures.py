@@ -35,8 +35,9 @@ def draw(
         results, said = found[0].results, found[0].kind
         path = folder / f"quality-sweep-{kind}.png"
         draw_sweep(path, [_panel(sweep) for sweep in found], f"{results.headline.axis}{results.layout.wording.axis}")
-        what = f"{results.headline.axis} along a change: {said.words}. Mean over targets with its 95 % interval"
-        yield path, f"{what}; moved apart a little, so that bars do not hide each other. Dashed: the baseline."
+        what = f"{results.headline.axis} along a change: {said.words}. Mean over targets"
+        bars = "bars: 95 % interval of the mean difference to the unchanged display, target by target"
+        yield path, f"{what}; {bars}, moved apart a little. Dashed: the baseline."
         for sweep in found if target is not None else []:
             path = folder / f"sweep-{kind}-{_stem(sweep)}.jpg"
             rows = _rows(sweep, take, target[0]) if target else []
@@ -57,9 +58,9 @@ def _panel(sweep: Sweep) -> Panel:
         points = (("before", sweep.swept.before), *points)
     curves = []
     for label in sweep.methods:
-        found = [sweep.mean(label, condition) for _, condition in points]
-        ends = [tuple(getattr(one, name) for one in found) for name in ("mean", "low", "high")]
-        curves.append(Curve(label, *ends, dashed=label == sweep.results.layout.baseline))
+        means = tuple(sweep.mean(label, condition).mean for _, condition in points)
+        reaches = tuple(_reach(sweep, label, condition) for _, condition in points)
+        curves.append(Curve(label, means, reaches, dashed=label == sweep.results.layout.baseline))
     places = tuple(float(value) for value, _ in points) if kind.numeric else tuple(map(float, range(len(points))))
     return Panel(
         title=sweep.swept.before,
@@ -69,6 +70,15 @@ def _panel(sweep: Sweep) -> Panel:
         ticks=None if kind.numeric else tuple(shown(value) for value, _ in points),
         nominal=kind.nominal,
     )
+
+
+def _reach(sweep: Sweep, label: str, condition: str) -> tuple[float, float]:
+    """How far the interval of the mean difference to the unchanged display reaches down and up."""
+    loss = sweep.loss(label, condition) if condition != sweep.swept.before else None
+    if loss is None:
+        return 0.0, 0.0
+    ends = loss.high - loss.mean, loss.mean - loss.low
+    return ends if sweep.results.headline.higher_is_better else (ends[1], ends[0])
 
 
 def _rows(sweep: Sweep, take: Take, target: str) -> list[Row]:

@@ -160,7 +160,9 @@ class Lines:
     def _left(self, now: float) -> str:
         if not self.done or self.begun is None:
             return ""
-        return f", about {(now - self.begun) / self.done * (self.total - self.done):.0f} s left"
+        training = len(self.follower.places)
+        beside = f" besides the {training} in training" * bool(training)
+        return f", about {(now - self.begun) / self.done * (self.total - self.done):.0f} s left{beside}"
 
 
 @contextmanager
