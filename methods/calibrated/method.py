@@ -46,6 +46,10 @@ class ThroughModel(ABC):
     start: Wirtinger holography, stopped while its phase is still smooth: a converged phase is full of wraps that
     descent does not get out of.
     seed: of the model's first weights, where it has any.
+
+    In the end, the holograms of the held-out images by ``retrieval`` through the model and by ``NOMINAL`` are captured.
+    Where the latter's captures are closer to the targets, ``nominal`` is kept as 1 and ``solve`` gives them: of a
+    display that is as the nominal model says, a calibration learns noise.
     """
 
     training: Rounds = Rounds()
@@ -59,16 +63,23 @@ class ThroughModel(ABC):
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 1
 
+    NOMINAL: ClassVar[Wirtinger] = Wirtinger()
+
     @abstractmethod
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """The model, untrained."""
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Learn the display from captures; what ``solve`` and ``predict`` need of it."""
-        return self._learned(bench).learned()
+        approximator = self._learned(bench)
+        return {**approximator.learned(), "nominal": int(self._is_nominal(bench, approximator))}
 
-    def _learned(self, bench: TrainingBench, before: Sequence[Sample] = ()) -> ModelApproximator:
-        """The trained model. before: see ``train_in_the_loop``."""
+    def _before(self, _: TrainingBench) -> Sequence[Sample]:
+        """Samples that every round learns from, beside its own."""
+        return ()
+
+    def _learned(self, bench: TrainingBench) -> ModelApproximator:
+        """The trained model."""
         check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec)
 
@@ -78,11 +89,31 @@ class ThroughModel(ABC):
         def search(display: Image, target: Tensor, phase: Tensor) -> Tensor:
             return retrieve(display, target, phase, self.search)
 
-        train_in_the_loop(bench, approximator, begin, search, self.training, before)
+        train_in_the_loop(bench, approximator, begin, search, self.training, self._before(bench))
         return approximator
+
+    def _is_nominal(self, bench: TrainingBench, approximator: ModelApproximator) -> bool:
+        """Whether, on the held-out images, plain Wirtinger holography is captured closer to the targets."""
+
+        def learned(image: TrainingImage) -> Tensor:
+            start = self.start.solve(image.target[None], bench)[0]
+            return retrieve(approximator.image(bench.light(image)), image.target, start, self.retrieval)
+
+        def nominal(image: TrainingImage) -> Tensor:
+            return self.NOMINAL.solve(image.target[None], bench)[0]
+
+        def captured(name: str, solve: Callable[[TrainingImage], Tensor], image: TrainingImage) -> float:
+            """PSNR [dB]."""
+            made = bench.kept(f"{name} {image.item}", lambda: {"shown": bench.photograph(solve(image), image, name)})
+            return matched_psnr(made["shown"], image.target)
+
+        gains = [captured("learned", learned, one) - captured("nominal", nominal, one) for one in bench.held_out]
+        return sum(gains) < 0
 
     def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        if bench.learned["nominal"]:
+            return self.NOMINAL.solve(target, bench)
         display, start = self._display(bench), self.start.solve(target, bench)
         pairs = zip(target, start, strict=True)
         return torch.stack([retrieve(display, image, phase, self.retrieval) for image, phase in pairs])
@@ -112,45 +143,10 @@ class Schedule(Rounds):
 
 @dataclass(frozen=True)
 class Calibrated(ThroughModel):
-    """``ThroughModel`` from few captures, and with a way back where there was nothing to correct.
-
-    patterns: speckle-like patterns captured before, and learned from in all rounds.
-
-    In the end, the holograms of the held-out images by ``retrieval`` through the model and by ``NOMINAL`` are captured.
-    Where the latter's captures are closer to the targets, ``nominal`` is kept as 1 and ``solve`` gives them: of a
-    display that is as the nominal model says, a calibration learns noise.
-    """
+    """``ThroughModel`` from few captures. patterns: speckle-like, captured before and learned from in all rounds."""
 
     training: Schedule = Schedule()
     patterns: Annotated[int, Interval(ge=0, le=1000)] = 12
 
-    NOMINAL: ClassVar[Wirtinger] = Wirtinger()
-
-    def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
-        """Learn the display from captures; what ``solve`` and ``predict`` need of it."""
-        approximator = self._learned(bench, pattern_samples(bench, self.patterns))
-        return {**approximator.learned(), "nominal": int(self._is_nominal(bench, approximator))}
-
-    def _is_nominal(self, bench: TrainingBench, approximator: ModelApproximator) -> bool:
-        """Whether, on the held-out images, plain Wirtinger holography is captured closer to the targets."""
-
-        def learned(image: TrainingImage) -> Tensor:
-            start = self.start.solve(image.target[None], bench)[0]
-            return retrieve(approximator.image(bench.light(image)), image.target, start, self.retrieval)
-
-        def nominal(image: TrainingImage) -> Tensor:
-            return self.NOMINAL.solve(image.target[None], bench)[0]
-
-        def captured(name: str, solve: Callable[[TrainingImage], Tensor], image: TrainingImage) -> float:
-            """PSNR [dB]."""
-            made = bench.kept(f"{name} {image.item}", lambda: {"shown": bench.photograph(solve(image), image, name)})
-            return matched_psnr(made["shown"], image.target)
-
-        gains = [captured("learned", learned, one) - captured("nominal", nominal, one) for one in bench.held_out]
-        return sum(gains) < 0
-
-    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
-        if bench.learned["nominal"]:
-            return self.NOMINAL.solve(target, bench)
-        return super().solve(target, bench)
+    def _before(self, bench: TrainingBench) -> Sequence[Sample]:
+        return pattern_samples(bench, self.patterns)

@@ -60,7 +60,7 @@ class HILPlus(Diagnosed, ThroughModel):
 
     network: Network | None = None
 
-    version: ClassVar[int] = 2
+    version: ClassVar[int] = 3
 
     def approximator(self, spec: DisplaySpec) -> PlusApproximator:
         """The display model, untrained, with a network if there is one."""
