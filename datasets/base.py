@@ -37,14 +37,14 @@ class Dataset(Protocol):
         ...
 
 
-def fit(image: Tensor, shape: tuple[int, int]) -> Tensor:
+def fit(image: Tensor, shape: tuple[int, int], resampling: Image.Resampling = Image.Resampling.BILINEAR) -> Tensor:
     """The largest centred part of an image that has the aspect of ``shape``, resized to it; never a stretch.
 
     image: ``(C, H, W)`` linear light in [0, 1]; shape: ``(h, w)`` px. Returns ``(C, h, w)`` float32 in [0, 1].
 
     The crop is not rounded to pixels, so that both axes are scaled by the same factor exactly. The filter is a
     triangle as wide as two output pixels (two input pixels where the image is too small and has to be enlarged):
-    its weights are positive, so nothing rings and the result needs no clipping.
+    its weights are positive, so nothing rings and the result needs no clipping. ``resampling``: another of Pillow's.
     """
     rows, columns = shape
     height, width = image.shape[-2:]
@@ -53,7 +53,7 @@ def fit(image: Tensor, shape: tuple[int, int]) -> Tensor:
     # Rounding must not reach past the border by the last bit, which Pillow refuses.
     box = (max(left, 0.0), max(top, 0.0), min(left + columns * scale, width), min(top + rows * scale, height))
     resized = [
-        np.asarray(Image.fromarray(plane).resize((columns, rows), Image.Resampling.BILINEAR, box=box))
+        np.asarray(Image.fromarray(plane).resize((columns, rows), resampling, box=box))
         for plane in image.to(torch.float32).numpy()
     ]
     return torch.from_numpy(np.stack(resized)).clamp_(0.0, 1.0)

@@ -135,11 +135,11 @@ def _sheets(study: Study, output: Path) -> None:
     for source in study.display.profiles:  # a learned display has no stages
         place = condition(source, study.display.panel, study.folder)
         path = output / "figures" / f"stages-{place.name}.png"
-        source = digest([place.digest, list(place.spec.shape), study.seed, harness_digest()])
-        if drawn_from(path) != source:
+        wanted = digest([place.digest, list(place.spec.shape), study.seed, harness_digest()])
+        if drawn_from(path) != wanted:
             note = load_profile(source, study.folder).scaling_note(study.display.panel)
             try:
-                save_sheet(workbench(place, study.seed), note, path, source)
+                save_sheet(workbench(place, study.seed), note, path, wanted)
             except Exception as error:  # a picture must not cost the report
                 print(f"holoeval: no stage sheet of {place.name}: {error}", file=sys.stderr)
 

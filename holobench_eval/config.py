@@ -20,6 +20,7 @@ from .errors import UserError, suggest
 from .study.bench import LEARNED, condition
 from .study.identity import params_of
 from .study.plan import FLOORS, REFERENCE, scored_dataset
+from .study.stacks import SCORES, planes_of
 from .typed_yaml import check_keys, typed
 from .yaml_source import Document, Keys, load
 
@@ -149,7 +150,8 @@ class Study:
     """A grid of cells and the tables drawn from it; see ``load_study``.
 
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
-    captures of ``holograms`` against those captures. note: a paragraph that the report prints beside its tables.
+    captures of ``holograms`` against those captures; ``focus`` scores the planes of focal stacks, each at its own
+    distance. note: a paragraph that the report prints beside its tables.
     repeats: how often every cell is measured, with new noise; sweeps: changes of the displays at test time; baseline:
     label that paired tests compare against (the first method when the config names none); headline: the column the
     report leads with.
@@ -160,7 +162,7 @@ class Study:
     display: DisplayGrid
     targets: Targets
     methods: Annotated[tuple[MethodEntry, ...], MinLen(1)]
-    measure: Literal["picture", "prediction"] = "picture"
+    measure: Literal["picture", "prediction", "focus"] = "picture"
     holograms: Probe = Probe()
     training: Training = Training()
     sweeps: tuple[Sweep, ...] = ()
@@ -240,6 +242,8 @@ def _targets(study: Study, document: Document) -> Targets:
         dataset = scored_dataset(study)
         if not dataset.items():
             raise UserError(f"dataset '{study.targets.dataset}' has no images")
+        if study.measure == "focus":
+            planes_of(dataset, study.targets.dataset)
     return replace(study.targets, params=params_of(dataset))
 
 
@@ -269,7 +273,7 @@ def _display(study: Study, document: Document) -> DisplayGrid:
         raise document.error(where, "display.profiles or display.learned: name displays in one of the two")
     if display.learned is None:
         return display
-    if study.measure == "prediction":
+    if study.measure != "picture":
         raise document.error(("measure",), "a learned display is a prediction already; measure its pictures")
     where = ("display", "learned")
     with _placed(document, (*where, "method"), (*where, "params")):
@@ -320,8 +324,8 @@ def _sweep(study: Study, document: Document, index: int) -> Sweep:
     from .display.profile import load_profile
 
     sweep, where = study.sweeps[index], ("sweeps", index)
-    if study.display.learned or study.measure == "prediction":
-        raise document.error(where, "a sweep changes simulated displays, and scores pictures")
+    if study.display.learned or study.measure != "picture":
+        raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
     if sweep.condition not in KINDS:
         near = suggest(sweep.condition, KINDS)
         raise document.error((*where, "condition"), f"unknown condition '{sweep.condition}'; {near}")
@@ -330,7 +334,8 @@ def _sweep(study: Study, document: Document, index: int) -> Sweep:
         raise document.error(where, "a sweep has values; one of siblings or draws may have a count in their place")
     given = sweep.values or tuple(str(number) for number in range(1, (sweep.count or 0) + 1))
     profiles = _subset(study, document, sweep.profiles, (*where, "profiles"))
-    values = [value for other in study.sweeps[:index] if other.condition == sweep.condition for value in other.values]
+    same = [other for other in study.sweeps[:index] if other.condition == sweep.condition]
+    values = [value for other in same if set(other.profiles) & set(profiles) for value in other.values]
     known = len(values)
     for number, value in enumerate(given):
         place: Keys = (*where, "values", number) if sweep.values else (*where, "count")
@@ -396,6 +401,7 @@ def _check_headline(study: Study, document: Document) -> None:
     from .metrics.catalogue import catalogue
 
     columns = [f"{metric.name}_{domain}" for metric in catalogue() for domain in metric.domains]
+    columns += SCORES if study.measure == "focus" else ()
     if study.headline not in columns:
         message = f"unknown metric '{study.headline}'; {suggest(study.headline, columns)}"
         raise document.error(("headline",), message)

@@ -9,12 +9,22 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from ..study.store import write_atomically
-from . import leaderboard, section_diagnosis, section_sweeps, section_training, sections, sweep_figures
+from . import (
+    leaderboard,
+    section_diagnosis,
+    section_focus,
+    section_ranks,
+    section_sweeps,
+    section_training,
+    sections,
+    sweep_figures,
+)
 from .description import Description, counts, describe, environment, method_parameters, rules, setup
 from .figures import Figures, draw_figures
-from .findings import findings
+from .findings import blur_keys, findings
 from .layout import Layout, layout_of
 from .markdown import render
+from .ranks import ranks
 from .results import Results
 from .section_training import Trained
 from .statistics import RESAMPLES
@@ -53,6 +63,7 @@ def write_report(
     context = (
         _numbers(results)
         | _changes(results)
+        | _draws(results)
         | _words(results, records, provenance, description)
         | _training(layout, trained)
     )
@@ -97,9 +108,14 @@ def _numbers(results: Results) -> dict[str, Any]:
         "baseline": results.layout.baseline,
         "baseline_tests": sections.tests(results, results.against_baseline) if results.against_baseline else "",
         "all_tests": sections.tests(results, results.between_all) if results.between_all else "",
+        "planes": [
+            (condition, shown, section_focus.sentences(results, condition))
+            for condition, shown in each(section_focus.by_plane)
+        ],
         "domain_tables": each(sections.domains),
         "geometry_tables": each(sections.geometry),
         "blur_tables": each(sections.blur),
+        "blurred": next(iter(blur_keys(results)), results.headline),
         "memory": MEMORY_COLUMN in results.table,
         "light_tables": each(sections.light_and_time),
         "target_tables": each(sections.per_target),
@@ -127,6 +143,21 @@ def _changes(results: Results) -> dict[str, Any]:
         "claims": section_sweeps.claims(results, every),
         "sweeps_missing": sweep_figures.missing(every),
     }
+
+
+def _draws(results: Results) -> dict[str, Any]:
+    """The section on rankings over draws of the displays, empty for a study without them."""
+    told = [
+        (
+            section_ranks.heading(one),
+            section_ranks.sentences(one),
+            section_ranks.methods(one) if one.told else "",
+            section_ranks.flips(one) if one.told else "",
+            section_ranks.ranges(one),
+        )
+        for one in ranks(results)
+    ]
+    return {"ranks": told, "ranks_introduction": section_ranks.introduction()}
 
 
 def _words(
@@ -173,6 +204,7 @@ def _pictures(figures: Figures) -> dict[str, Any]:
         "charts": figures.charts,
         "frontiers": figures.frontiers,
         "sweep_figures": figures.sweeps,
+        "rank_figures": figures.ranks,
         "comparisons": figures.comparisons,
         "stages": figures.stages,
         "training_figures": figures.trainings,

@@ -188,11 +188,11 @@ def rules(results: Results) -> dict[str, str]:
         if residuals
         else "No residual was recorded."
     )
-    refused = "; above 0.1 % a capture is refused" if results.layout.measure == "picture" else ""
+    refused = "; above 0.1 % a capture is refused" if results.layout.measure != "prediction" else ""
     saturation = (
         f"At most {100 * saturated.max():.3g} % of a capture's samples{refused}." if len(saturated) else "Not recorded."
     )
-    known = EXPOSURES if results.layout.measure == "picture" else EXPOSURES_PREDICTED
+    known = EXPOSURES if results.layout.measure != "prediction" else EXPOSURES_PREDICTED
     policies = sorted(set(results.frame["exposure"]) - {""})
     exposure = " ".join(known.get(policy, policy) for policy in policies) or "Not recorded."
     return {"registration": registration, "saturation": saturation, "exposure": exposure}

@@ -12,12 +12,13 @@ import pandas as pd
 
 from ..study.plan import REFERENCE
 from ..study.store import Store
-from . import frontiers, sweep_figures
+from . import figure_ranks, frontiers, sweep_figures
 from .figure_charts import Chart, quality_bars, target_dots
 from .figure_comparison import draw_comparison, tile_size
 from .figure_style import slugs
 from .figure_training import draw_trainings
 from .gallery import Column, Picture, Tile, chunks, error_ceiling, error_map, load_picture, spread
+from .ranks import ranks
 from .results import Results
 from .section_training import Trained
 from .sections import label, leading_scores
@@ -48,6 +49,7 @@ class Figures:
     charts: list[Drawn]
     frontiers: list[Drawn]
     sweeps: list[Drawn]
+    ranks: list[Drawn]
     comparisons: list[Drawn]
     stages: list[Drawn]
     trainings: list[Drawn]
@@ -71,14 +73,15 @@ def draw_figures(results: Results, trained: Sequence[Trained], output: Path) -> 
         _charts(results, folder),
         [Drawn(f"{FOLDER}/{path.name}", caption) for path, caption in frontiers.draw(results, folder)],
         _sweeps(results, output, absent),
+        [Drawn(f"{FOLDER}/{path.name}", caption) for path, caption in figure_ranks.draw(ranks(results), folder)],
         comparisons,
         _stages(results, folder),
         _trainings(trained, folder),
     )
-    charts, costs, changes, captures, stages, trainings = (
+    charts, costs, changes, stability, captures, stages, trainings = (
         [replace(drawn, number=next(number)) for drawn in kind] for kind in kinds
     )
-    return Figures(charts, costs, changes, captures, stages, trainings, sorted(set(absent)))
+    return Figures(charts, costs, changes, stability, captures, stages, trainings, sorted(set(absent)))
 
 
 def _sweeps(results: Results, output: Path, absent: list[str]) -> list[Drawn]:
@@ -148,7 +151,8 @@ def _comparison(results: Results, output: Path, condition: str, stem: str, absen
     methods, said = results.methods(condition), results.layout.wording
     if not targets or not methods:
         return
-    shown = _selection(results, condition, targets)
+    sheets = _sheets(results, condition, targets)
+    shown = [target for sheet in sheets for target in sheet]
     tiles = {
         (name, target): _tile(results, store, (name, condition, target), targets[target].shape, absent)
         for name in methods
@@ -157,7 +161,7 @@ def _comparison(results: Results, output: Path, condition: str, stem: str, absen
     errors = [error_map(tile.picture, targets[key[1]]) for key, tile in tiles.items() if tile.picture is not None]
     if not errors:
         return
-    pages = [(a, b) for a in chunks(shown, TARGETS_A_PAGE) for b in chunks(methods, METHODS_A_PAGE)]
+    pages = [(a, b) for a in sheets for b in chunks(methods, METHODS_A_PAGE)]
     scale = error_ceiling(errors)
     for number, (rows, labels) in enumerate(pages, start=1):
         columns = [Column(label(results, name), tuple(tiles[name, row] for row in rows)) for name in labels]
@@ -175,6 +179,15 @@ def _caption(results: Results, condition: str, page: str, shown: int) -> str:
         f"{said.scored.capitalize()}s on {condition}{page}: {chosen}. {said.picture}; below, the most detailed window "
         f"of the {said.truth} enlarged twice as much, and the absolute error against the {said.truth} in sRGB."
     )
+
+
+def _sheets(results: Results, condition: str, targets: dict[str, Picture]) -> list[list[str]]:
+    """The targets of each page: of focal stacks every plane, a scene a page."""
+    planes = results.layout.planes
+    if not planes:
+        return list(chunks(_selection(results, condition, targets), TARGETS_A_PAGE))
+    stacks = [[t for t in targets if planes[t][0] == scene] for scene in dict.fromkeys(planes[t][0] for t in targets)]
+    return [sheet for stack in stacks for sheet in chunks(stack, TARGETS_A_PAGE)]
 
 
 def _selection(results: Results, condition: str, targets: dict[str, Picture]) -> list[str]:
@@ -215,7 +228,7 @@ def _tile(results: Results, store: Store, place: tuple[str, str, str], shape: Se
         return Tile(None, "no thumbnail of this capture")
     if picture.shape != tuple(shape):
         return Tile(None, f"thumbnail is {picture.shape[1]} x {picture.shape[0]}, target {shape[1]} x {shape[0]}")
-    scores = [results.headline, *(s for s in leading_scores(results) if s.metric == "ssim")]
+    scores = [results.headline, *(s for s in leading_scores(results) if s.metric == "ssim")][:2]
     return Tile(picture, "   ".join(f"{s.title} {s.with_unit(float(cell[s.key]))}" for s in scores))
 
 

@@ -177,17 +177,17 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
 
 
 def blur_keys(results: Results) -> list[Score]:
-    """The headline metric at each blur width, sharpest first; the plain one counts as width zero."""
+    """The headline metric, of whole pictures, at each blur width, sharpest first; plain counts as width zero."""
     same = [s for s in results.scores if (s.metric, s.domain) == (results.headline.metric, results.headline.domain)]
     blurred = sorted((s for s in same if s.blur is not None), key=lambda s: s.blur or 0.0)
-    return [results.headline, *blurred] if blurred else []
+    return [next(s for s in same if not s.variant), *blurred] if blurred else []
 
 
 def _blur(results: Results, condition: str) -> list[str]:
     keys = blur_keys(results)
     rankings = {score: results.ranking(condition, score.key) for score in keys}
-    plain = results.ranking(condition)
-    if len(plain) < 2 or not keys:
+    plain = rankings[keys[0]] if keys else []
+    if len(plain) < 2:
         return []
     flips = []
     for score, ranking in rankings.items():

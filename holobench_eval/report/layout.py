@@ -7,7 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from .. import registry
+from ..display.conditions import draws
+from ..display.profile import load_profile
 from ..study.plan import changed, displays, scored_dataset
+from ..study.stacks import planes_of
 from .tracks import CALIBRATED, CEILING, ONLINE, OPEN_LOOP
 from .wording import Wording, plain, wording
 
@@ -35,12 +38,14 @@ class Swept:
     """A change of a display, by one value after another, and the conditions under which cells stand for it.
 
     kind: of ``display.conditions``; before: the condition without the change; points: (value, condition) of every
-    other one, in the order of the config.
+    other one, in the order of the config; drawn: of random draws, the value of each parameter that the display has, by
+    its name in ``display.conditions.draws``, a mapping per point.
     """
 
     kind: str
     before: str
     points: tuple[tuple[float | str, str], ...]
+    drawn: tuple[Mapping[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,8 +59,10 @@ class Layout:
     privileged: labels of methods that may differentiate through the bench; they are the ceiling, not competitors.
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
-    note: a paragraph that the study wants beside its tables. measure: ``picture`` or ``prediction``; holograms: whose
-    captures are predicted, with parameters. learned_display: the condition that is a trained network (None: benches).
+    note: a paragraph that the study wants beside its tables. measure: ``picture``, ``prediction`` or ``focus``;
+    holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
+    stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
+    that is a trained network (None: benches).
     trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
     camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
     of others.
@@ -79,6 +86,8 @@ class Layout:
     training: TrainingSet | None = None
     camera: frozenset[str] = frozenset()
     sweeps: tuple[Swept, ...] = ()
+    planes: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    stacked: frozenset[str] = frozenset()
 
     def track(self, label: str) -> str:
         """The track that a method competes in."""
@@ -159,6 +168,8 @@ def layout_of(study: Study) -> Layout:
         training=_training_set(study) if trained or study.display.learned else None,
         camera=marked("camera"),
         sweeps=tuple(_sweeps(study, shown)),
+        planes=planes_of(scored_dataset(study), study.targets.dataset) if study.measure == "focus" else {},
+        stacked=marked("planes") if study.measure == "focus" else frozenset(),
     )
 
 
@@ -168,7 +179,17 @@ def _sweeps(study: Study, shown: Mapping[str, Condition]) -> Iterator[Swept]:
             places = changed(replace(study, sweeps=(sweep,)), source, shown[source])[1:]
             points = tuple((place.change[1], place.title) for place in places if place.change)
             if points:
-                yield Swept(sweep.condition, shown[source].name, points)
+                drawn = _drawn(shown[source], points) if sweep.condition == "draw" else ()
+                yield Swept(sweep.condition, shown[source].name, points, drawn)
+
+
+def _drawn(place: Condition, points: tuple[tuple[float | str, str], ...]) -> tuple[dict[str, float], ...]:
+    """What was drawn at every point, without the parameters of stages that the display lacks."""
+    profile = load_profile(place.source, folder=place.folder)
+    every = draws.PARAMETERS.items()
+    felt = {name for name, one in every if one.put(profile, one.low) != one.put(profile, one.high)}
+    drawn = (draws.values(profile, int(index)) for index, _ in points)
+    return tuple({name: value for name, value in one.items() if name in felt} for one in drawn)
 
 
 def _training_set(study: Study) -> TrainingSet:

@@ -162,7 +162,7 @@ class Results:
         The reference rows make them: for predictions, captures of one display.
         """
         made_for = self.frame.loc[self.frame["condition"] == REFERENCE, "profile"]
-        return self.layout.measure == "picture" or condition in set(made_for)
+        return self.layout.measure != "prediction" or condition in set(made_for)
 
     @cached_property
     def holes(self) -> pd.DataFrame:

@@ -49,7 +49,13 @@ class Score:
     @property
     def title(self) -> str:
         """The metric's usual name."""
-        return _TITLES.get(self.metric, self.metric.replace("_", " "))
+        name = _TITLES.get(self.metric, self.metric.replace("_", " "))
+        return f"{name} in focus" if self.in_focus else name
+
+    @property
+    def in_focus(self) -> bool:
+        """Whether it is the score of what is in focus at the plane of a focal stack, and not of the whole picture."""
+        return self.variant == "infocus"
 
     @property
     def unit(self) -> str:

@@ -62,7 +62,7 @@ def _legible(row: Row) -> bool:
 
 
 def _known(value: object) -> bool:
-    return type(value) in (int, float) and -MOST < value < MOST  # type: ignore[operator]  # NaN is neither
+    return isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST  # not for NaN
 
 
 def _table(rows: Sequence[Row]) -> Markup:

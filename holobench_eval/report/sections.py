@@ -31,9 +31,9 @@ def label(results: Results, name: str) -> str:
 
 
 def leading_scores(results: Results) -> list[Score]:
-    """The headline metric, then the usual ones: each in linear light, or in the only domain it has."""
+    """The headline metric, those of what is in focus, then the usual ones in linear light, or in their only domain."""
     plain = [score for score in results.scores if not score.variant]
-    chosen = [results.headline]
+    chosen = list(dict.fromkeys([results.headline, *(score for score in results.scores if score.in_focus)]))
     for metric in LEADING:
         found = sorted((s for s in plain if s.metric == metric), key=lambda s: s.domain not in ("linear", ""))
         if found and found[0] not in chosen and not (metric == "mofd" and any("lpips" in s.metric for s in chosen)):

@@ -156,6 +156,26 @@ PREDICTION = replace(
 )
 
 
+FOCUS = replace(
+    PICTURE,
+    procedure=(
+        "The targets are focal stacks: a scene with depth as an eye sees it that focuses on one plane after another, "
+        "with depth-of-field blur. A method turns the picture of a plane into a phase pattern for the display's own "
+        "distance; the display adds the phase of a lens, which moves the picture to its plane, and the camera stands "
+        "there and is registered anew (dynamic global focus). A method that makes one hologram of all planes of a "
+        "scene is given all their pictures; no lens is added, and the camera goes from plane to plane. A capture is "
+        'matched in intensity over the whole picture and scored; scores "in focus" are of what is in focus at its '
+        "plane."
+    ),
+    caution="Targets of one scene are not independent, so that intervals and tests over targets are too narrow.",
+    picture="Each capture is taken at the plane of its target, registered, matched in intensity and sRGB-encoded",
+    effort=(
+        "Captures are camera captures that a method used for one hologram, and seconds are those of one hologram: of "
+        "one plane, or of all planes of a scene for a method that makes one of them."
+    ),
+)
+
+
 def wording(measure: str, holograms: str, on_a_network: bool) -> Wording:
     """The words for a measure; holograms: the method whose captures are predicted."""
     if measure == "prediction":
@@ -164,4 +184,6 @@ def wording(measure: str, holograms: str, on_a_network: bool) -> Wording:
             procedure=PREDICTION.procedure.replace("{holograms}", holograms),
             picture=PREDICTION.picture.replace("{holograms}", holograms),
         )
+    if measure == "focus":
+        return FOCUS
     return ON_A_NETWORK if on_a_network else PICTURE

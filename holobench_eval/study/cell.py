@@ -6,20 +6,22 @@ import math
 import traceback
 
 from ..errors import CellError
+from . import focus
 from .bench import Condition
 from .job import Job, repeatable
 from .measures import Measure, floor, picture, prediction
 from .plan import Cell
 from .store import Record, Store, write_atomically
 
-MEASURES = {"picture": picture, "prediction": prediction}
+MEASURES = {"picture": picture, "prediction": prediction, "focus": focus.focus}
+FLOORS = {"picture": floor, "prediction": floor, "focus": focus.floor}
 
 
 def work(job: Job) -> list[Record]:
     """Compute and write the wanted records of a task. A failure of a cell becomes a failed record, never an error."""
     with repeatable(job.setting.threads):
         try:
-            measure = (floor if job.task.is_floor else MEASURES[job.task.cells[0].measure])(job)
+            measure = (FLOORS if job.task.is_floor else MEASURES)[job.task.cells[0].measure](job)
         except (Exception, SystemExit) as error:
             return [_note_failure(job, cell, error) for cell, _ in job.cells]
         return [_recorded(job, cell, place, measure) for cell, place in job.cells]

@@ -1,9 +1,12 @@
-"""How a cell becomes scores: a picture against its target, a prediction against a capture, a reference image."""
+"""How a cell becomes scores: a picture against its target, a prediction against a capture, a reference image.
+
+Focal stacks are in ``focus``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +19,7 @@ from ..metrics import floor_captures, match, score
 from . import effort, timings
 from .artifacts import Artifact
 from .bench import Condition, workbench
+from .effort import Effort
 from .images import write_capture, write_phase, write_thumbnail
 from .job import Job, target_of
 from .plan import Cell
@@ -28,14 +32,43 @@ MOST_SATURATED = 0.001
 """Largest fraction of saturated samples with which a capture is scored (protocol v1, step 1)."""
 
 Measure = Callable[[Cell, Condition], Record]
+Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]
+"""The scores of an image ``(C, h, w)`` against the wanted one."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method made: the phase ``(C, H, W)`` [rad], the captures and the effort it took, why the display ended it
+    (empty: it did not), and what it had learned."""
+
+    phase: Tensor
+    captures: int
+    taken: Effort
+    stopped: str
+    learned: Artifact | None
+
+
+def plain(job: Job, _: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
+    """The scores of the metric protocol."""
+    return score(image, wanted, lpips_weights=job.setting.lpips_weights)
 
 
 def picture(job: Job) -> Measure:
     """Solve the task's target on its first display; the result shows the phase on any of its displays."""
+    place = job.task.conditions[0]
+    target = target_of(job.task.cells[0], place, job.setting.folder)
+    made = solution(job, place, target, lambda method, handle: method.solve(target[None].clone(), handle))
+    return lambda cell, place: captured(job, made, cell, place, target)
+
+
+def solution(job: Job, place: Condition, target: Tensor, solve: Callable[[Any, MeteredBench], Any]) -> Solution:
+    """Let the task's method ``solve`` on a display, in the name of the task's first cell.
+
+    target: ``(C, h, w)``, which the display is exposed for. What a method does to its own must not reach the score.
+    """
     task, setting = job.task, job.setting
-    first, place = task.cells[0], task.conditions[0]
+    first, learned = task.cells[0], job.learned(task.preparation)
     method = registry.build("methods", first.method, dict(first.params), setting.folder)
-    target, learned = target_of(first, place, setting.folder), job.learned(task.preparation)
     handle = job.bench(first, place).for_method(
         method,
         task.label,
@@ -45,47 +78,47 @@ def picture(job: Job) -> Measure:
         budget=first.captures,
         learned=learned.state if learned else None,
     )
-    given = target[None].clone()  # what a method does to its target must not reach the score
     watch = effort.start()
-    solved, stopped = _within_budget(method, given, handle)
+    solved, stopped = _within_budget(method, solve, handle)
     taken = watch.stop()
-    if not isinstance(solved, Tensor) or tuple(solved.shape[:2]) != tuple(given.shape[:2]):
+    if not isinstance(solved, Tensor) or tuple(solved.shape[:2]) != (1, len(target)):
         found = tuple(solved.shape) if isinstance(solved, Tensor) else type(solved).__name__
-        raise CellError(f"{task.label}: solve returned {found}, not a phase ({given.shape[0]}, {given.shape[1]}, H, W)")
-    phase = solved.detach().cpu()[0]
+        raise CellError(f"{task.label}: solve returned {found}, not a phase (1, {len(target)}, H, W)")
     taken = timings.keep(timings.key(task, setting.threads, setting.workers), taken, setting.retime)
-
-    def show(cell: Cell, place: Condition) -> Record:
-        shot = job.bench(cell, place).photograph(
-            phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure, label=task.label
-        )
-        _refuse_saturated(shot)
-        _save(job, cell, shot.image, phase)
-        scores = score(shot.image, target, lpips_weights=setting.lpips_weights)
-        write_thumbnail(Store(setting.output).thumbnail(cell.id), match(shot.image, target)[0])
-        return Record(
-            cell=cell.description(),
-            state="done",
-            label=task.label,
-            scores=scores | {"efficiency": shot.efficiency},
-            captures=handle.captures,
-            seconds=taken.seconds,
-            memory_mib=taken.memory_mib,
-            registration_residual_px=shot.residual,
-            saturated=shot.saturated,
-            learned=_account(learned),
-            stopped=stopped,
-        )
-
-    return show
+    return Solution(solved.detach().cpu()[0], handle.captures, taken, stopped, learned)
 
 
-def _within_budget(method: Any, target: Tensor, handle: MeteredBench) -> tuple[Any, str]:
-    """What ``solve`` returns and an empty line; its best hologram so far and why, if the display ended its captures,
+def captured(job: Job, made: Solution, cell: Cell, place: Condition, target: Tensor, scored: Scored = plain) -> Record:
+    """Show a solution on a display, photograph it and score it against ``target`` ``(C, h, w)``."""
+    label = job.task.label
+    shot = job.bench(cell, place).photograph(
+        made.phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure, label=label
+    )
+    _refuse_saturated(shot)
+    _save(job, cell, shot.image, made.phase)
+    scores = scored(job, cell, shot.image, target)
+    write_thumbnail(Store(job.setting.output).thumbnail(cell.id), match(shot.image, target)[0])
+    return Record(
+        cell=cell.description(),
+        state="done",
+        label=label,
+        scores=scores | {"efficiency": shot.efficiency},
+        captures=made.captures,
+        seconds=made.taken.seconds,
+        memory_mib=made.taken.memory_mib,
+        registration_residual_px=shot.residual,
+        saturated=shot.saturated,
+        learned=_account(made.learned),
+        stopped=made.stopped,
+    )
+
+
+def _within_budget(method: Any, solve: Callable[[Any, MeteredBench], Any], handle: MeteredBench) -> tuple[Any, str]:
+    """What ``solve`` returns and an empty line; the best hologram so far and why, if the display ended its captures,
     whatever the method made of that."""
     solved = None
     try:
-        solved = method.solve(target, handle)
+        solved = solve(method, handle)
     except BudgetError:
         if not handle.over or handle.kept is None:
             raise
@@ -143,7 +176,7 @@ def prediction(job: Job) -> Measure:
     return compare
 
 
-def floor(job: Job) -> Measure:
+def floor(job: Job, scored: Scored = plain) -> Measure:
     """What images that no display made score on the task's target, or on the capture that is to be predicted."""
     setting, cells, place = job.setting, job.task.cells, job.task.conditions[0]
     images = [_wanted(cells[0], place, setting.folder)]
@@ -152,7 +185,7 @@ def floor(job: Job) -> Measure:
     write_thumbnail(Store(setting.output).target_thumbnail(cells[0].target), images[0])
 
     def reference(cell: Cell, _: Condition) -> Record:
-        scores = score(captures[cell.method], images[0], lpips_weights=setting.lpips_weights)
+        scores = scored(job, cell, captures[cell.method], images[0])
         return Record(cell.description(), "done", cell.method, scores=scores)
 
     return reference
@@ -161,7 +194,7 @@ def floor(job: Job) -> Measure:
 def _wanted(cell: Cell, place: Condition, folder: Path) -> Tensor:
     """What a cell's image is compared with, ``(C, h, w)`` linear light in [0, 1]: its target, or a capture."""
     target = target_of(cell, place, folder)
-    return target if cell.measure == "picture" else match(_shown(_Shown(cell), place, folder)[1].image, target)[0]
+    return target if cell.measure != "prediction" else match(_shown(_Shown(cell), place, folder)[1].image, target)[0]
 
 
 class _Shown:

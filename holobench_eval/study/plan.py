@@ -13,6 +13,8 @@ from ..errors import UserError
 from .bench import LEARNED, Condition, condition
 from .identity import code_digest, digest, harness_digest
 from .preparation import Preparation, check_unseen, preparation
+from .stacks import VERSION as IN_FOCUS
+from .stacks import Showing, Target, planes_a_scene, planes_of, showings
 
 if TYPE_CHECKING:
     from ..config import MethodEntry, Study
@@ -41,10 +43,10 @@ class Cell:
     panel: rows and columns in pixels; condition: name of the display, or ``reference`` for the floor;
     repeat, seed: names of the noise; harness_sha256: code of optics, bench, registration and metrics
     (``identity.harness_digest``); metrics: name and version of every metric that can be computed here; measure: what
-    is scored, ``picture`` or ``prediction``; holograms: whose captures are predicted (empty for pictures); prepared:
-    what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the most that
-    the display allows while the target is solved (None: no limit); change: kind and value of what has changed on the
-    display since methods were prepared for it (empty: nothing).
+    is scored, ``picture``, ``prediction`` or ``focus``; holograms: whose captures are predicted (empty for pictures);
+    prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the
+    most that the display allows while the target is solved (None: no limit); change: kind and value of what has changed
+    on the display since methods were prepared for it (empty: nothing).
     """
 
     method: str
@@ -65,7 +67,7 @@ class Cell:
     harness_sha256: str
     metrics: tuple[str, ...]
     exposure: Literal["equal", "matched"]
-    measure: Literal["picture", "prediction"] = "picture"
+    measure: Literal["picture", "prediction", "focus"] = "picture"
     holograms: Mapping[str, Any] = field(default_factory=dict)
     prepared: tuple[str, ...] = ()
     captures: int | None = None
@@ -157,7 +159,8 @@ def plan(study: Study) -> Plan:
     shown = displays(study)
     ground = _Ground(study, _metrics(study))
     first = next(iter(shown.values()))
-    tasks = [ground.floor(first, target, targets[(i + 1) % len(targets)]) for i, target in enumerate(targets)]
+    apart = planes_a_scene(ground.planes) if study.measure == "focus" else 1
+    tasks = [ground.floor(first, target, targets[(i + apart) % len(targets)]) for i, target in enumerate(targets)]
     for entry in study.methods:
         places = [place for source in entry.profiles for place in changed(study, source, shown[source])]
         tasks += ground.solutions(entry, places, targets)
@@ -203,13 +206,18 @@ class _Ground:
     metrics: tuple[str, ...]
 
     @cached_property
+    def planes(self) -> dict[str, tuple[str, float]]:
+        """Scene and plane [mm] of every target of focal stacks."""
+        return planes_of(scored_dataset(self.study), self.study.targets.dataset)
+
+    @cached_property
     def probe_sha256(self) -> str:
         """The code of the method whose captures are predicted."""
         return code_digest(registry.find("methods", self.study.holograms.name, self.study.folder))
 
     def cell(
         self,
-        target: tuple[str, str],
+        target: Target,
         place: Condition,
         condition: str,
         repeat: int,
@@ -248,21 +256,36 @@ class _Ground:
             change=dict([place.change]) if place.change and condition != REFERENCE else {},
         )
 
-    def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[tuple[str, str]]) -> Iterator[Task]:
+    def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
         cls = registry.find("methods", entry.name, self.study.folder)
         made = (entry.name, code_digest(cls), entry.params)
-        for group in [(place,) for place in shown] if self.study.measure == "prediction" else _sharing(cls, shown):
-            own = preparation(self.study, entry.name, entry.params, group[0].nominal)
-            for target in targets:
-                for repeat in range(self.study.repeats):
-                    cells = (
-                        self.cell(target, place, place.title, repeat, made, _ids(own, place.learned), entry.captures)
-                        for place in group
+        for showing in self._showings(cls, shown, targets):
+            places = tuple(place for _, place in showing)
+            own = preparation(self.study, entry.name, entry.params, places[0].nominal)
+            for repeat in range(self.study.repeats):
+                cells = (
+                    self.cell(
+                        target, place, self._condition(place), repeat, made, _ids(own, place.learned), entry.captures
                     )
-                    yield Task(entry.label, tuple(cells), group, own)
+                    for target, place in showing
+                )
+                yield Task(entry.label, tuple(cells), places, own)
 
-    def floor(self, place: Condition, target: tuple[str, str], wrong: tuple[str, str]) -> Task:
+    def _showings(self, cls: type[Any], shown: list[Condition], targets: list[Target]) -> Iterator[Showing]:
+        """Targets and displays that share a solution, for every solution."""
+        measure = self.study.measure
+        for group in [(place,) for place in shown] if measure == "prediction" else _sharing(cls, shown):
+            if measure == "focus":
+                yield from showings(cls, group, targets, self.planes)
+            else:
+                yield from ([(target, place) for place in group] for target in targets)
+
+    def _condition(self, place: Condition) -> str:
+        """The name of a display in tables, where planes of a focal stack stand together."""
+        return place.name if self.study.measure == "focus" else place.title
+
+    def floor(self, place: Condition, target: Target, wrong: Target) -> Task:
         """The references of a target; ``wrong`` is the target that is shown in its place."""
         shown = {"target": wrong[0], "target_sha256": wrong[1]}
         params = {name: shown if name == "floor_wrong_target" else {} for name in FLOORS}
@@ -285,7 +308,8 @@ def _metrics(study: Study) -> tuple[str, ...]:
 
     weights = study.protocol.lpips_weights
     known = catalogue(None if weights is None else Path(weights))
-    return tuple(f"{metric.name} {metric.version}" for metric in known if metric.available() is None)
+    names = tuple(f"{metric.name} {metric.version}" for metric in known if metric.available() is None)
+    return (*names, IN_FOCUS) if study.measure == "focus" else names
 
 
 def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ...]]:
@@ -299,5 +323,5 @@ def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ..
         return [(place,) for place in shown]
     trains, groups = getattr(cls, "trains", False), dict[Any, list[Condition]]()
     for place in shown:
-        groups.setdefault(place.nominal if trains else replace(place.spec, name=""), []).append(place)
+        groups.setdefault((place.name, place.spec) if trains else replace(place.spec, name=""), []).append(place)
     return [tuple(group) for group in groups.values()]

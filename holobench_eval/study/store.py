@@ -193,4 +193,4 @@ def _is_told(value: object) -> bool:
 
 def _is_number(value: object) -> bool:
     """A finite number that a table can hold; JSON has larger ones."""
-    return type(value) in (int, float) and abs(value) < sys.float_info.max  # type: ignore[arg-type, operator]
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < sys.float_info.max

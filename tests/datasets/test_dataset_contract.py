@@ -13,7 +13,7 @@ from holobench_eval.errors import UserError
 SHAPES = [(48, 64), (64, 48), (40, 40)]
 
 
-@pytest.fixture(params=["photographs", "dead_leaves", "charts", "folder"])
+@pytest.fixture(params=["photographs", "dead_leaves", "charts", "folder", "focal_stacks"])
 def dataset(request, tmp_path) -> Any:
     params: dict[str, Any] = {}
     if request.param == "folder":
@@ -25,7 +25,7 @@ def dataset(request, tmp_path) -> Any:
 
 
 def test_every_dataset_is_registered():
-    assert {"photographs", "dead_leaves", "charts", "folder"} <= set(registry.names("datasets"))
+    assert {"photographs", "dead_leaves", "charts", "folder", "focal_stacks"} <= set(registry.names("datasets"))
 
 
 def test_items_are_unique_and_in_a_fixed_order(dataset):
@@ -84,4 +84,4 @@ def test_an_unknown_item_is_one_line(dataset):
 def test_only_generated_images_are_for_training():
     training = {name: registry.find("datasets", name).training for name in registry.names("datasets")}
     assert training["dead_leaves"]
-    assert not any(training[name] for name in ("photographs", "charts", "folder"))
+    assert not any(training[name] for name in ("photographs", "charts", "folder", "focal_stacks"))

@@ -63,5 +63,5 @@ def swapped(profile: Profile, name: str) -> Profile:
     if name not in SENSORS:
         raise UserError(f"unknown camera '{name}'; {suggest(name, SENSORS)}")
     old = profile.sensor
-    kept = {"vignetting": old.vignetting, "headroom": old.headroom, "ambient": old.ambient, "noise": old.noise}
-    return replace(profile, sensor=replace(SENSORS[name], dark=old.dark, **kept))
+    new = replace(SENSORS[name], dark=old.dark, vignetting=old.vignetting, headroom=old.headroom)
+    return replace(profile, sensor=replace(new, ambient=old.ambient, noise=old.noise))

@@ -1,0 +1,191 @@
+"""A generated still life with true depth: patterned balls and pillars on a floor before a wall, ray-traced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ..optics import srgb_decode
+from ..seeds import generator
+
+VERSION = 1
+"""Part of every digest: raise it when the scene is drawn differently."""
+
+Array = NDArray[np.float64]
+
+FLOOR, WALL = -1.0, 9.0
+"""Height of the floor and distance of the wall, with the eye at the origin, y upwards and z away from it."""
+NEAREST = 2.25
+"""The distance that is mapped to the near end of the depth; a strip of floor before it counts as there."""
+BANDS = ((2.4, 2.6), (3.7, 4.0), (7.2, 7.8))
+"""Distances in which objects stand: near, in the middle, far."""
+TILT, HEIGHT = 0.12, 0.75
+"""How far the middle of the picture lies below the horizon, and its height, at distance 1."""
+LIGHT = np.array([-0.45, 0.75, -0.48]) / np.linalg.norm([-0.45, 0.75, -0.48])
+AMBIENT = 0.25
+"""Share of the light that comes from everywhere."""
+
+
+class Surface(Protocol):
+    """Something that a ray can meet."""
+
+    def distance(self, start: Array, ray: Array) -> Array:
+        """How many lengths of ``ray`` ``(3, ...)`` from ``start`` ``(3, ...)`` to the surface; infinite for a miss."""
+        ...
+
+    def appearance(self, points: Array) -> tuple[Array, Array]:
+        """Normals and reflected colours ``(3, n)`` at points ``(3, n)`` of the surface."""
+        ...
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Two colours ``(3,)`` in turn over coordinates along a surface; kind: checks, stripes, dots or bricks."""
+
+    kind: str
+    colours: tuple[Array, Array]
+    period: float
+
+    def at(self, u: Array, v: Array) -> Array:
+        """Colours ``(3, n)`` at coordinates ``(n,)``."""
+        a, b = u / self.period, v / self.period
+        if self.kind == "checks":
+            second = (np.floor(a) + np.floor(b)) % 2 == 1
+        elif self.kind == "stripes":
+            second = (a + 0.35 * np.sin(2.1 * b)) % 1 < 0.5
+        elif self.kind == "bricks":
+            second = (np.abs(2 * b % 1 - 0.5) < 0.4) & (np.abs((a + np.floor(2 * b) / 2) % 1 - 0.5) < 0.45)
+        else:
+            second = np.hypot(a % 1 - 0.5, b % 1 - 0.5) < 0.33
+        first, other = (colour[:, None] for colour in self.colours)
+        return np.where(second, other, first)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """An endless plane at ``place`` of an axis; its normal points to the eye."""
+
+    axis: int
+    place: float
+    pattern: Pattern
+
+    def distance(self, start: Array, ray: Array) -> Array:
+        """See ``Surface``."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            way = (self.place - start[self.axis]) / ray[self.axis]
+        return np.where(way > 1e-6, way, np.inf)
+
+    def appearance(self, points: Array) -> tuple[Array, Array]:
+        """See ``Surface``."""
+        normal = np.zeros_like(points)
+        normal[self.axis] = -np.sign(self.place)
+        u, v = (points[axis] for axis in range(3) if axis != self.axis)
+        return normal, self.pattern.at(u, v)
+
+
+@dataclass(frozen=True)
+class Round:
+    """A ball, or with ``upright`` a pillar that ends at its centre's height."""
+
+    centre: Array
+    radius: float
+    upright: bool
+    pattern: Pattern
+
+    def distance(self, start: Array, ray: Array) -> Array:
+        """See ``Surface``."""
+        axes = [0, 2] if self.upright else [0, 1, 2]
+        offset = start[axes] - self.centre[axes].reshape(-1, *[1] * (start.ndim - 1))
+        a, b = (ray[axes] ** 2).sum(0), (offset * ray[axes]).sum(0)
+        root = b**2 - a * ((offset**2).sum(0) - self.radius**2)
+        way = (-b - np.sqrt(np.maximum(root, 0))) / a
+        met = (root > 0) & (way > 1e-6)
+        if self.upright:
+            met &= start[1] + way * ray[1] < self.centre[1]
+        return np.where(met, way, np.inf)
+
+    def appearance(self, points: Array) -> tuple[Array, Array]:
+        """See ``Surface``."""
+        normal = (points - self.centre[:, None]) / self.radius
+        if self.upright:
+            normal[1] = 0
+        around = np.arctan2(normal[0], -normal[2]) * self.radius
+        up = points[1] if self.upright else np.arcsin(np.clip(normal[1], -1, 1)) * self.radius
+        return normal, self.pattern.at(around, up)
+
+
+def still_life(name: str, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """Picture ``(h, w, 3)`` linear light in [0, 1] and depth ``(h, w)``, 1 at the near end; ``name`` seeds it.
+
+    Depth is linear in the inverse of the distance, as the focus of an eye is told.
+    """
+    surfaces = _surfaces(name)
+    rays = _rays(shape)
+    origin = np.zeros((3, 1, 1))
+    ways = np.stack([surface.distance(origin, rays) for surface in surfaces])
+    nearest, way = ways.argmin(0), ways.min(0)
+    picture = np.zeros((*shape, 3))
+    for index, surface in enumerate(surfaces):
+        seen = nearest == index
+        points = way[seen] * rays[:, seen]
+        picture[seen] = _lit(*surface.appearance(points), points, surfaces[2:]).T
+    far, near = 1 / WALL, 1 / NEAREST
+    return picture.clip(0, 1), ((1 / way - far) / (near - far)).clip(0, 1)
+
+
+def _rays(shape: tuple[int, int]) -> Array:
+    """``(3, h, w)`` through the middles of pixels, of length 1 along z."""
+    rows, columns = shape
+    y, x = ((np.arange(size) + 0.5 - size / 2) * HEIGHT / rows for size in (rows, columns))
+    across, down = np.meshgrid(x, y)
+    return np.stack([across, -down - TILT, np.ones(shape)])
+
+
+def _lit(normal: Array, colour: Array, points: Array, casting: Sequence[Surface]) -> Array:
+    """Light ``(3, n)`` from points: matt, with a small highlight, in the shadow of what stands on the floor."""
+    towards = np.einsum("i,in->n", LIGHT, normal)
+    ray = np.broadcast_to(LIGHT[:, None], points.shape)
+    shadowed = np.zeros(points.shape[1], dtype=bool)
+    for surface in casting:
+        shadowed |= np.isfinite(surface.distance(points + 1e-3 * normal, ray))
+    direct = np.where(shadowed, 0.0, towards.clip(0))
+    halfway = LIGHT[:, None] - points / np.linalg.norm(points, axis=0)
+    halfway /= np.linalg.norm(halfway, axis=0)
+    shine = np.where(direct > 0, np.einsum("in,in->n", normal, halfway).clip(0) ** 40, 0.0)
+    return colour * (AMBIENT + (1 - AMBIENT) * direct) + 0.25 * shine
+
+
+def _surfaces(name: str) -> list[Surface]:
+    """Wall and floor, then balls and pillars beside one another, each in one of the bands of depth."""
+    draw = generator("still life", name)
+
+    def number(low: float, high: float) -> float:
+        return low + (high - low) * float(torch.rand((), generator=draw, dtype=torch.float64))
+
+    def colours(strong: float) -> tuple[Array, Array]:
+        """A dark and a light colour of one hue, drawn in sRGB."""
+        hue = torch.rand(3, generator=draw, dtype=torch.float64)
+        hue = (hue - hue.min()) / (hue.max() - hue.min())
+        hue = 1 - strong * (1 - hue)
+        return srgb_decode(0.25 * hue).numpy(), srgb_decode(0.45 + 0.5 * hue).numpy()
+
+    surfaces: list[Surface] = [
+        Plane(2, WALL, Pattern("bricks", colours(0.6), 0.9)),
+        Plane(1, FLOOR, Pattern("checks", colours(0.3), 0.4)),
+    ]
+    places = zip((0, 2, 1, 0, 2, 1), ("dots", "stripes", "checks", "stripes", "dots", "checks"), strict=True)
+    side = 1 if number(0, 1) < 0.5 else -1
+    for place, (band, kind) in enumerate(places):
+        z = number(*BANDS[band])
+        upright = kind == "checks"
+        radius = number(0.08, 0.11) * z * (0.6 if upright else 1.0)
+        x = side * (0.118 * (place - 2.5) + number(-0.02, 0.02)) * z
+        top = number(-0.06, 0.0) * z if upright else FLOOR + radius
+        pattern = Pattern(kind, colours(0.9), number(0.025, 0.05) * z)
+        surfaces.append(Round(np.array([x, top, z]), radius, upright, pattern))
+    return surfaces

@@ -1,0 +1,70 @@
+"""Focal stacks: the picture of every plane, photographed at its distance, scored where it is in focus (paper 7.1)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor
+
+from .. import registry
+from ..errors import CellError
+from ..metrics import match
+from ..metrics.psnr import psnr
+from ..metrics.ssim import RADIUS, LocalStatistics
+from . import measures
+from .job import Job, target_of
+from .measures import Measure, captured, plain, solution
+from .plan import Cell
+from .stacks import SCORES, offset
+
+if TYPE_CHECKING:
+    from ..display.workbench import MeteredBench
+
+
+def focus(job: Job) -> Measure:
+    """Solve for one plane, or for all planes of a scene at once, on the display before any change; the result shows the
+    phase at any of the task's planes and displays."""
+    cells, place, folder = job.task.cells, job.task.conditions[0].nominal, job.setting.folder
+    targets = {cell.target: target_of(cell, place, folder) for cell in cells}
+    offsets = {cell.target: offset(place, cell.change) for cell in cells}
+
+    def solve(method: Any, handle: MeteredBench) -> Any:
+        pictures = torch.stack(list(targets.values()))
+        if getattr(method, "planes", False):
+            return method.solve_planes(pictures, list(offsets.values()), handle)[None]
+        return method.solve(pictures, handle)
+
+    made = solution(job, place, targets[cells[0].target], solve)
+    return lambda cell, place: captured(job, made, cell, place, targets[cell.target], scored)
+
+
+def floor(job: Job) -> Measure:
+    """What images that no display made score on the task's target."""
+    return measures.floor(job, scored)
+
+
+def scored(job: Job, cell: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
+    """The scores of the whole picture, and those of what is in focus."""
+    dataset = registry.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
+    mask = dataset.mask(cell.target, tuple(wanted.shape[-2:]))
+    return plain(job, cell, image, wanted) | in_focus(image, wanted, mask)
+
+
+def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
+    """PSNR over a mask, and the mean of the SSIM map over it, in linear light.
+
+    image: ``(C, h, w)``; wanted: ``(C, h, w)`` in [0, 1]; mask: ``(h, w)`` bool. Brightness is matched over the whole
+    picture, as for every other score. CellError for a mask that is empty where SSIM is defined.
+    """
+    inner = mask[RADIUS:-RADIUS, RADIUS:-RADIUS]
+    if not bool(inner.any()):
+        raise CellError("nothing of this picture is in focus")
+    truth = wanted.double()
+    matched, _ = match(image.double(), truth)
+    luminance, structure = LocalStatistics(truth).maps(matched)
+    values = (
+        psnr(matched[:, mask][:, None], truth[:, mask][:, None]),
+        (luminance * structure)[:, inner].mean(),
+    )
+    return {name: float(value) for name, value in zip(SCORES, values, strict=True)}

@@ -1,0 +1,72 @@
+"""One hologram for several planes: phase retrieval of all planes of a focal stack at once.
+
+The way to depth that Chakravarthula et al. 2020 (Section 7.1) name beside their own: the volume is cut into planes, and
+the hologram of all of them is optimised jointly, which takes as many times longer as there are planes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from .common import Bench, Offset, per_channel, with_offset
+from .descent import Best
+from .initial_phase import InitialPhase, initial_phase
+from .losses import LOSSES, LossName
+from .wirtinger import Objective
+
+
+@dataclass(frozen=True)
+class MultiPlane:
+    """Adam on one phase for the mean loss of the intensities at all planes, by Wirtinger's gradient at each.
+
+    Each plane is compared after an intensity scale of its own, as it is scored. iterations: evaluations of the loss,
+    with one forward and one adjoint propagation a plane. loss: see ``losses``; step: Adam's step [rad];
+    initial_phase: see ``initial_phase``, of the first plane. The phase of the least loss that was seen is returned.
+    """
+
+    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
+    loss: LossName = "intensity_l2"
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.1
+    initial_phase: InitialPhase = "constant"
+    offset: Offset = "centre"
+
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+    planes: ClassVar[bool] = True
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """One plane, that of the display: linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        return per_channel(target, lambda image, channel: self._retrieve(image[None], [0.0], bench, channel))
+
+    def solve_planes(self, targets: Tensor, offsets: Sequence[float], bench: Bench) -> Tensor:
+        """Linear intensities ``(P, C, h, w)`` at ``offsets`` [m] from the display's plane to phase ``(C, H, W)`` [rad].
+
+        Positive offsets are farther from the panel.
+        """
+        colours = range(targets.shape[1])
+        return torch.cat([self._retrieve(targets[:, None, colour], offsets, bench, colour) for colour in colours])
+
+    def _retrieve(self, targets: Tensor, offsets: Sequence[float], bench: Bench, channel: int) -> Tensor:
+        """Targets ``(P, B, h, w)`` of a colour to phases ``(B, H, W)``."""
+        planes = [self._objective(*plane, bench, channel) for plane in zip(targets, offsets, strict=True)]
+        phase = initial_phase(self.initial_phase, targets[0], bench, channel)
+        best, pixels = Best(phase), phase.shape[-2] * phase.shape[-1]
+        optimiser = torch.optim.Adam([phase], lr=self.step, fused=True)
+        for _ in range(self.iterations):
+            losses, gradients = zip(*(plane.evaluate(phase) for plane in planes), strict=True)
+            best.update(torch.stack(losses).mean(0), phase)
+            phase.grad = torch.stack(gradients).mean(0) * pixels  # far above Adam's epsilon
+            optimiser.step()
+        return with_offset(best.phase, self.offset)
+
+    def _objective(self, target: Tensor, offset: float, bench: Bench, channel: int) -> Objective:
+        """The loss at one plane, through the nominal model at its distance."""
+        spec = replace(bench.spec, distance=bench.spec.distance + offset)
+        model = spec.propagator(channel, dtype=torch.complex(target, target).dtype, device=target.device)
+        return Objective(model, spec.region, target, LOSSES[self.loss])

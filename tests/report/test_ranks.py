@@ -1,0 +1,269 @@
+"""Rankings over draws of a display: made-up studies in which it is known what flips, and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from importlib.resources import files
+
+import numpy as np
+import pytest
+import synthetic_study as made
+from skimage.io import imread
+
+from holobench_eval.config import load_study
+from holobench_eval.display import load_profile
+from holobench_eval.display.conditions import draws
+from holobench_eval.report import Layout, Results, layout_of, records_frame, section_ranks, write_report
+from holobench_eval.report.description import Description
+from holobench_eval.report.figure_ranks import draw
+from holobench_eval.report.layout import Swept
+from holobench_eval.report.ranks import ranks, share
+
+Quality = Callable[[Mapping[str, float]], float]
+
+DISPLAY, COUNT, TARGETS = "leto-aged", 30, made.TARGETS[:3]
+LEVELS = dict(zip(TARGETS, (-2.0, 0.5, 1.5), strict=True))
+PROFILE = load_profile(DISPLAY)
+NOMINAL = {"crosstalk": 0.45, "zero_phase": -0.5, "astigmatism": 0.05, "gamma": 1.28}
+MIDDLE = 0.35
+"""Of the range of crosstalk."""
+
+
+def study(methods: Mapping[str, Quality], count: int = COUNT, **changes):
+    """Records and layout; methods: mean quality [dB] from a draw's parameters."""
+    drawn = tuple(draws.values(PROFILE, index) for index in range(1, count + 1))
+    conditions = {DISPLAY: NOMINAL} | {f"{DISPLAY}, draw {i}": values for i, values in enumerate(drawn, start=1)}
+    records = [
+        made.record(
+            label,
+            made.cell("sgd", target, condition, params={"label": label}),
+            {"psnr_linear": quality(values) + level},
+        )
+        for label, quality in methods.items()
+        for condition, values in conditions.items()
+        for target, level in LEVELS.items()
+    ]
+    points = tuple((str(i), condition) for i, condition in enumerate(list(conditions)[1:], start=1))
+    given = {
+        "title": "Made-up draws",
+        "pairs": tuple((label, condition) for label in methods for condition in conditions),
+        "targets": TARGETS,
+        "baseline": next(iter(methods)),
+        "sweeps": (Swept("draw", DISPLAY, points, drawn),),
+    }
+    return records, Layout(**(given | changes))
+
+
+def found(methods, lost=(), **changes):
+    """The ranking; lost: (label, draw, target) without a score, None for any."""
+    records, layout = study(methods, **changes)
+    for record in records:
+        place = (record["label"], record["cell"]["condition"].rpartition("draw ")[2], record["cell"]["target"])
+        if any(all(a in (None, b) for a, b in zip(one, place, strict=True)) for one in lost):
+            record |= {"state": "failed", "scores": {}}
+    (one,) = ranks(Results(records_frame(records, layout), layout))
+    return one
+
+
+FLIPPING: Mapping[str, Quality] = {
+    "steady": lambda values: 20.0,
+    "robust": lambda values: 20.0 + 10 * (values["crosstalk"] - MIDDLE),
+    "poor": lambda values: 12.0,
+}
+
+
+def test_a_method_that_wins_above_the_middle_of_a_parameter_flips_there_and_the_parameter_is_named():
+    one = found(FLIPPING)
+    high = np.array([values["crosstalk"] > MIDDLE for values in one.swept.drawn])
+    assert 5 < high.sum() < 25
+    assert one.methods == ["robust", "steady", "poor"]  # nominal crosstalk is high
+    assert one.first("robust").mean == pytest.approx(high.mean())
+    assert one.first("steady").mean == pytest.approx(1 - high.mean())
+    assert one.first("poor").mean == 0
+    pair = one.pairs[0]
+    assert (pair.first, pair.second, pair.flips) == ("robust", "steady", (~high).sum())
+    assert pair.nominal == pytest.approx(1.0)
+    assert pair.cause.feature.parameter == "crosstalk"
+    assert pair.cause.correlation == pytest.approx(1)
+    assert section_ranks.favours(pair, pair.cause) == "more crosstalk favours robust (rho 1.00, p < 0.001)"
+    assert [p.flips for p in one.pairs[1:]] == [0, 0]
+    assert one.tests == len(one.features)  # only what flips is tried
+
+
+def test_places_and_agreement_follow_from_the_order_of_each_draw():
+    one = found(FLIPPING)
+    high = np.array([values["crosstalk"] > MIDDLE for values in one.swept.drawn])
+    assert one.places.tolist() == [[1, 2, 3] if up else [2, 1, 3] for up in high]
+    assert one.taus == pytest.approx(np.where(high, 1.0, 1 / 3))
+    assert one.unchanged == high.sum()
+    assert one.tau.low < one.taus.mean() < one.tau.high
+    assert one.shares.sum(axis=1) == pytest.approx(1)
+    text = " ".join(section_ranks.sentences(one))
+    assert "2 of 3 pairs of methods have their nominal order in every draw" in text
+    assert f"have their nominal order in {high.sum()} of 30" in text
+    assert f"Others that are first: steady in {(~high).sum()}" in text
+
+
+def test_lower_is_better_turns_the_ranking_and_not_the_meaning_of_a_lead():
+    records, layout = study(FLIPPING, headline="mofd_srgb")
+    for record in records:
+        record["scores"] = {"mofd_srgb": record["scores"]["psnr_linear"]}
+    (one,) = ranks(Results(records_frame(records, layout), layout))
+    assert one.methods == ["poor", "steady", "robust"]
+    pair = one.pairs[-1]
+    assert (pair.first, pair.second) == ("steady", "robust")
+    assert pair.nominal == pytest.approx(1.0)
+    assert section_ranks.more(pair.cause.feature) == "more crosstalk"
+    assert pair.cause.correlation > 0  # more crosstalk raises the score of robust, which is worse
+
+
+def test_methods_that_are_far_apart_never_flip():
+    one = found({"best": lambda v: 25.0 - v["crosstalk"], "middle": lambda v: 20.0, "last": lambda v: 15.0})
+    assert (one.taus == 1).all()
+    assert (one.tau.low, one.tau.mean, one.tau.high) == (1, 1, 1)
+    assert [pair.flips for pair in one.pairs] == [0, 0, 0]
+    assert all(pair.cause is None for pair in one.pairs)
+    assert section_ranks.flips(one) == ""
+    text = " ".join(section_ranks.sentences(one))
+    assert "best in 30 of 30 (100 [89, 100] %). No other method is ever first." in text
+    assert "3 of 3 pairs of methods have their nominal order in every draw" in text
+
+
+def test_ties_share_the_first_place_flip_nothing_and_have_no_tau(tmp_path):
+    one = found({"a": lambda v: 20.0, "b": lambda v: 20.0})
+    assert (one.places == 1).all()
+    assert one.first("a").mean == one.first("b").mean == 1
+    assert one.pairs[0].flips == 0
+    assert len(one.taus) == 0
+    assert "is not defined" in " ".join(section_ranks.sentences(one))
+    ((path, caption),) = draw([one], tmp_path)
+    assert path.is_file()
+    assert "tau" not in caption
+
+
+def test_a_difference_that_no_parameter_explains_is_said_to_have_none():
+    one = found({"a": lambda v: 20.0 + math.sin(1e6 * v["gamma"]), "b": lambda v: 20.0})
+    assert 0 < one.pairs[0].flips < COUNT
+    assert one.pairs[0].cause is None
+    assert section_ranks.NOTHING in section_ranks.flips(one)
+
+
+def test_an_angle_is_told_by_its_sine_and_cosine_and_a_signed_range_by_its_size_too():
+    turned = found({"a": lambda v: 20.0 + math.cos(v["zero_phase"]), "b": lambda v: 20.0})
+    assert (turned.pairs[0].cause.feature.parameter, turned.pairs[0].cause.feature.form) == ("zero_phase", "cosine")
+    assert section_ranks.more(turned.pairs[0].cause.feature).startswith("a larger cosine of the phase of the unmod")
+    bent = found({"a": lambda v: 20.0, "b": lambda v: 19.0 + 15 * abs(v["astigmatism"])})
+    assert bent.pairs[0].flips
+    assert section_ranks.favours(bent.pairs[0], bent.pairs[0].cause).startswith("more astigmatism of either sign fav")
+    forms = [feature.form for feature in bent.features if feature.parameter == "zero_phase"]
+    assert forms == ["sine", "cosine"]
+
+
+def test_few_draws_explain_nothing_however_well_they_are_ordered():
+    one = found(FLIPPING, count=4)
+    assert one.pairs[0].flips
+    assert one.pairs[0].cause is None
+
+
+def test_a_hole_takes_its_draw_from_all_methods_and_is_told():
+    one, whole = found(FLIPPING, lost=[("poor", "7", TARGETS[1])]), found(FLIPPING)
+    assert one.methods == whole.methods
+    assert one.used == [index for index in range(COUNT) if index != 6]
+    assert (one.drawn == np.delete(whole.drawn, 6, axis=0)).all()
+    assert len(one.features[0].values) == COUNT - 1
+    assert section_ranks.left_out(one) == ["Draw 7 is left out (1 of 30): a ranked method lacks a target there."]
+
+
+def test_a_bench_on_which_nothing_could_be_scored_is_told_apart():
+    one = found(FLIPPING, lost=[(None, "3", None), (None, "9", None)])
+    (sentence,) = section_ranks.left_out(one)
+    assert sentence.startswith("Draws 3 and 9 are left out (2 of 30): no ranked method")
+
+
+def test_a_method_that_mostly_fails_is_not_ranked_and_takes_no_draws_from_the_others():
+    one = found(FLIPPING, lost=[("poor", str(index), None) for index in range(1, 20)])
+    assert one.methods == ["robust", "steady"]
+    assert len(one.used) == COUNT
+    assert "Not ranked" in section_ranks.left_out(one)[0]
+    assert "poor" in section_ranks.left_out(one)[0]
+
+
+def test_without_a_draw_that_has_scores_there_is_no_ranking(tmp_path):
+    one = found(FLIPPING, lost=[(None, str(index), None) for index in range(1, COUNT + 1)])
+    assert not one.told
+    assert "No ranking" in section_ranks.sentences(one)[-1]
+    assert list(draw([one], tmp_path)) == []
+
+
+def test_the_ceiling_and_methods_that_see_the_camera_are_not_ranked():
+    one = found(FLIPPING, privileged=frozenset({"robust"}), camera=frozenset({"poor"}))
+    assert one.methods == ["steady"]
+    assert not one.told
+
+
+def test_two_sweeps_of_one_display_are_one_ranking():
+    records, layout = study(FLIPPING)
+    (swept,) = layout.sweeps
+    halves = (
+        Swept("draw", DISPLAY, swept.points[:9], swept.drawn[:9]),
+        Swept("draw", DISPLAY, swept.points[9:], swept.drawn[9:]),
+    )
+    _, split = study(FLIPPING, sweeps=halves)
+    results = [Results(records_frame(records, one), one) for one in (layout, split)]
+    assert ranks(results[1])[0].swept == ranks(results[0])[0].swept
+
+
+def test_a_share_has_wilsons_interval():
+    some = share(15, 40)
+    z, n, p = 1.959964, 40, 15 / 40
+    middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    assert (some.low, some.high) == pytest.approx(
+        ((middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n))
+    )
+
+
+def test_the_report_has_the_section_its_tables_and_its_figure(tmp_path):
+    records, layout = study(FLIPPING)
+    text = write_report(layout, records, tmp_path, {}, Description()).read_text()
+    section = text.partition("## Rank stability")[2].partition("\n## ")[0]
+    for phrase in (
+        "### leto-aged, 30 draws",
+        "| method | nominal rank | first in [% of draws] | mean rank | best rank | worst rank |",
+        "more crosstalk favours robust",
+        "| crosstalk | px | 0.2 to 0.5 |",
+        "0.25 px measured",
+        "(figures/quality-ranks-leto-aged.png)",
+    ):
+        assert phrase in section, phrase
+    assert "## Changes of the displays" not in text
+    picture = imread(tmp_path / "figures" / "quality-ranks-leto-aged.png")
+    assert picture.shape[1] == 900
+
+
+CONFIG = """
+title: Draws
+display: {{profiles: [{profile}], panel: [128, 128]}}
+targets: {{dataset: photographs, params: {{count: 1}}}}
+sweeps: [{{condition: draw, count: 3}}, {{condition: defocus, values: [0.1]}}]
+methods: [double_phase]
+"""
+
+
+def swept_of(folder, profile):
+    (folder / "study.yaml").write_text(CONFIG.format(profile=profile))
+    return layout_of(load_study(folder / "study.yaml")).sweeps
+
+
+def test_a_layout_knows_what_was_drawn_whether_the_profile_has_a_name_or_a_path(tmp_path):
+    drawn, other = swept_of(tmp_path, "leto-aged")
+    assert drawn.drawn == tuple(draws.values(PROFILE, index) for index in (1, 2, 3))
+    assert other.drawn == ()
+    path = files("holobench_eval.display") / "profiles" / "leto-aged.yaml"
+    (tmp_path / "own.yaml").write_text(path.read_text())
+    assert swept_of(tmp_path, "own.yaml")[0] == drawn
+
+
+def test_parameters_of_a_stage_that_the_display_lacks_are_not_among_what_was_drawn(tmp_path):
+    (one, *_), _ = (swept.drawn for swept in swept_of(tmp_path, "ideal"))
+    assert set(draws.PARAMETERS) - set(one) == {"fill"}

@@ -1,0 +1,211 @@
+"""Focal stacks: what is planned, what is shown where, and what is scored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from trained_study import compute
+
+from holobench_eval.config import load_study
+from holobench_eval.errors import CellError, UserError
+from holobench_eval.metrics import score
+from holobench_eval.study.focus import in_focus
+from holobench_eval.study.plan import REFERENCE, Task, plan
+
+CONFIG = """\
+title: "Depth"
+measure: focus
+display: {profiles: [ideal], panel: [128, 128]}
+targets: {dataset: focal_stacks, params: {planes: [-1.5, 0, 1.5], blur: 0.03}}
+methods:
+  - {name: wirtinger, params: {iterations: 20}}
+  - {name: multi_plane, params: {iterations: 20}}
+  - {name: "middle.py:Middle", params: {iterations: 20}}
+headline: psnr_linear_infocus
+"""
+
+MIDDLE = '''
+from dataclasses import dataclass
+from typing import ClassVar
+
+from holobench_eval.methods.wirtinger import Wirtinger
+
+
+@dataclass(frozen=True)
+class Middle(Wirtinger):
+    """One hologram for all planes that knows the middle one alone."""
+
+    planes: ClassVar[bool] = True
+
+    def solve_planes(self, targets, offsets, bench):
+        assert offsets[1] == 0
+        return self.solve(targets[1:2], bench)[0]
+'''
+
+
+def write(folder: Path, *changes: tuple[str, str]) -> Path:
+    (folder / "middle.py").write_text(MIDDLE)
+    text = CONFIG
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "study.yaml"
+    path.write_text(text)
+    return path
+
+
+def solutions(folder: Path, *changes: tuple[str, str]) -> dict[str, list[Task]]:
+    """The tasks of every method."""
+    tasks: dict[str, list[Task]] = {}
+    for task in plan(load_study(write(folder, *changes))).tasks:
+        tasks.setdefault(task.label, []).append(task)
+    return tasks
+
+
+TWO_SCENES = ("{planes:", "{scenes: [shapes, shapes-2], planes:")
+TWO_DISPLAYS = ("[ideal]", "[leto-mild, leto-aged]")
+
+
+def test_most_methods_solve_every_picture_and_one_of_planes_every_scene(tmp_path: Path) -> None:
+    tasks = solutions(tmp_path, TWO_SCENES, TWO_DISPLAYS)
+    assert [len(task.cells) for task in tasks["wirtinger"]] == [2] * 6
+    assert [len(task.cells) for task in tasks["multi_plane"]] == [6] * 2
+
+
+def test_cells_carry_the_display_and_where_the_camera_is(tmp_path: Path) -> None:
+    tasks = solutions(tmp_path)
+    lens = {task.cells[0].target: dict(task.cells[0].change) for task in tasks["wirtinger"]}
+    assert lens == {"shapes@-1.5mm": {"refocus": -1.5}, "shapes@0mm": {}, "shapes@1.5mm": {"refocus": 1.5}}
+    (stack,) = tasks["multi_plane"]
+    assert [dict(cell.change) for cell in stack.cells] == [{"other_plane": -1.5}, {}, {"other_plane": 1.5}]
+    assert {cell.condition for cell in stack.cells} == {"ideal"}
+    assert "infocus 1" in stack.cells[0].metrics
+
+
+def test_the_wrong_target_is_another_scene(tmp_path: Path) -> None:
+    wrong = {
+        cell.target: cell.params["target"]
+        for task in solutions(tmp_path, TWO_SCENES)["floor"]
+        for cell in task.cells
+        if cell.method == "floor_wrong_target"
+    }
+    assert wrong["shapes@-1.5mm"] == "shapes-2@-1.5mm"
+    assert wrong["shapes-2@1.5mm"] == "shapes@1.5mm"
+    alone = {cell.method for task in solutions(tmp_path)["floor"] for cell in task.cells}
+    assert "floor_wrong_target" not in alone
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("focus")
+
+
+@pytest.fixture(scope="module")
+def records(study: Path) -> dict[tuple[str, str], dict[str, Any]]:
+    """The records of a study on a real bench, by label and target."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(study / "cache"))
+        found = compute(write(study)).records
+    assert {record["state"] for record in found} == {"done"}, [record["reason"] for record in found]
+    return {(record["label"], record["cell"]["target"]): record for record in found}
+
+
+def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(
+    records: dict[tuple[str, str], dict[str, Any]], tmp_path: Path
+) -> None:
+    config = write(tmp_path, ("measure: focus\n", ""), ("psnr_linear_infocus", "psnr_linear"))
+    pictures = {(r["label"], r["cell"]["target"]): r["scores"] for r in compute(config).records}
+    place = ("wirtinger", "shapes@0mm")
+    plain, found = pictures[place], records[place]["scores"]
+    assert {name: found[name] for name in plain} == plain
+    assert set(found) - set(plain) == {"psnr_linear_infocus", "ssim_linear_infocus"}
+
+
+def test_a_hologram_of_all_planes_is_better_at_every_other_plane_than_one_of_the_middle(
+    records: dict[tuple[str, str], dict[str, Any]],
+) -> None:
+    for target in ("shapes@-1.5mm", "shapes@1.5mm"):
+        joint, middle = (records[label, target]["scores"] for label in ("multi_plane", "Middle"))
+        for name in ("psnr_linear", "psnr_linear_infocus"):
+            assert joint[name] > middle[name] + 1
+
+
+def test_a_lens_keeps_more_than_the_camera_loses_without_one(
+    records: dict[tuple[str, str], dict[str, Any]],
+) -> None:
+    for target in ("shapes@-1.5mm", "shapes@1.5mm"):
+        moved, stayed = (records[label, target]["scores"] for label in ("wirtinger", "Middle"))
+        assert moved["psnr_linear"] > stayed["psnr_linear"] + 3
+
+
+def test_planes_of_a_scene_share_the_time_of_their_hologram(
+    records: dict[tuple[str, str], dict[str, Any]],
+) -> None:
+    targets = ("shapes@-1.5mm", "shapes@0mm", "shapes@1.5mm")
+    assert len({records["multi_plane", target]["seconds"] for target in targets}) == 1
+
+
+def test_the_floor_is_scored_in_focus_too(records: dict[tuple[str, str], dict[str, Any]]) -> None:
+    assert records["floor_constant", "shapes@0mm"]["scores"]["psnr_linear_infocus"] < 25
+    assert records["floor_constant", "shapes@0mm"]["cell"]["condition"] == REFERENCE
+
+
+def pictures() -> tuple[torch.Tensor, torch.Tensor]:
+    draw = torch.Generator().manual_seed(3)
+    wanted = torch.rand(3, 40, 48, generator=draw)
+    return 3 * (wanted + 0.1 * torch.rand(3, 40, 48, generator=draw)), wanted
+
+
+def test_in_focus_everywhere_is_the_score_of_the_picture() -> None:
+    image, wanted = pictures()
+    plain = score(image, wanted, metrics=["psnr", "ssim"])
+    found = in_focus(image, wanted, torch.ones(40, 48, dtype=torch.bool))
+    assert found["psnr_linear_infocus"] == pytest.approx(plain["psnr_linear"], abs=1e-9)
+    assert found["ssim_linear_infocus"] == pytest.approx(plain["ssim_linear"], abs=1e-9)
+
+
+def test_errors_out_of_focus_do_not_count() -> None:
+    _, wanted = pictures()
+    mask = torch.zeros(40, 48, dtype=torch.bool)
+    mask[:, :20] = True
+    image = wanted.clone()
+    image[:, :, 30:] = wanted[:, :, 30:].flip(-1)  # keeps the brightness nearly as it is
+    found = in_focus(image, wanted, mask)
+    assert found["psnr_linear_infocus"] > in_focus(image, wanted, ~mask)["psnr_linear_infocus"] + 3
+    assert found["ssim_linear_infocus"] > in_focus(image, wanted, ~mask)["ssim_linear_infocus"] + 0.1
+
+
+def test_a_picture_with_nothing_in_focus_is_no_score() -> None:
+    image, wanted = pictures()
+    with pytest.raises(CellError, match="nothing of this picture is in focus"):
+        in_focus(image, wanted, torch.zeros(40, 48, dtype=torch.bool))
+
+
+REFUSED = [
+    (
+        ("dataset: focal_stacks, params: {planes: [-1.5, 0, 1.5], blur: 0.03}", "dataset: charts"),
+        "4:20: dataset 'charts' has no planes; measure: focus needs one that has, such as focal_stacks",
+    ),
+    (
+        ("headline:", "sweeps: [{condition: defocus, values: [1]}]\nheadline:"),
+        "9:10: a sweep changes simulated displays, and scores pictures (measure: picture)",
+    ),
+    (
+        ("profiles: [ideal]", "learned: {method: hil, profile: ideal}"),
+        "2:10: a learned display is a prediction already; measure its pictures",
+    ),
+    (("measure: focus\n", ""), "8:11: unknown metric 'psnr_linear_infocus'"),
+    (("planes: [-1.5, 0, 1.5]", "planes: [-1.5, 70]"), "4:51: dataset 'focal_stacks': parameter 'planes.1'"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), REFUSED)
+def test_what_has_no_planes_is_refused_at_its_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    config = write(tmp_path, change)
+    with pytest.raises(UserError) as refused:
+        load_study(config)
+    assert str(refused.value).startswith(f"{config}:{message}")
+    assert "\n" not in str(refused.value)
