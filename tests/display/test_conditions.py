@@ -1,5 +1,6 @@
 """Changes of a bench at test time: each changes the stages that it names, by as much as it says, and no other."""
 
+import itertools
 from dataclasses import fields, replace
 
 import pytest
@@ -128,7 +129,7 @@ def test_dust_settles_speck_by_speck_and_stays():
     drifts = [replace(profile.drift, days=days) for days in (0, 30, 60, 365)]
     shades = [drift.dust(geometry, profile.coherent_noise) for drift in drifts]
     assert torch.equal(shades[0], torch.ones(PANEL, dtype=torch.float64))
-    for earlier, later in zip(shades, shades[1:], strict=False):
+    for earlier, later in itertools.pairwise(shades):
         assert (later <= earlier).all()
         assert (later < earlier).any()
     clean = replace(profile.coherent_noise, specks=0)
