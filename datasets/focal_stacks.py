@@ -24,7 +24,7 @@ from ..errors import UserError, suggest
 from . import still_life
 from .base import fit, from_srgb, known, named_digest, with_channels
 from .defocus import defocus
-from .images import decode, read
+from .images import decode, opened, read
 
 VERSION = 1
 """Part of every digest: raise it when stacks are rendered differently."""
@@ -219,10 +219,16 @@ def _files(scene: str) -> tuple[bytes, bytes]:
     if not Path(scene).is_dir():
         near = suggest(scene, [GENERATED, f"{GENERATED}-2", "motorcycle"])
         raise UserError(f"unknown scene '{scene}'; {near}, or a folder with image.png and depth.png")
+    if not Path(scene, "depth.png").is_file():
+        raise UserError(
+            f"{scene}/depth.png: no such file; expected a gray PNG of 8 or 16 bits, bright where it is near"
+        )
     return read(Path(scene, "image.png")), read(Path(scene, "depth.png"))
 
 
 def _depth_levels(content: bytes, name: str) -> NDArray[np.float64]:
+    if opened(content, name).format != "PNG":
+        raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")
     levels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if levels is None or levels.ndim != 2 or levels.dtype not in (np.uint8, np.uint16):
         raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")

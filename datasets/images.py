@@ -80,7 +80,7 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     UserError, one line, for an image that is damaged, of another kind, larger than 64 million pixels, or of another
     colour space by its ICC profile.
     """
-    image = _open(content, name)
+    image = opened(content, name)
     if image.format == "PNG" and PNG_END not in content:  # Pillow is content with all pixels
         raise UserError(f"{name}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
     found = _fault(image, gray)
@@ -102,8 +102,8 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     return planes((deep / np.float32(65535)).astype(np.float32)) if sixteen_bit == "linear" else from_srgb(deep)
 
 
-def _open(content: bytes, name: str) -> Image.Image:
-    """The header, with the number of pixels and of frames checked."""
+def opened(content: bytes, name: str) -> Image.Image:
+    """The header of an image file, with the number of pixels and of frames checked. UserError as in ``decode``."""
     try:
         with warnings.catch_warnings():
             # Pillow's own limit, which an importing program may have lifted, is only the first line.

@@ -6,9 +6,7 @@ Every mistake in a config is one line that starts with its place, ``configs/tabl
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,12 +14,13 @@ from typing import Annotated, Any, Literal
 from annotated_types import Interval, MinLen
 
 from . import registry
+from .config_sweeps import subset, sweep_of
 from .errors import UserError, suggest
 from .study.bench import LEARNED, condition
 from .study.identity import params_of
 from .study.plan import FLOORS, REFERENCE, scored_dataset
 from .study.stacks import SCORES, planes_of
-from .typed_yaml import check_keys, typed
+from .typed_yaml import check_keys, placed, typed
 from .yaml_source import Document, Keys, load
 
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
@@ -202,7 +201,7 @@ def load_study(path: Path | str) -> Study:
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
     _check_profiles(study, document)
-    study = replace(study, sweeps=tuple(_sweep(study, document, index) for index in range(len(study.sweeps))))
+    study = replace(study, sweeps=tuple(sweep_of(study, document, index) for index in range(len(study.sweeps))))
     entries = tuple(_entry(study, document, index) for index in range(len(study.methods)))
     study = replace(study, methods=entries)
     _check_labels(study, document)
@@ -226,19 +225,8 @@ def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
     return {**data, "methods": [{"name": item} if isinstance(item, str) else item for item in methods]}
 
 
-@contextmanager
-def _placed(document: Document, name: Keys, params: Keys) -> Iterator[None]:
-    """Put a place before an error of the registry: the parameter it names if any, else the plug-in's name."""
-    try:
-        yield
-    except UserError as error:
-        named = re.search(r"parameter '([^'.]+)", str(error))
-        where = (*params, named[1]) if named and (*params, named[1]) in document.keys else name
-        raise document.error(where, str(error), at_key="has no parameter" in str(error)) from error
-
-
 def _targets(study: Study, document: Document) -> Targets:
-    with _placed(document, ("targets", "dataset"), ("targets", "params")):
+    with placed(document, ("targets", "dataset"), ("targets", "params")):
         dataset = scored_dataset(study)
         if not dataset.items():
             raise UserError(f"dataset '{study.targets.dataset}' has no images")
@@ -249,7 +237,7 @@ def _targets(study: Study, document: Document) -> Targets:
 
 def _training(study: Study, document: Document) -> Training:
     chosen = study.training
-    with _placed(document, ("training", "dataset"), ("training", "params")):
+    with placed(document, ("training", "dataset"), ("training", "params")):
         dataset = registry.build("datasets", chosen.dataset, dict(chosen.params), study.folder)
         count = len(dataset.items())
         if chosen.held_out >= count:
@@ -259,7 +247,7 @@ def _training(study: Study, document: Document) -> Training:
 
 def _holograms(study: Study, document: Document) -> Probe:
     chosen = study.holograms
-    with _placed(document, ("holograms", "name"), ("holograms", "params")):
+    with placed(document, ("holograms", "name"), ("holograms", "params")):
         method = registry.build("methods", chosen.name, dict(chosen.params), study.folder)
         if getattr(method, "trains", False):
             raise UserError(f"method '{chosen.name}' has to be trained; holograms should be of one that learns nothing")
@@ -276,7 +264,7 @@ def _display(study: Study, document: Document) -> DisplayGrid:
     if study.measure != "picture":
         raise document.error(("measure",), "a learned display is a prediction already; measure its pictures")
     where = ("display", "learned")
-    with _placed(document, (*where, "method"), (*where, "params")):
+    with placed(document, (*where, "method"), (*where, "params")):
         method = registry.build("methods", display.learned.method, dict(display.learned.params), study.folder)
         if not (getattr(method, "trains", False) and hasattr(method, "predict")):
             raise UserError(f"method '{display.learned.method}' learns no display; name one that predicts captures")
@@ -291,7 +279,7 @@ def _protocol(study: Study, document: Document) -> Protocol:
         return study.protocol
     weights = (study.folder / Path(given).expanduser()).resolve()
     where: Keys = ("protocol", "lpips_weights")
-    with _placed(document, where, where):
+    with placed(document, where, where):
         if not (find_weights("alex", weights) or find_weights("vgg", weights)):
             raise UserError(f"no alexnet-*.pth or vgg16-*.pth in {weights}")
     return replace(study.protocol, lpips_weights=str(weights))
@@ -304,7 +292,7 @@ def _check_profiles(study: Study, document: Document) -> None:
     learned = study.display.learned
     for index, profile in enumerate([learned.profile] if learned else study.display.profiles):
         where: Keys = ("display", "learned", "profile") if learned else ("display", "profiles", index)
-        with _placed(document, where, where):
+        with placed(document, where, where):
             place = condition(profile, study.display.panel, study.folder)
         name, region = place.name, place.spec.region.shape
         if min(region) < SMALLEST_REGION:
@@ -319,54 +307,16 @@ def _check_profiles(study: Study, document: Document) -> None:
         seen[name] = profile
 
 
-def _sweep(study: Study, document: Document, index: int) -> Sweep:
-    from .display.conditions import KINDS, altered, checked
-    from .display.profile import load_profile
-
-    sweep, where = study.sweeps[index], ("sweeps", index)
-    if study.display.learned or study.measure != "picture":
-        raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
-    if sweep.condition not in KINDS:
-        near = suggest(sweep.condition, KINDS)
-        raise document.error((*where, "condition"), f"unknown condition '{sweep.condition}'; {near}")
-    countable = sweep.condition in ("sibling", "draw")
-    if bool(sweep.values) == (sweep.count is not None) or (sweep.count is not None and not countable):
-        raise document.error(where, "a sweep has values; one of siblings or draws may have a count in their place")
-    given = sweep.values or tuple(str(number) for number in range(1, (sweep.count or 0) + 1))
-    profiles = _subset(study, document, sweep.profiles, (*where, "profiles"))
-    same = [other for other in study.sweeps[:index] if other.condition == sweep.condition]
-    values = [value for other in same if set(other.profiles) & set(profiles) for value in other.values]
-    known = len(values)
-    for number, value in enumerate(given):
-        place: Keys = (*where, "values", number) if sweep.values else (*where, "count")
-        with _placed(document, place, place):
-            values.append(checked(sweep.condition, value))
-            for profile in profiles:
-                altered(load_profile(profile, folder=study.folder), sweep.condition, values[-1])
-        if values[-1] in values[:-1]:
-            raise document.error(place, f"{sweep.condition} {value} is listed twice")
-    return replace(sweep, values=tuple(values[known:]), count=None, profiles=profiles)
-
-
-def _subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:
-    """The named displays of the study, in its order; all for none."""
-    for number, profile in enumerate(named):
-        if profile not in study.display.sources:
-            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
-            raise document.error((*where, number), message)
-    return tuple(p for p in study.display.sources if p in named or not named)
-
-
 def _entry(study: Study, document: Document, index: int) -> MethodEntry:
     entry, where = study.methods[index], ("methods", index)
-    with _placed(document, (*where, "name"), (*where, "params")):
+    with placed(document, (*where, "name"), (*where, "params")):
         method = registry.build("methods", entry.name, dict(entry.params), study.folder)
         if study.measure == "prediction" and not hasattr(method, "predict"):
             raise UserError(f"method '{entry.name}' predicts no captures; measure: prediction needs methods that do")
     if entry.captures is not None and (not getattr(method, "camera", False) or study.measure == "prediction"):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)
-    profiles = _subset(study, document, entry.profiles, (*where, "profiles"))
+    profiles = subset(study, document, entry.profiles, (*where, "profiles"))
     label = entry.label or entry.name.rpartition(":")[2]
     return replace(entry, label=label, params=params_of(method), profiles=profiles)
 

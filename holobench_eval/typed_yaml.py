@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
-from .errors import suggest
+from .errors import UserError, suggest
 from .yaml_source import Document, Keys
 
 T = TypeVar("T")
@@ -62,3 +64,14 @@ def _message(where: Keys, fault: Mapping[str, Any]) -> str:
     ):
         message = message.replace(theirs, ours)
     return f"{dotted(where)} {message[0].lower()}{message[1:]}, got {json.dumps(fault['input'])[:60]}"
+
+
+@contextmanager
+def placed(document: Document, name: Keys, params: Keys) -> Iterator[None]:
+    """Put a place before an error of the registry: the parameter it names if any, else the plug-in's name."""
+    try:
+        yield
+    except UserError as error:
+        named = re.search(r"parameter '([^'.]+)", str(error))
+        where = (*params, named[1]) if named and (*params, named[1]) in document.keys else name
+        raise document.error(where, str(error), at_key="has no parameter" in str(error)) from error

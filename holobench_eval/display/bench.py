@@ -96,10 +96,12 @@ class SimulatedBench:
         turning = 1 - profile.coherent_noise.plane_distance if plane is not None else 1.0
         padded, pupil, way = self._padded(), profile.panel.pupil, profile.propagation
         transfer = way.transfer(geometry, padded, pupil, (0.0, turning))
+        last = None if plane is None else way.transfer(geometry, padded, pupil, (turning, 1.0))
         if any(profile.eye.focus):
             fy, fx = frequencies(padded, geometry.pitch)
-            seen = eye_phase(profile.eye.focus, fy, fx, geometry.wavelength, geometry.distance)
-            transfer = transfer * torch.polar(torch.ones_like(seen), seen).to(transfer.dtype)
+            phase = eye_phase(profile.eye.focus, fy, fx, geometry.wavelength, geometry.distance)
+            eye = torch.polar(torch.ones_like(phase), phase).to(transfer.dtype)
+            transfer, last = (transfer * eye, None) if last is None else (transfer, last * eye)
         return ChannelMaps(
             geometry=geometry,
             added=self.ramp + profile.lens.phase(geometry) if any(profile.lens.move) else self.ramp,
@@ -109,7 +111,7 @@ class SimulatedBench:
             still=self._spectrum(self.unmodulated * incident),
             transfer=transfer,
             plane=plane,
-            last_transfer=None if plane is None else way.transfer(geometry, padded, pupil, (turning, 1.0)),
+            last_transfer=last,
             laser_power=profile.drift.laser_power(geometry) * light.power,
         )
 

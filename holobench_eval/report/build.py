@@ -17,7 +17,6 @@ from . import (
     section_sweeps,
     section_training,
     sections,
-    sweep_figures,
 )
 from .description import Description, counts, describe, environment, method_parameters, rules, setup
 from .figures import Figures, draw_figures
@@ -141,7 +140,6 @@ def _changes(results: Results) -> dict[str, Any]:
     return {
         "sweeps": told,
         "claims": section_sweeps.claims(results, every),
-        "sweeps_missing": sweep_figures.missing(every),
     }
 
 

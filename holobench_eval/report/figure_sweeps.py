@@ -54,7 +54,9 @@ def draw_sweep(path: Path, panels: Sequence[Panel], quality: str) -> None:
             axes.set_title(panel.title, loc="left", weight="bold", parse_math=False)
             _panel(axes, panel, looks)
             axes.set_ylabel(quality.replace(", of ", "\nof "))
-        found = dict(zip(*reversed(drawn[0].get_legend_handles_labels()), strict=True))
+        found = {}
+        for axes in drawn:
+            found |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
         figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=4, frameon=False)
         save(figure, path)
 

@@ -174,13 +174,14 @@ def layout_of(study: Study) -> Layout:
 
 
 def _sweeps(study: Study, shown: Mapping[str, Condition]) -> Iterator[Swept]:
-    for sweep in study.sweeps:
-        for source in sweep.profiles:
-            places = changed(replace(study, sweeps=(sweep,)), source, shown[source])[1:]
+    for kind in dict.fromkeys(sweep.condition for sweep in study.sweeps):
+        same = tuple(sweep for sweep in study.sweeps if sweep.condition == kind)
+        for source, before in shown.items():
+            places = changed(replace(study, sweeps=same), source, before)[1:]
             points = tuple((place.change[1], place.title) for place in places if place.change)
             if points:
-                drawn = _drawn(shown[source], points) if sweep.condition == "draw" else ()
-                yield Swept(sweep.condition, shown[source].name, points, drawn)
+                drawn = _drawn(before, points) if kind == "draw" else ()
+                yield Swept(kind, before.name, points, drawn)
 
 
 def _drawn(place: Condition, points: tuple[tuple[float | str, str], ...]) -> tuple[dict[str, float], ...]:

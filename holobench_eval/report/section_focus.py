@@ -66,11 +66,12 @@ def _compared(results: Results, condition: str, baseline: str, name: str) -> str
     estimate = bootstrap_mean(second - first)
     difference = score.interval(estimate.mean, estimate.low, estimate.high, signed=True)
     unit = f" {score.unit}" if score.unit else ""
+    where = " in focus" if score.in_focus else ""
     return (
         f"{name} makes one hologram of all {len(every)} planes and need not know where the eye looks. It takes "
         f"{number(seconds)} s, {number(seconds / other)} times what {baseline} takes for one plane and "
         f"{number(seconds / other / len(every))} times what {baseline} takes for all of them. Against {baseline} moved "
-        f"by a lens it {_turned(score, estimate.mean)} in focus: {difference}{unit} over all planes; "
+        f"by a lens it {_turned(score, estimate.mean)}{where}: {difference}{unit} over all planes; "
         f"{_each(results, second - first)}."
     )
 

@@ -173,8 +173,9 @@ def _pairs(ranks: Ranks) -> list[str]:
 
 
 def ranges(ranks: Ranks) -> Markup:
-    """What was drawn, within which range, and where that comes from."""
-    drawn = {name: [one[name] for one in ranks.swept.drawn] for name in (ranks.swept.drawn or ({},))[0]}
+    """What was drawn of the draws that are ranked, within which range, and where that comes from."""
+    ranked = [ranks.swept.drawn[index] for index in ranks.used] if ranks.swept.drawn else []
+    drawn = {name: [one[name] for one in ranked] for name in (ranked or [{}])[0]}
     rows = []
     for name, values in drawn.items():
         one = PARAMETERS[name]

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from markupsafe import Markup
 
+from . import sections
 from .markdown import escape, table
 from .results import Results
 from .statistics import Estimate
 from .sweeps import SMALL, Sweep
+from .tracks import ONLINE
 from .wording import words
 
 PAPER = {
-    "camera_shift_x": "the quality stays stable when the camera moves by up to 4 cm",
-    "camera_shift_y": "the quality stays stable when the camera moves by up to 4 cm",
-    "drift": "there is no significant change in quality over three months",
-    "sensor": "captures of two cameras are consistent",
+    "camera_shift_x": ("the quality stays stable when the camera moves by up to 4 cm", 40.0),
+    "camera_shift_y": ("the quality stays stable when the camera moves by up to 4 cm", 40.0),
+    "drift": ("there is no significant change in quality over three months", 90.0),
+    "sensor": ("captures of two cameras are consistent", None),
 }
-"""What Chakravarthula et al. 2020, Section 7.2, say of their method, by kind of change."""
+"""What Chakravarthula et al. 2020, Section 7.2, say of their method, by kind of change, and how far a sweep has to go
+to tell (None: two of a kind)."""
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}
 """Kinds whose changes others are meant to undo."""
 
@@ -46,31 +50,47 @@ def scores(sweep: Sweep) -> Markup:
     unit = f" {sweep.kind.unit}" if sweep.kind.unit else ""
     points = sweep.points if sweep.kind.numeric else (("before", sweep.swept.before), *sweep.points)
     columns = ["method", *(f"{shown(value)}{unit}" if value != "before" else "before" for value, _ in points)]
-    rows = [[label, *(score.number(sweep.mean(label, name).mean) for _, name in points)] for label in sweep.methods]
+    rows = [
+        [named(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in points)]
+        for label in sweep.methods
+    ]
     return table(columns, rows)
+
+
+def named(results: Results, name: str) -> str:
+    """A label, marked for the ceiling and for methods that see the changed display while they solve."""
+    return f"{name} (online)" if results.layout.track(name) == ONLINE else sections.label(results, name)
 
 
 def losses(sweep: Sweep) -> Markup:
     """What the worst change cost each method, the slope, and what is left above the baseline."""
     score, kind, baseline = sweep.results.headline, sweep.kind, sweep.results.layout.baseline
     unit = f" [{score.unit}]" if score.unit else ""
-    per = f"loss per {kind.per:g} {kind.unit}{unit}"
-    columns = ["method", "worst at", f"loss there{unit}", *([per] if kind.numeric else [])]
+    sides = {-1: " below", 1: " above"} if len(sweep.sides) > 1 else {-1: "", 1: ""}
+    per = [f"loss per {kind.per:g} {kind.unit}{sides[side]}{unit}" for side in sweep.sides]
+    columns = ["method", "worst at", f"loss there{unit}", *per]
     columns += [f"above {baseline} there{unit}", *([f"falls to {baseline} at"] if kind.numeric else [])]
     rows = []
     for label in sweep.methods:
-        worst, slope = sweep.worst(label), sweep.slope(label)
+        worst, slopes = sweep.worst(label), [sweep.slope(label, side) for side in sweep.sides]
         if worst is None:
             continue
         value, loss = worst
         condition = dict(sweep.swept.points)[value]
         gained = sweep.gain(label, condition) if label != baseline else None
-        row = [label, f"{shown(value)} {kind.unit}".strip(), _interval(sweep, loss)]
-        row += [f"{slope.mean:+.3g} [{slope.low:+.3g}, {slope.high:+.3g}]" if slope else "–"] if kind.numeric else []
+        row = [named(sweep.results, label), f"{shown(value)} {kind.unit}".strip(), _interval(sweep, loss)]
+        row += [_slope(slope) for slope in slopes]
         row += [_interval(sweep, gained) if gained else "–"]
         row += [_break_even(sweep, label)] if kind.numeric else []
         rows.append(row)
-    return table(columns, rows)
+    return table(columns, rows) if rows else Markup("")
+
+
+def _slope(slope: Estimate | None) -> str:
+    if slope is None:
+        return "–"
+    ends = "" if np.isnan(slope.low) else f" [{slope.low:+.3g}, {slope.high:+.3g}]"
+    return f"{slope.mean:+.3g}{ends}"
 
 
 def _interval(sweep: Sweep, estimate: Estimate) -> str:
@@ -81,10 +101,11 @@ def _break_even(sweep: Sweep, label: str) -> str:
     """Where an advantage ends; in words where there is none or it does not end."""
     if label == sweep.results.layout.baseline:
         return "–"
-    before = sweep.gain(label, sweep.swept.before)
-    if before is None or before.mean <= 0:
+    before, found = sweep.gain(label, sweep.swept.before), sweep.break_even(label)
+    if before is None or found is None:
+        return "–"
+    if before.mean <= 0:
         return "not above it before"
-    found = sweep.break_even(label)
     return words([f"{value:.3g} {sweep.kind.unit}".strip() for value in found]) if found else "nowhere in this range"
 
 
@@ -107,7 +128,8 @@ def _stated_range(sweep: Sweep) -> list[str]:
             ranges.setdefault(found, []).append(label)
     unit = f" {sweep.kind.unit}" if sweep.kind.unit else ""
     return [
-        f"Within {SMALL:g} dB of the score before the change from {low:g} to {high:g}{unit}: {words(labels)}."
+        f"Within {SMALL:g} {sweep.results.headline.unit} of the score before the change from {low:g} to "
+        f"{high:g}{unit}: {words(labels)}."
         for (low, high), labels in ranges.items()
     ]
 
@@ -116,7 +138,8 @@ def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
     told = []
     for label in sweep.methods:
         parts = [
-            f"{value}: {100 * share.mean:.0f} % [{100 * share.low:.0f}, {100 * share.high:.0f}]"
+            f"{value}: {100 * share.mean:.0f} %"
+            f"{'' if np.isnan(share.low) else f' [{100 * share.low:.0f}, {100 * share.high:.0f}]'}"
             for value, share in sweep.recovered(label, remedy).items()
         ]
         if parts:
@@ -127,29 +150,40 @@ def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
 def claims(results: Results, every: Sequence[Sweep]) -> str:
     """One paragraph: the paper's three claims of robustness for its method, and what these sweeps say of each.
 
-    Empty where the paper's method, or every one of the three changes, is missing.
+    Empty where the paper's method, or every one of the three changes, is missing, and for a headline that is not in dB.
     """
+    if results.headline.unit != "dB":
+        return ""
     labels = list(dict.fromkeys(results.frame.loc[results.frame["name"] == "hil", "method"]))
     told = []
     for sweep in every:
         for label in labels:
-            worst = sweep.worst(label) if label in sweep.methods and sweep.swept.kind in PAPER else None
-            if worst is not None:
-                told.append(_claim(sweep, label, *worst))
+            if label in sweep.methods and sweep.swept.kind in PAPER:
+                told.append(_claim(sweep, label))
     if not told:
         return ""
     rule = f"A claim is said to hold where the mean loss is at most {SMALL:g} dB at every value."
     return f"Chakravarthula et al. 2020 (Section 7.2) show pictures for three claims. {rule} {' '.join(told)}"
 
 
-def _claim(sweep: Sweep, label: str, value: float | str, loss: Estimate) -> str:
+def _claim(sweep: Sweep, label: str) -> str:
     score, baseline = sweep.results.headline, sweep.results.layout.baseline
+    said, far = PAPER[sweep.swept.kind]
+    whole = len(sweep.losses(label)) == len(sweep.swept.points)
+    reached = len(sweep.swept.points) > 1 if far is None else max(abs(float(v)) for v, _ in sweep.swept.points) >= far
+    worst = sweep.worst(label)
+    if not (whole and reached) or worst is None:
+        lacking = "the sweep does not go so far" if whole else "some points have no score"
+        return f"On {sweep.swept.before}, whether {said} for {label} cannot be told ({sweep.kind.words}): {lacking}."
+    value, loss = worst
     verdict = "holds here" if loss.mean <= SMALL else "does not hold here"
     where = f"{sweep.kind.words}, {shown(value)} {sweep.kind.unit}".rstrip(" ,")
     sentence = (
-        f"On {sweep.swept.before}, that {PAPER[sweep.swept.kind]} {verdict} for {label}: at worst ({where}) it loses "
+        f"On {sweep.swept.before}, that {said} {verdict} for {label}: at worst ({where}) it loses "
         f"{score.interval(loss.mean, loss.low, loss.high)} {score.unit}"
     )
+    if label == baseline:
+        return f"{sentence}."
     condition = dict(sweep.swept.points)[value]
     gained, before = sweep.gain(label, condition), sweep.gain(label, sweep.swept.before)
     other = sweep.loss(str(baseline), condition)

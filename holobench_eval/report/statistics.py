@@ -58,6 +58,22 @@ def bootstrap_mean(values: Sequence[float] | Array) -> Estimate:
     return Estimate(mean, float(low), float(high), n)
 
 
+def bootstrap_ratio(part: Array, whole: Array) -> Estimate:
+    """Ratio of two means over the same targets, each ``(n,)``, and its percentile interval over resampled targets, with
+    the expansion of ``bootstrap_mean``."""
+    n = part.size
+    ratio = float(part.mean() / whole.mean())
+    if n < FEWEST:
+        return Estimate(ratio, np.nan, np.nan, n)
+    quantile = stats.t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt(n / (n - 1))
+    tail = float(stats.norm.cdf(-quantile))
+    chosen = _resamples(n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = part[chosen].mean(axis=1) / whole[chosen].mean(axis=1)
+    low, high = np.quantile(ratios, [tail, 1 - tail])
+    return Estimate(ratio, float(low), float(high), n)
+
+
 def wilcoxon(differences: Sequence[float] | Array) -> float:
     """Exact two-sided p value of the Wilcoxon signed-rank test, ties and zeros included.
 

@@ -10,10 +10,9 @@ import numpy as np
 from .figure_rows import Row, draw_rows
 from .figure_sweeps import Curve, Panel, draw_sweep
 from .gallery import Picture, Tile
-from .results import Results
 from .section_sweeps import shown
 from .sweeps import Sweep
-from .wording import words
+from .tracks import OFFLINE, ONLINE
 
 MOST_VALUES = 7
 """Pictures in a row; of more values, the nominal one and evenly spaced others are shown."""
@@ -82,7 +81,7 @@ def _reach(sweep: Sweep, label: str, condition: str) -> tuple[float, float]:
 
 
 def _rows(sweep: Sweep, take: Take, target: str) -> list[Row]:
-    """A row a method: the best of each track that is not the ceiling, the baseline, and the paper's method."""
+    """A row a method, see ``chosen``."""
     points = sweep.points if sweep.kind.numeric else (("before", sweep.swept.before), *sweep.points)
     if len(points) > MOST_VALUES:
         picks = np.linspace(0, len(points) - 1, MOST_VALUES).round().astype(int)
@@ -91,24 +90,17 @@ def _rows(sweep: Sweep, take: Take, target: str) -> list[Row]:
     heads = [value if value == "before" else f"{shown(value)}{unit}" for value, _ in points]
     return [
         Row(label, tuple((head, take(label, name, target)) for head, (_, name) in zip(heads, points, strict=True)))
-        for label in chosen(sweep.results, sweep.methods)
+        for label in chosen(sweep)
     ]
 
 
-def chosen(results: Results, methods: Sequence[str]) -> list[str]:
-    """At most ``MOST_ROWS`` methods to be shown: the baseline first, then the paper's, then the best of the others."""
-    condition = results.conditions[0]
+def chosen(sweep: Sweep) -> list[str]:
+    """At most ``MOST_ROWS`` methods to be shown: the baseline, the paper's, then the best of the others on the display
+    before the change, without the ceiling."""
+    results, before = sweep.results, sweep.swept.before
     named = results.frame.drop_duplicates("method").set_index("method")["name"]
-    first = [label for label in methods if label == results.layout.baseline]
-    paper = [label for label in methods if named[label] == "hil"]
-    sign = -1 if results.headline.higher_is_better else 1
-    rest = sorted(methods, key=lambda label: sign * float(np.nanmean(results.values(label, condition))))
-    return list(dict.fromkeys([*first, *paper, *rest]))[:MOST_ROWS]
-
-
-def missing(every: Sequence[Sweep]) -> str:
-    """Methods that lack a point of a sweep and are in none of its figures and tables; empty if there is none."""
-    left = {
-        label for sweep in every for label in sweep.results.methods(sweep.swept.before) if label not in sweep.methods
-    }
-    return f"Left out where they lack a value: {words(sorted(left))}." if left else ""
+    first = [label for label in sweep.methods if label == results.layout.baseline]
+    paper = [label for label in sweep.methods if named[label] == "hil"]
+    ranked = results.ranking(before, tracks=(*OFFLINE, ONLINE))
+    others = [label for label in ranked if label in sweep.methods]
+    return list(dict.fromkeys([*first, *paper, *others]))[:MOST_ROWS]

@@ -10,7 +10,7 @@ import numpy as np
 from ..display.conditions import KINDS, Kind
 from .layout import Swept
 from .results import Results
-from .statistics import Estimate, bootstrap_mean
+from .statistics import Estimate, bootstrap_mean, bootstrap_ratio
 
 SMALL = 1.0
 """dB; a mean loss up to this is called small. It is what the acceptance of a moved image is told by, too."""
@@ -39,8 +39,13 @@ class Sweep:
         return tuple(sorted(numbers, key=lambda point: float(point[0])))
 
     @property
+    def values(self) -> dict[str, float | str]:
+        """The value of every changed condition."""
+        return {condition: value for value, condition in self.swept.points}
+
+    @property
     def methods(self) -> list[str]:
-        """Labels that have a row under every condition of the sweep."""
+        """Labels that were planned under every condition of the sweep."""
         rows = [self.results.methods(condition) for _, condition in ((0.0, self.swept.before), *self.swept.points)]
         return [label for label in rows[0] if all(label in others for others in rows)]
 
@@ -59,20 +64,30 @@ class Sweep:
 
     def worst(self, label: str) -> tuple[float | str, Estimate] | None:
         """The value that cost most, and what it cost."""
-        losses, values = self.losses(label), {condition: value for value, condition in self.swept.points}
+        losses = self.losses(label)
         if not losses:
             return None
         condition = max(losses, key=lambda name: losses[name].mean)
-        return values[condition], losses[condition]
+        return self.values[condition], losses[condition]
 
-    def slope(self, label: str) -> Estimate | None:
-        """Loss for ``kind.per`` of the change, either way: the least-squares line through zero, target by target."""
-        if self.kind.nominal is None or len(self.losses(label)) < len(self.swept.points):
+    @property
+    def sides(self) -> list[int]:
+        """-1 and 1 where there are points below and above the nominal value; none for names and for factors."""
+        nominal = self.kind.nominal
+        if nominal is None or not self.kind.per:
+            return []
+        return [side for side in (-1, 1) if any(side * (float(v) - nominal) > 0 for v, _ in self.swept.points)]
+
+    def slope(self, label: str, side: int) -> Estimate | None:
+        """Loss for ``kind.per`` of the change to one side: the least-squares line through zero, target by target."""
+        nominal = float(self.kind.nominal or 0.0)
+        points = [(abs(float(v) - nominal), name) for v, name in self.swept.points if side * (float(v) - nominal) > 0]
+        if not points or any(self.loss(label, name) is None for _, name in points):
             return None
         sign = 1 if self.results.headline.higher_is_better else -1
-        reach = np.array([abs(float(value) - self.kind.nominal) for value, _ in self.swept.points])
+        reach = np.array([away for away, _ in points])
         before = self.results.values(label, self.swept.before)
-        after = np.stack([self.results.values(label, condition) for _, condition in self.swept.points])
+        after = np.stack([self.results.values(label, condition) for _, condition in points])
         return bootstrap_mean(self.kind.per * (reach @ (sign * (before - after))) / float(reach @ reach))
 
     def gain(self, label: str, condition: str) -> Estimate | None:
@@ -82,11 +97,11 @@ class Sweep:
             return gained
         return Estimate(-gained.mean, -gained.high, -gained.low, gained.n)
 
-    def break_even(self, label: str) -> list[float]:
+    def break_even(self, label: str) -> list[float] | None:
         """Where a method that is above the baseline without a change falls to it, on either side of the nominal value,
-        by straight lines between the points; empty where it never does."""
-        if self.kind.nominal is None:
-            return []
+        by straight lines between the points; empty where it never does. None where a difference is not known."""
+        if self.kind.nominal is None or any(self.gain(label, condition) is None for _, condition in self.points):
+            return None
         found = []
         for side in (-1, 1):
             walk = sorted(
@@ -119,18 +134,17 @@ class Sweep:
         return ends[0], ends[1]
 
     def recovered(self, label: str, remedy: Sweep) -> dict[str, Estimate]:
-        """Share of each loss that is got back under the same value of another kind, by value."""
+        """Share of each loss that is got back under the same value of another kind, by value; of a loss that is small,
+        or not clear, no share is told."""
         shares = {}
         same = dict(remedy.swept.points)
         for value, condition in self.swept.points:
             if value in same:
                 lost, left = self.loss(label, condition), remedy.loss(label, same[value])
-                if lost is not None and left is not None and lost.mean > 0:
-                    back = self.results.values(label, same[value]) - self.results.values(label, condition)
-                    sign = 1 if self.results.headline.higher_is_better else -1
-                    share = bootstrap_mean(sign * back)
-                    scaled = (share.mean / lost.mean, share.low / lost.mean, share.high / lost.mean)
-                    shares[str(value)] = Estimate(*scaled, share.n)
+                if lost is not None and left is not None and lost.mean > SMALL and not lost.low <= 0:
+                    before = self.results.values(label, self.swept.before)
+                    blurred, cured = (self.results.values(label, name) for name in (condition, same[value]))
+                    shares[str(value)] = bootstrap_ratio(cured - blurred, before - blurred)
         return shares
 
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 Panel = tuple[int, int]
 LEARNED = "learned"
 """How a config names the display that is a trained network."""
-OPEN_PIXELS = 8 * 1080 * 1920
-"""Pixels of all benches that a process keeps open, at most."""
+OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
+"""Pixels of all benches that a process keeps open, and their number, at most; but two are."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def change_text(kind: str, value: Value) -> str:
     """A change in words: ``drift 30 days``."""
     from ..display.conditions import KINDS
 
-    shown = f"{value:g}" if isinstance(value, float) else value
+    shown = f"{value:.10g}" if isinstance(value, float) else value
     return " ".join(part for part in (kind.replace("_", " "), shown, KINDS[kind].unit) if part)
 
 
@@ -76,7 +76,8 @@ def workbench(shown: Condition, seed: int) -> Workbench:
     key = (shown.source, shown.folder, shown.digest, shown.spec.shape, shown.change, seed)
     if key not in _open:
         _open[key] = _opened(shown, seed)
-        while len(_open) > max(2, OPEN_PIXELS // (shown.spec.shape[0] * shown.spec.shape[1])):
+        pixels = shown.spec.shape[0] * shown.spec.shape[1]
+        while len(_open) > max(2, min(OPEN_BENCHES, OPEN_PIXELS // pixels)):
             _open.popitem(last=False)
     _open.move_to_end(key)
     opened = _open[key]

@@ -39,16 +39,20 @@ def showings(
 ) -> Iterator[Showing]:
     """Targets and displays that share a solution of a method, for every solution.
 
-    A method with ``planes = True`` makes one hologram of all planes of a scene; others make one a target, which the
-    display moves to the target's plane.
+    A method with ``planes = True`` makes one hologram of all planes of a scene, for displays whose planes lie equally
+    far apart; others make one a target, which the display moves to the target's plane.
     """
     if not getattr(method, "planes", False):
         for target in targets:
             yield [(target, _at(place, LENS, planes[target[0]][1])) for place in group]
         return
+    alike: dict[float, list[Condition]] = {}
+    for place in group:
+        alike.setdefault(offset(place, {STAYS: 1.0}), []).append(place)
     for scene in dict.fromkeys(planes[name][0] for name, _ in targets):
         stack = [target for target in targets if planes[target[0]][0] == scene]
-        yield [(target, _at(place, STAYS, planes[target[0]][1])) for target in stack for place in group]
+        for places in alike.values():
+            yield [(target, _at(place, STAYS, planes[target[0]][1])) for target in stack for place in places]
 
 
 def _at(place: Condition, kind: str, millimetres: float) -> Condition:

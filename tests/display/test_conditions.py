@@ -99,11 +99,28 @@ def test_a_value_out_of_range_is_refused(kind, value):
 )
 def test_a_name_that_means_nothing_is_refused(kind, value):
     with pytest.raises(UserError):
-        altered(load_profile("leto-aged"), kind, value)
+        altered(load_profile("leto-aged"), kind, checked(kind, value))
+
+
+def test_a_value_has_one_form_however_it_is_written():
+    assert checked("sibling", 3) == checked("sibling", 3.0) == checked("sibling", "3") == "3"
+    assert checked("eye", "-2/-1x30") == checked("eye", "-2 / -1 x 30") == "-2 / -1 x 30"
+    assert checked("eye", -2) == checked("known_eye", "-2.0") == "-2"
+    for wrong in (0, "0", "01", 1.5, "1_0", -1):
+        with pytest.raises(UserError):
+            checked("sibling", wrong)
+
+
+def test_a_change_adds_to_what_the_profile_has():
+    profile = load_profile("leto-aged")
+    aged = replace(profile, drift=replace(profile.drift, days=30.0))
+    assert altered(aged, "drift", 10.0).drift.days == 40
+    moved = altered(profile, "camera_shift_x", 20.0)
+    assert altered(moved, "camera_shift_x", 20.0).propagation.pupil_shift[1] == pytest.approx(0.25)
 
 
 def test_bits_of_a_panel_with_a_table_of_levels_are_fixed():
-    with pytest.raises(UserError, match="table"):
+    with pytest.raises(UserError, match="smooth look-up table"):
         altered(load_profile("plm-4bit"), "bits", 3.0)
 
 

@@ -82,10 +82,14 @@ def test_losses_are_told_target_by_target_and_by_unit(results: Results) -> None:
     drift = of(results, "drift")
     value, loss = drift.worst("HIL") or pytest.fail("no loss")
     assert (value, loss.mean, loss.low, loss.high) == pytest.approx((90, 9, 9, 9))
-    slope = drift.slope("HIL")
+    assert drift.sides == [1]
+    slope = drift.slope("HIL", 1)
     assert slope is not None
     assert slope.mean == pytest.approx(3)  # dB in 30 days
-    assert (drift.slope("Wirtinger") or slope).mean == pytest.approx(0)
+    assert (drift.slope("Wirtinger", 1) or slope).mean == pytest.approx(0)
+    shift = of(results, "camera_shift_x")
+    assert shift.sides == [-1, 1]
+    assert "loss per 1 mm below [dB]" in section_sweeps.losses(shift)
 
 
 def test_an_advantage_ends_between_the_points_on_either_side(results: Results) -> None:
@@ -107,6 +111,7 @@ def test_points_stand_in_order_with_the_unchanged_display_among_them(results: Re
 def test_what_a_remedy_gets_back_is_told_as_a_share(results: Results) -> None:
     (share,) = of(results, "eye").recovered("HIL", of(results, "known_eye")).values()
     assert share.mean == pytest.approx(7 / 8)
+    assert of(results, "eye").recovered("Wirtinger", of(results, "known_eye")) == {}  # it lost nothing
     told = section_sweeps.sentences(of(results, "eye"), sweeps(results))
     assert any("88 %" in sentence for sentence in told)
 
@@ -114,20 +119,24 @@ def test_what_a_remedy_gets_back_is_told_as_a_share(results: Results) -> None:
 def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> None:
     told = section_sweeps.claims(results, sweeps(results))
     assert "three months does not hold here for HIL" in told
-    assert "4 cm holds here for HIL" in told
+    assert "4 cm for HIL cannot be told (camera moved sideways): the sweep does not go so far" in told
     assert "goes from +4.00 to -5.00 dB" in told
     without = Results(results.frame[results.frame["name"] != "hil"], replace(layout(), pairs=()))
     assert section_sweeps.claims(without, sweeps(without)) == ""
 
 
-def test_a_method_that_lacks_a_point_is_left_out_and_named(results: Results) -> None:
+def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Results) -> None:
     frame = results.frame.copy()
-    hole = (frame["method"] == "HIL") & (frame["condition"] == title("drift", 60.0)) & (frame["target"] == "b")
+    hole = (frame["method"] == "HIL") & (frame["condition"] == title("drift", 90.0)) & (frame["target"] == "b")
     frame.loc[hole, "state"] = "failed"
     frame.loc[hole, "psnr_linear"] = np.nan
     holed = Results(frame, layout())
-    assert of(holed, "drift").slope("HIL") is None
-    assert of(holed, "camera_shift_x").slope("HIL") is not None
+    drift = of(holed, "drift")
+    assert drift.slope("HIL", 1) is None
+    assert drift.break_even("HIL") is None
+    assert of(holed, "camera_shift_x").slope("HIL", 1) is not None
+    assert "three months for HIL cannot be told" in section_sweeps.claims(holed, sweeps(holed))
+    assert "–" in section_sweeps.scores(drift)
 
 
 def test_a_report_with_sweeps_has_curves_and_tables(tmp_path: Path, results: Results) -> None:

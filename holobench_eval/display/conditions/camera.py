@@ -25,9 +25,9 @@ SENSORS = {
     "canon-t6i": Sensor(pitch=3.72e-6, bits=14, full_well=32000, read_noise=7, prnu=0.005, nonlinearity=0.01),
     "fujifilm-s5-pro": Sensor(pitch=5.4e-6, bits=14, full_well=45000, read_noise=12, prnu=0.01, nonlinearity=0.02),
 }
-"""Pitch by paper 5.1 and 7.2 (23 mm over 4256 pixels), bits of the raw files; the rest is assumed: full wells in
-proportion to pixels of the same kind, a CCD's higher read noise and its amplifier's response."""
-SENSOR_MODEL = "pitch and bits as published, well, noise and response assumed; registered anew"
+"""Pitch by paper 5.1 and 7.2 (23 mm over 4256 pixels), bits of the raw files; the rest is assumed: larger
+pixels hold more, a CCD has more read noise and the response of its amplifier."""
+SENSOR_MODEL = "pitch and bits as published; well, noise and response assumed"
 
 
 def moved_sideways(profile: Profile, millimetres: float) -> Profile:
@@ -48,7 +48,11 @@ def _moved(profile: Profile, down: float, right: float) -> Profile:
     aberration = {name: way.aberration.get(name, 0.0) + added.get(name, 0.0) for name in {**way.aberration, **added}}
     return replace(
         profile,
-        propagation=replace(way, aberration=aberration, pupil_shift=(PUPIL * down, PUPIL * right)),
+        propagation=replace(
+            way,
+            aberration=aberration,
+            pupil_shift=(way.pupil_shift[0] + PUPIL * down, way.pupil_shift[1] + PUPIL * right),
+        ),
         relay=replace(
             relay,
             shift=(relay.shift[0] + REST * down, relay.shift[1] + REST * right),

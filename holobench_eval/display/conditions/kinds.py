@@ -7,6 +7,7 @@ are marked "assumed" have no published source; lengths are those of the full pan
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -18,6 +19,8 @@ from . import camera, draws, vision
 Value = float | str
 """How far a condition goes: a number, or the name of one of several."""
 
+USUAL_BITS = 8
+"""Of the panels of which fewer bits are asked."""
 GREEN = 517e-9
 """Wavelength [m] at which a drift of the laser is told."""
 CLEARING, OPERATING, HALLER = 373.0, 308.0, 0.2
@@ -32,8 +35,8 @@ class Kind:
     words: what changes; unit: of the values, empty for a factor or a name; stages: the parameters of ``Profile`` that
     may differ; apply: the profile after a change; nominal: the value that changes nothing (None: values are names, or
     draws, and there is none); low, high: what a number may be; moves: whether the camera's view moves, so that it is
-    registered anew (else it stays as it was before the change); per: the loss is told for so much; model: what is
-    assumed, for reports.
+    registered anew (else it stays as it was before the change); per: the loss is told for so much (0: not at all);
+    counted: whether values are whole numbers from 1 that name one of many; model: what is assumed, for reports.
     """
 
     words: str
@@ -46,6 +49,7 @@ class Kind:
     high: float = math.inf
     moves: bool = False
     per: float = 1.0
+    counted: bool = False
 
     @property
     def numeric(self) -> bool:
@@ -59,7 +63,7 @@ def number(change: Callable[[Profile, float], Profile]) -> Callable[[Profile, Va
 
 
 def _drift(profile: Profile, days: float) -> Profile:
-    return replace(profile, drift=replace(profile.drift, days=days))
+    return replace(profile, drift=replace(profile.drift, days=profile.drift.days + days))
 
 
 def _distance(profile: Profile, percent: float) -> Profile:
@@ -80,7 +84,8 @@ def _defocus(profile: Profile, waves: float) -> Profile:
 
 
 def _obstruction(profile: Profile, radius: float) -> Profile:
-    return replace(profile, propagation=replace(profile.propagation, obstruction=radius))
+    way = profile.propagation
+    return replace(profile, propagation=replace(way, obstruction=max(way.obstruction, radius)))
 
 
 def _power(profile: Profile, factor: float) -> Profile:
@@ -94,15 +99,17 @@ def _temperature(profile: Profile, kelvin: float) -> Profile:
 
 
 def _bits(profile: Profile, bits: float) -> Profile:
-    if profile.lut.table and bits != profile.panel.bits:
-        raise UserError(f"'{profile.name}' has a table of {len(profile.lut.table)} levels; its bit depth is fixed")
+    if profile.panel.bits != USUAL_BITS or profile.lut.table:
+        raise UserError(
+            f"'{profile.name}' is no panel of {USUAL_BITS} bits with a smooth look-up table, of which to take some"
+        )
     if bits != int(bits):
         raise UserError(f"a panel has a whole number of bits, got {bits:g}")
     return replace(profile, panel=replace(profile.panel, bits=int(bits)))
 
 
 def _sibling(profile: Profile, value: Value) -> Profile:
-    return replace(profile, seed=profile.seed + int(_whole(value, "the panel's sibling")))
+    return replace(profile, seed=profile.seed + int(value))
 
 
 def _ambient(profile: Profile, level: float) -> Profile:
@@ -131,14 +138,7 @@ def _known_eye(profile: Profile, value: Value) -> Profile:
 
 
 def _draw(profile: Profile, value: Value) -> Profile:
-    return draws.drawn(profile, int(_whole(value, "a draw")))
-
-
-def _whole(value: Value, what: str) -> float:
-    try:
-        return float(int(value))
-    except (TypeError, ValueError):
-        raise UserError(f"{what} is named by a whole number, got '{value}'") from None
+    return draws.drawn(profile, int(value))
 
 
 KINDS: Mapping[str, Kind] = {
@@ -175,6 +175,7 @@ KINDS: Mapping[str, Kind] = {
     "laser_power": Kind(
         "laser power", "of the nominal", ("illumination",), number(_power),
         "the exposure stays, so that less light is noisier and more may saturate", nominal=1.0, low=0.01, high=20,
+        per=0,
     ),
     "temperature": Kind(
         "panel temperature above that of calibration", "K", ("lut",), number(_temperature),
@@ -187,11 +188,11 @@ KINDS: Mapping[str, Kind] = {
     ),
     "bits": Kind(
         "bit depth of the panel", "bits", ("panel",), number(_bits),
-        "the same look-up table at fewer levels", nominal=8.0, low=1, high=16,
+        "the same look-up table at fewer levels", nominal=float(USUAL_BITS), low=1, high=USUAL_BITS,
     ),
     "sibling": Kind(
         "another panel of the same kind", "", ("seed",), _sibling,
-        "same profile, every random pattern drawn anew", nominal=None, moves=True,
+        "same profile, every random pattern drawn anew", nominal=None, moves=True, counted=True,
     ),
     "ambient": Kind(
         "ambient light", "of a white pixel", ("sensor",), number(_ambient),
@@ -199,7 +200,9 @@ KINDS: Mapping[str, Kind] = {
     ),
     "refocus": Kind(
         "image moved by a lens phase, camera at its new place", "mm", ("lens", "propagation"), number(_refocus),
-        "paper 7.1: a lens added to the same hologram; on a smaller panel the way shrinks with the distance",
+        "paper 7.1: a lens added to the same hologram; on a smaller panel the way shrinks with the distance. What it "
+        "loses: the lens tilts light towards the panel's edge, where the iris cuts another part of its band, and adds "
+        "wraps, which a panel with crosstalk blurs",
         low=-50, high=50, moves=True,
     ),
     "other_plane": Kind(
@@ -224,6 +227,7 @@ KINDS: Mapping[str, Kind] = {
     ),
     "draw": Kind(
         "random draw of the bench's parameters", "", draws.STAGES, _draw, draws.MODEL, nominal=None, moves=True,
+        counted=True,
     ),
 }  # fmt: skip
 """Every kind of condition by its name in a config."""
@@ -234,6 +238,13 @@ def checked(kind: str, value: Value) -> Value:
     if kind not in KINDS:
         raise UserError(f"unknown condition '{kind}'; {suggest(kind, KINDS)}")
     found = KINDS[kind]
+    if found.counted:
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+        if not re.fullmatch(r"[1-9]\d{0,8}", text):
+            raise UserError(f"{kind} is named by a whole number from 1, got {value!r}")
+        return text
+    if kind.endswith("eye"):
+        return str(vision.Prescription.read(str(value)))
     if not found.numeric:
         return str(value)
     if not isinstance(value, int | float) or isinstance(value, bool) or not found.low <= value <= found.high:

@@ -39,6 +39,10 @@ class Prescription:
             raise UserError(f"prescription '{text}': at most {STRONGEST:g} dioptres, and an axis of 0 to 180 degrees")
         return cls(sphere, cylinder, axis)
 
+    def __str__(self) -> str:
+        """As ``read`` takes it, in one form."""
+        return f"{self.sphere:g} / {self.cylinder:g} x {self.axis:g}" if self.cylinder else f"{self.sphere:g}"
+
     def shift(self) -> Matrix:
         """By how much the plane that the relaxed eye sees is further away than the eyepiece's focal plane [m].
 
