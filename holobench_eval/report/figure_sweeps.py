@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from .figure_style import COLOURS, GREY, new_figure, save, style
@@ -54,10 +55,11 @@ def draw_sweep(path: Path, panels: Sequence[Panel], quality: str) -> None:
             axes.set_title(panel.title, loc="left", weight="bold", parse_math=False)
             _panel(axes, panel, looks)
             axes.set_ylabel(quality.replace(", of ", "\nof "))
-        found = {}
+        found: dict[str, Artist] = {}
         for axes in drawn:
-            found |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-        figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=4, frameon=False)
+            handles, names = axes.get_legend_handles_labels()
+            found |= dict(zip(names, handles, strict=True))
+        figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=4, frameon=False)
         save(figure, path)
 
 
