@@ -143,7 +143,7 @@ def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
             for value, share in sweep.recovered(label, remedy).items()
         ]
         if parts:
-            told.append(f"Of what {sweep.kind.words} costs {label}, {remedy.kind.words} gets back: {'; '.join(parts)}.")
+            told.append(f"Recovered of the loss by {remedy.swept.kind}, {label}: {'; '.join(parts)}.")
     return told
 
 
