@@ -177,9 +177,11 @@ def rules(results: Results) -> dict[str, str]:
         return ON_A_NETWORK
     done = results.frame[(results.frame["state"] == DONE) & (results.frame["condition"] != REFERENCE)]
     saturated = done["saturated"].dropna()
+    changed = done["condition"].isin(results.layout.changed)
+    named = done["condition"].where(~changed, "displays after a change")
     residuals = [
         f"{condition} {' to '.join(dict.fromkeys(f'{end:.3f}' for end in (cells.min(), cells.max())))} px"
-        for condition, cells in done.groupby("condition", sort=False)["registration_residual_px"]
+        for condition, cells in done.groupby(named, sort=False)["registration_residual_px"]
         if cells.notna().any()
     ]
     registration = (
