@@ -32,6 +32,11 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
+def text_digest(text: str) -> str:
+    """sha256 of a config's text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int) -> dict[str, Any]:
     """Everything about the present run that is not in its config: versions, revision, machine, displays, command."""
     shown = {place.name: place for task in plan.tasks for place in task.conditions}
@@ -40,7 +45,7 @@ def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int)
         **_revision(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
-        "config_sha256": hashlib.sha256(study.text.encode()).hexdigest(),
+        "config_sha256": text_digest(study.text),
         "profiles": {name: {"version": place.version, "sha256": place.digest} for name, place in shown.items()},
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in PACKAGES},

@@ -88,7 +88,7 @@ def run(
         refuse_unavailable(plan, missing, study.folder)
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)
-        if missing or not described:
+        if missing or described.get("config_sha256") != provenance.text_digest(study.text):
             described = provenance.describe(study, plan, output, threads, executor.workers)
             described = provenance.begin(output, described, resumed=len(missing) < len(plan.cells))
         setting = Setting(
@@ -116,6 +116,7 @@ def run(
                     watch.trained(one.needed.name, reason)
                 else:
                     watch.finished(made if isinstance(made, list) else _lost(one, _error(made), store))
+        if "ended" not in described:
             described = provenance.end(output, described)
         return Outcome(store.load(plan), described, len(missing))
 

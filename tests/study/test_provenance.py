@@ -42,6 +42,18 @@ def test_a_resumed_run_keeps_the_runs_it_completes(tmp_path: Path) -> None:
     assert compute(config, tmp_path / "out").provenance["earlier"] == []
 
 
+@pytest.mark.usefixtures("no_physics")
+def test_a_config_that_needs_nothing_computed_is_noted_all_the_same(tmp_path: Path) -> None:
+    first = compute(write_config(tmp_path, count=1), tmp_path / "out").provenance
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", label: renamed}',), count=1)
+    second = compute(config, tmp_path / "out").provenance
+    assert second["config_sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
+    assert second["ended"]
+    first.pop("earlier")
+    assert second["earlier"] == [first]
+    assert compute(config, tmp_path / "out").provenance == second
+
+
 @pytest.mark.parametrize("text", ["{", "[]"])
 def test_a_damaged_provenance_is_named(tmp_path: Path, text: str) -> None:
     (tmp_path / "provenance.json").write_text(text)
