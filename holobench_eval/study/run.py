@@ -116,7 +116,7 @@ def run(
                     watch.trained(one.needed.name, reason)
                 else:
                     watch.finished(made if isinstance(made, list) else _lost(one, _error(made), store))
-        if "ended" not in described:
+        if described.get("ended") is None:
             described = provenance.end(output, described)
         return Outcome(store.load(plan), described, len(missing))
 
