@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from ..optics.convolution import frequencies, multiply
+from ..optics.convolution import frequencies
 from ..optics.padding import padded_shape
 from ..optics.phase import blaze
 from ..optics.phasor import phasor, squared_modulus
 from ..seeds import generator
 from .contract import Capture, DisplaySpec
+from .path import OpticalPath, panel_spectrum
 from .profile import Profile
 from .stages import Geometry, Relay
 from .stages.eye import eye_phase
@@ -27,8 +28,7 @@ class ChannelMaps:
     """What is fixed for one colour channel: every random pattern drawn, every transfer function built.
 
     added: phase [rad] that the display adds to every hologram; lut_gain; amplitude and angle [rad] of the incident
-    light: ``(H, W)``; still (spectrum of the light that no phase changes), transfer, plane (transmission of the dust
-    plane), last_transfer: padded.
+    light: ``(H, W)``; path: all that is linear in the light, and the light that no phase changes.
     """
 
     geometry: Geometry
@@ -36,10 +36,7 @@ class ChannelMaps:
     lut_gain: Tensor
     amplitude: Tensor
     angle: Tensor
-    still: Tensor
-    transfer: Tensor
-    plane: Tensor | None
-    last_transfer: Tensor | None
+    path: OpticalPath
     laser_power: float
 
 
@@ -108,10 +105,16 @@ class SimulatedBench:
             lut_gain=profile.lut.gain_map(geometry),
             amplitude=incident.abs(),
             angle=incident.angle(),
-            still=self._spectrum(self.unmodulated * incident),
-            transfer=transfer,
-            plane=plane,
-            last_transfer=last,
+            path=OpticalPath(
+                shape=geometry.shape,
+                rows=self.weights[0],
+                columns=self.weights[1],
+                still=panel_spectrum(self.unmodulated * incident, *self.weights),
+                transfer=transfer,
+                plane=plane,
+                last=last,
+                finer=self.image_samples,
+            ),
             laser_power=profile.drift.laser_power(geometry) * light.power,
         )
 
@@ -128,7 +131,7 @@ class SimulatedBench:
     def modulated_field(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Field ``(samples, samples, H, W)`` of the sub-samples' light that follows ``phase`` ``(H, W)`` [rad].
 
-        The carrier is off. The light that follows no phase is ``ChannelMaps.still``.
+        The carrier is off. The light that follows no phase is in ``ChannelMaps.path``.
         """
         profile, maps = self.profile, self.channels[channel]
         level = straight_through_level(phase + maps.added, profile.panel.bits)
@@ -136,33 +139,13 @@ class SimulatedBench:
         fine = profile.crosstalk.apply(shown, self.crosstalk).view(self.samples, self.samples, *shown.shape)
         return phasor(self.modulated * maps.amplitude, fine + maps.angle)
 
-    def _spectrum(self, field: Tensor) -> Tensor:
-        """Spectrum of the panel on the padded grid, from the field ``(samples, samples, H, W)`` of its sub-samples.
-
-        Axis by axis, so that the sub-samples of a row are one array before the columns are transformed.
-        """
-        rows, columns = self.weights
-        total = torch.zeros(())
-        for line, row in zip(field, rows, strict=True):
-            joined = torch.zeros(())
-            for samples, column in zip(line, columns, strict=True):
-                joined = joined + multiply(torch.fft.fft(samples, n=len(column)), column)
-            total = total + multiply(torch.fft.fft(joined, n=len(row), dim=-2), row[:, None])
-        return total
-
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane, ``image_samples`` a pixel; differentiable in ``phase`` ``(H, W)``.
 
         Unit: the mean incident intensity on the panel.
         """
         maps = self.channels[channel]
-        spectrum = self._spectrum(self.modulated_field(phase, channel, flicker)) + maps.still
-        spectrum = multiply(spectrum, maps.transfer)
-        if maps.plane is not None and maps.last_transfer is not None:
-            field = multiply(torch.fft.ifft2(spectrum), maps.plane)
-            spectrum = multiply(torch.fft.fft2(field), maps.last_transfer)
-        fine = finer_field(spectrum, self.image_samples, self.spec.shape)
-        return squared_modulus(fine) * maps.laser_power
+        return squared_modulus(maps.path.image(self.modulated_field(phase, channel, flicker))) * maps.laser_power
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Intensity as in ``intensity``, averaged over the area of a sensor pixel."""
@@ -188,22 +171,6 @@ class SimulatedBench:
             frames.append(sensor.expose(light, exposure[channel], self.response, draw))
         gain = tuple(electrons * sensor.counts_per_electron for electrons in exposure)
         return Capture(torch.stack(frames), sensor.dark, sensor.white, gain[: len(frames)])
-
-
-def finer_field(spectrum: Tensor, factor: int, shape: tuple[int, int]) -> Tensor:
-    """The first ``shape`` pixels of the field of a spectrum, with ``factor`` samples a pixel and axis.
-
-    Each axis is transformed with zeros between its positive and negative frequencies, and cropped before the next.
-    """
-    spectrum = spectrum * factor**2
-    for dim in (-1, -2):
-        size = spectrum.shape[dim]
-        low, high = spectrum.split([(size + 1) // 2, size // 2], dim)
-        gap = list(spectrum.shape)
-        gap[dim] *= factor - 1
-        padded = torch.cat([low, spectrum.new_zeros(gap), high], dim)
-        spectrum = torch.fft.ifft(padded, dim=dim).narrow(dim, 0, shape[dim] * factor)
-    return spectrum
 
 
 @dataclass

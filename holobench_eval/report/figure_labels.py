@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
 from .figure_style import GREY
 
@@ -57,7 +58,8 @@ class Names:
         at = self.pixel(x, y)
         shown = self._write(text)
         width, height = self._size(shown)
-        reach, middle = min(_around(at, width, height), key=lambda option: self._cost(option, width, height))
+        cost = self._costs(width, height)
+        reach, middle = min(_around(at, width, height), key=cost)
         self._settle(shown, middle, width, height)
         if reach > NEAR:
             edge = _nearest(at, _box(middle, width, height))
@@ -85,7 +87,7 @@ class Names:
             for share in (1.0, 0.75, 0.5, 0.25, 0.0)
             for above in (True, False)
         ]
-        _, middle = min(options, key=lambda option: self._cost(option, width, height))
+        _, middle = min(options, key=self._costs(width, height))
         self._settle(shown, middle, width, height)
 
     def _write(self, text: str) -> Annotation:
@@ -112,12 +114,18 @@ class Names:
         shown.xy = middle
         self.taken.append(_box(middle, width, height))
 
-    def _cost(self, option: tuple[float, Place], width: float, height: float) -> float:
-        reach, middle = option
-        box, frame = _box(middle, width, height), self.axes.bbox
-        covered = sum(_shared(box, other) for other in self.taken)
-        outside = width * height - _shared(box, frame)
-        return COVERED * covered + OUTSIDE * outside + reach
+    def _costs(self, width: float, height: float) -> Callable[[tuple[float, Place]], float]:
+        """What a box of that size costs at a (reach, middle), as things stand."""
+        taken = np.array([box.extents for box in self.taken]).reshape(-1, 4)
+        frame = np.array([self.axes.bbox.extents])
+
+        def cost(option: tuple[float, Place]) -> float:
+            reach, (x, y) = option
+            box = np.array([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
+            outside = width * height - _shared(box, frame)
+            return COVERED * _shared(box, taken) + OUTSIDE * outside + reach
+
+        return cost
 
 
 def _around(at: Place, width: float, height: float) -> Iterator[tuple[float, Place]]:
@@ -134,11 +142,10 @@ def _box(middle: Place, width: float, height: float) -> Bbox:
     return Bbox.from_extents(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
 
 
-def _shared(a: Bbox, b: Bbox) -> float:
-    """Area that two boxes share."""
-    wide = min(a.x1, b.x1) - max(a.x0, b.x0)
-    tall = min(a.y1, b.y1) - max(a.y0, b.y0)
-    return float(wide * tall) if wide > 0 and tall > 0 else 0.0
+def _shared(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
+    """Area that a box shares with others, ``(N, 4)`` as x0, y0, x1, y1."""
+    size = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
+    return float(size.clip(min=0).prod(axis=1).sum())
 
 
 def _nearest(at: Place, box: Bbox) -> Place:

@@ -78,7 +78,11 @@ class Results:
 
     def cells(self, label: str, condition: str) -> pd.DataFrame:
         """The records of a method under a condition."""
-        return self.frame[(self.frame["method"] == label) & (self.frame["condition"] == condition)]
+        return self._groups.get((label, condition), self.frame.iloc[:0])
+
+    @cached_property
+    def _groups(self) -> dict[tuple[str, str], pd.DataFrame]:
+        return {(str(label), str(place)): rows for (label, place), rows in self.frame.groupby(["method", "condition"])}
 
     def values(self, label: str, condition: str, key: str | None = None) -> Array:
         """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""

@@ -131,7 +131,7 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
     _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
     clean = torch.ones(bench.spec.shape)
-    plane = clean if maps.plane is None else maps.plane.real[: clean.shape[0], : clean.shape[1]]
+    plane = clean if maps.path.plane is None else maps.path.plane.real[: clean.shape[0], : clean.shape[1]]
     _picture(axes[3], plane, "dust on the plane before the image", "amplitude")
     f = torch.linspace(-0.5, 0.5, 201, dtype=torch.float64) / bench.spec.pitch
     fy, fx = f[:, None], f[None, :]

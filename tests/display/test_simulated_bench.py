@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from holobench_eval.display import load_profile, open_bench
-from holobench_eval.display.bench import SimulatedBench, finer_field
+from holobench_eval.display.bench import SimulatedBench
 from holobench_eval.display.profile import names
 from holobench_eval.display.stages import CoherentNoise, Crosstalk, Drift, PixelAperture, Propagation, ZeroOrder
 from holobench_eval.optics import quantise
@@ -129,15 +129,6 @@ def test_days_change_the_bench_and_zero_days_do_not(phase):
     later = SimulatedBench(replace(profile, drift=Drift(days=90, gain=0.01, tilt=0.05))).intensity(phase[1], 1)
     assert torch.equal(today, still)
     assert not torch.allclose(today, later, rtol=1e-3)
-
-
-def test_finer_field_is_the_same_field_sampled_twice_as_finely():
-    for shape in ((8, 10), (9, 7)):
-        spectrum = torch.fft.fft2(torch.randn(shape, dtype=torch.complex64))
-        spectrum[shape[0] // 2, :] = 0
-        spectrum[:, shape[1] // 2] = 0
-        fine = finer_field(spectrum, 2, shape)
-        assert torch.allclose(fine[::2, ::2], torch.fft.ifft2(spectrum), atol=1e-5)
 
 
 @pytest.mark.parametrize("name", names())
