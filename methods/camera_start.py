@@ -52,6 +52,7 @@ class Camera:
 
     def show(self, phase: Tensor, frames: int = 1) -> Tensor:
         """The mean of so many captures of a phase ``(C, H, W)`` [rad], ``(C, h, w)`` linear light."""
+        self.announce([phase] * frames)
         capture = torch.stack([self._frame(phase) for _ in range(frames)]).mean(0)
         error = captured_error(capture, self._target)
         if bool((error < self._best.loss).any()):
@@ -66,6 +67,7 @@ class Camera:
         """
         errors = torch.zeros(len(phases), len(self._target))
         rounds = min(frames, self.left // len(phases))
+        self.announce([*phases] * rounds)
         for _ in range(rounds):
             errors += torch.stack([captured_error(self._frame(phase), self._target) for phase in phases])
         if not rounds:
@@ -74,6 +76,10 @@ class Camera:
         settled = torch.stack([phases[index][colour] for colour, index in enumerate(chosen)])
         self._bench.keep(settled)
         return settled
+
+    def announce(self, phases: Sequence[Tensor]) -> None:
+        """Tell the bench which phases ``(C, H, W)`` [rad] are captured next."""
+        self._bench.announce([phase.detach() for phase in phases])
 
     def _frame(self, phase: Tensor) -> Tensor:
         capture = self._bench.rectify(self._bench.capture(phase.detach()))
@@ -101,12 +107,13 @@ class CameraStart:
     def search(self, target: Tensor, bench: MeteredBench, camera: Camera, nominal: Tensor) -> Tensor:
         """Show the candidates, the converged one first; the best of each colour, ``(C, H, W)`` [rad]."""
         offsets = min(self.offsets, camera.left // LEAST_SHARE - 1)
-        if offsets >= 0:
-            camera.show(nominal)
+        tried = [nominal] if offsets >= 0 else []
         if offsets > 0:
             early = self.early.solve(target[None], bench)[0]
-            for index in range(offsets):
-                camera.show(early + math.tau * index / offsets)
+            tried += [early + math.tau * index / offsets for index in range(offsets)]
+        camera.announce(tried)
+        for phase in tried:
+            camera.show(phase)
         return camera.best.clone()
 
 

@@ -188,6 +188,9 @@ class BenchSession:
         return self.bench.spec
 
     @torch.no_grad()
+    def announce(self, phases: Sequence[Tensor]) -> None:
+        """Nothing: a simulated camera is always ready."""
+
     def capture(self, phase: Tensor) -> Capture:
         """Show ``phase`` ``(C, H, W)`` [rad] and photograph the image plane."""
         profile = self.bench.profile

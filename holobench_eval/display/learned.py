@@ -12,7 +12,7 @@ from torch import Tensor
 from ..errors import CellError
 from .bench import BenchSession
 from .contract import Capture, DisplaySpec
-from .workbench import DARKEST_MEAN, Exposure, MeteredBench, Shot, Simulation, check_phase, concentration
+from .workbench import DARKEST_MEAN, Exposure, MeteredBench, Shot, Shows, Simulation, check_phase, concentration
 
 
 class Predictor(Protocol):
@@ -24,31 +24,18 @@ class Predictor(Protocol):
 
 
 @dataclass(frozen=True)
-class LearnedBench:
+class LearnedBench(Shows):
     """A display without noise, camera or registration; ``method`` predicts with what it ``learned``."""
 
     spec: DisplaySpec
     method: Predictor
     learned: Mapping[str, Any]
-    names: tuple[object, ...]
+    seed: int
 
     @property
     def simulation(self) -> Simulation:
         """There is none: only a simulated bench can be looked into."""
         raise CellError("a learned display has no simulated bench to look into")
-
-    def for_method(
-        self,
-        method: object,
-        label: str,
-        target: Tensor,
-        item: str,
-        repeat: int,
-        budget: int | None = None,
-        learned: Mapping[str, Any] | None = None,
-    ) -> MeteredBench:
-        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)``."""
-        return MeteredBench(self, label, target, (*self.names, item, repeat), method, budget, learned)
 
     @torch.no_grad()
     def photograph(
@@ -56,7 +43,7 @@ class LearnedBench:
     ) -> Shot:
         """The predicted capture of ``phase`` ``(C, H, W)`` [rad]; the exposure does not matter without noise."""
         check_phase(phase, self.spec, label)
-        handle = MeteredBench(self, label, target, (*self.names, item, repeat), learned=self.learned)
+        handle = MeteredBench(self, label, target, (self.seed, item, repeat), learned=self.learned)
         image = self.method.predict(phase[None], handle)[0].detach()
         share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
         light = tuple(concentration(target, self.spec).tolist())

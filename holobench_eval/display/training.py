@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -13,7 +14,7 @@ from torch import Tensor
 from ..errors import BudgetError
 from ..seeds import generator
 from .contract import DisplaySpec
-from .workbench import Workbench, check_phase, concentration
+from .workbench import Session, Source, check_phase, concentration
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
@@ -52,7 +53,7 @@ class TrainingBench:
 
     def __init__(
         self,
-        workbench: Workbench,
+        workbench: Source,
         label: str,
         images: Sequence[TrainingImage],
         held_out: Sequence[TrainingImage],
@@ -104,9 +105,19 @@ class TrainingBench:
             raise BudgetError(f"{self._label} has used its {self._budget} captures for training")
         check_phase(phase, self.spec, self._label)
         self._captures += 1
-        light = self._workbench.exposure(image.target)
-        session = self._workbench.bench.session(self._seed, "training", image.item, *names, exposure=light)
-        return self._workbench.rectified(session.capture(phase.detach()), image.target)
+        return self._workbench.rectified(self._camera(image, *names).capture(phase.detach()), image.target)
+
+    def announce(self, shown: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
+        """Tell the display the arguments of the next calls of ``photograph``, whatever those captures show.
+
+        A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
+        """
+        left = None if self._budget is None else max(0, self._budget - self._captures)
+        for phase, image, names in itertools.islice(shown, left):
+            self._camera(image, *names).announce([phase.detach()])
+
+    def _camera(self, image: TrainingImage, *names: object) -> Session:
+        return self._workbench.session((self._seed, "training", image.item, *names), image.target)
 
     def kept(self, name: str, make: Callable[[], Value]) -> Value:
         """The value kept under ``name``; made and kept if there is none. What it took is counted once."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import cv2
 import numpy as np
@@ -69,8 +70,30 @@ class Simulation:
         return torch.stack([sample(image, grid, samples) for image, grid in zip(images, self.grids, strict=False)])
 
 
+class Shows:
+    """A display that gives methods their handles; all random numbers depend on its seed."""
+
+    is_real: ClassVar[bool] = False
+
+    def for_method(
+        self: Source,
+        method: object,
+        label: str,
+        target: Tensor,
+        item: str,
+        repeat: int,
+        budget: int | None = None,
+        learned: Mapping[str, Any] | None = None,
+    ) -> MeteredBench:
+        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)`` with at most ``budget`` captures.
+
+        learned: what the method's ``prepare`` returned.
+        """
+        return MeteredBench(self, label, target, (self.seed, item, repeat), method, budget, learned)
+
+
 @dataclass(frozen=True)
-class Workbench:
+class Workbench(Shows):
     """A simulated bench and its calibration: one registration for all methods, made before any of them is shown.
 
     registered_as: a bench whose registration holds for this one too, since no camera has moved (None: its own).
@@ -106,21 +129,14 @@ class Workbench:
         return Simulation(self.bench, tuple(grids))
 
     def _fiducial(self, target: Tensor) -> Tensor:
-        """Mean capture ``(C, Hs, Ws)`` of several holograms of the grid.
-
-        Their phases start at random, because a smoothly curved image phase turns a little defocus into a change of
-        scale, and each is shown with several constant phases added, because unmodulated light interferes with the
-        image and the mean over the steps cancels that; both then also average speckle.
-        """
+        """Mean capture ``(C, Hs, Ws)`` of the holograms of the grid."""
         light = self.exposure(target)
-        total = torch.zeros(())
-        for hologram in range(FIDUCIAL_HOLOGRAMS):
-            handle = self.for_method(Wirtinger(), "fiducial", target, "fiducial", hologram)
-            phase = Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]
-            for step in range(FIDUCIAL_STEPS):
-                session = self.bench.session(self.seed, "fiducial", hologram, step, exposure=light)
-                total = total + session.capture(phase + step * TAU / FIDUCIAL_STEPS).linear()
-        return total / (FIDUCIAL_HOLOGRAMS * FIDUCIAL_STEPS)
+        names = itertools.product(range(FIDUCIAL_HOLOGRAMS), range(FIDUCIAL_STEPS))
+        captures = (
+            self.bench.session(self.seed, "fiducial", *name, exposure=light).capture(phase)
+            for name, phase in zip(names, fiducial_phases(self, target), strict=True)
+        )
+        return sum((capture.linear() for capture in captures), torch.zeros(())) / (FIDUCIAL_HOLOGRAMS * FIDUCIAL_STEPS)
 
     def exposure(self, target: Tensor) -> tuple[float, ...]:
         """Electrons per unit of light and channel, from the target alone and so equal for every method.
@@ -130,22 +146,6 @@ class Workbench:
         sensor = self.bench.profile.sensor
         per_unit = sensor.full_well / sensor.headroom / concentration(target, self.spec)
         return tuple(per_unit.tolist())
-
-    def for_method(
-        self,
-        method: object,
-        label: str,
-        target: Tensor,
-        item: str,
-        repeat: int,
-        budget: int | None = None,
-        learned: Mapping[str, Any] | None = None,
-    ) -> MeteredBench:
-        """The handle that ``method`` gets to solve ``target`` ``(C, h, w)`` with at most ``budget`` captures.
-
-        learned: what the method's ``prepare`` returned.
-        """
-        return MeteredBench(self, label, target, (self.seed, item, repeat), method, budget, learned)
 
     def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
         """The bench under noise that depends on ``names``, exposed for ``target``."""
@@ -185,8 +185,25 @@ class Workbench:
         return light / concentration(target, self.spec)[: light.shape[0], None, None]
 
 
+class Session(Protocol):
+    """A camera that counts its frames."""
+
+    def announce(self, phases: Sequence[Tensor]) -> None:
+        """Tell which phases ``(C, H, W)`` [rad] are captured next, so that they can be captured in one go."""
+        ...
+
+    def capture(self, phase: Tensor) -> Capture:
+        """Show ``phase`` ``(C, H, W)`` [rad] and photograph the image plane."""
+        ...
+
+
 class Source(Protocol):
-    """What is behind the handle of a method: a simulated bench or a learned display."""
+    """What is behind the handle of a method: a simulated bench, a real one or a learned display."""
+
+    @property
+    def seed(self) -> int:
+        """What all random numbers of the display depend on."""
+        ...
 
     @property
     def spec(self) -> DisplaySpec:
@@ -198,7 +215,7 @@ class Source(Protocol):
         """The bench itself. CellError where there is none."""
         ...
 
-    def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
+    def session(self, names: tuple[object, ...], target: Tensor) -> Session:
         """The camera, under noise that depends on ``names``."""
         ...
 
@@ -286,7 +303,7 @@ class MeteredBench:
         return generator("method", *self._names, *names)
 
     @cached_property
-    def _session(self) -> BenchSession:
+    def _session(self) -> Session:
         return self._workbench.session((*self._names, "solve"), self._target)
 
     def capture(self, phase: Tensor) -> Capture:
@@ -299,6 +316,15 @@ class MeteredBench:
         check_phase(phase, self.spec, self._label)
         self._captures += 1
         return self._session.capture(phase)
+
+    def announce(self, phases: Sequence[Tensor]) -> None:
+        """Tell the display which phases ``(C, H, W)`` [rad] are captured next, in that order, whatever they show.
+
+        A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
+        """
+        left = len(phases) if self._budget is None else max(0, self._budget - self._captures)
+        if self._camera:
+            self._session.announce(phases[:left])
 
     def keep(self, phase: Tensor) -> None:
         """Hand in the best hologram so far, ``(C, H, W)`` or ``(1, C, H, W)`` [rad], in the place of an earlier one.
@@ -313,6 +339,21 @@ class MeteredBench:
     def rectify(self, capture: Capture) -> Tensor:
         """A capture in the target's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency."""
         return self._workbench.rectified(capture, self._target)
+
+
+def fiducial_phases(display: Source, target: Tensor) -> list[Tensor]:
+    """Phases ``(C, H, W)`` [rad] of the holograms of the grid ``target`` ``(C, h, w)`` that register a camera.
+
+    They start at random, because a smoothly curved image phase turns a little defocus into a change of scale, and each
+    is shown with several constant phases added, because unmodulated light interferes with the image and the mean over
+    the steps cancels that; both then also average speckle.
+    """
+    phases = []
+    for hologram in range(FIDUCIAL_HOLOGRAMS):
+        handle = MeteredBench(display, "fiducial", target, (display.seed, "fiducial", hologram))
+        phase = Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]
+        phases += [phase + step * TAU / FIDUCIAL_STEPS for step in range(FIDUCIAL_STEPS)]
+    return phases
 
 
 def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ..hil.loop import Rounds, Sample, Steps, matched_psnr, train_in_the_loop
+from ..hil.loop import Rounds, Sample, Steps, captured, matched_psnr, train_in_the_loop
 from ..hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 from ..wirtinger import Wirtinger
 from .patterns import pattern_samples
@@ -102,12 +103,19 @@ class ThroughModel(ABC):
         def nominal(image: TrainingImage) -> Tensor:
             return self.NOMINAL.solve(image.target[None], bench)[0]
 
-        def captured(name: str, solve: Callable[[TrainingImage], Tensor], image: TrainingImage) -> float:
-            """PSNR [dB]."""
-            made = bench.kept(f"{name} {image.item}", lambda: {"shown": bench.photograph(solve(image), image, name)})
-            return matched_psnr(made["shown"], image.target)
+        def quality(name: str, solve: Callable[[TrainingImage], Tensor]) -> list[float]:
+            """PSNR [dB] of every held-out image."""
+            phases = [solve(image) for image in bench.held_out]
+            pairs = list(zip(phases, bench.held_out, strict=True))
+            bench.announce((phase, image, (name,)) for phase, image in pairs)
+            shown = [
+                bench.kept(f"{name} {image.item}", partial(captured, bench, phase, image, name))["capture"]
+                for phase, image in pairs
+            ]
+            return [matched_psnr(one, image.target) for one, image in zip(shown, bench.held_out, strict=True)]
 
-        gains = [captured("learned", learned, one) - captured("nominal", nominal, one) for one in bench.held_out]
+        pairs = zip(quality("learned", learned), quality("nominal", nominal), strict=True)
+        gains = [ours - plain for ours, plain in pairs]
         return sum(gains) < 0
 
     def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:

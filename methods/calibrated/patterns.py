@@ -8,14 +8,14 @@ tell look-up table, phase gain, crosstalk, unmodulated light and aberrations apa
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 from torch.nn import functional
 
 from ...display.training import TrainingImage
-from ..hil.loop import Sample
+from ..hil.loop import Sample, captured
 
 if TYPE_CHECKING:
     from ...display.training import TrainingBench
@@ -28,20 +28,20 @@ GRAY = 0.25
 
 def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
     """``count`` patterns, captured, one capture each."""
-    spec = bench.spec
-    gray = torch.full((len(spec.wavelengths), *spec.region.shape), GRAY)
+    gray = torch.full((len(bench.spec.wavelengths), *bench.spec.region.shape), GRAY)
+    images = [TrainingImage(f"pattern-{number:02d}", gray) for number in range(count)]
+    phases = [_pattern(bench, number) for number in range(count)]
+    bench.announce((phase, image, ("pattern",)) for phase, image in zip(phases, images, strict=True))
     samples = []
-    for number in range(count):
-        image = TrainingImage(f"pattern-{number:02d}", gray)
-        made = bench.kept(f"pattern {number}", partial(_shown, bench, number, image))
-        samples.append(Sample(made["phase"], made["capture"], gray, bench.light(image)))
+    for number, (phase, image) in enumerate(zip(phases, images, strict=True)):
+        made = bench.kept(f"pattern {number}", partial(captured, bench, phase, image, "pattern"))
+        samples.append(Sample(phase, made["capture"], gray, bench.light(image)))
     return samples
 
 
-def _shown(bench: TrainingBench, number: int, image: TrainingImage) -> dict[str, Any]:
-    length = LENGTHS[number % len(LENGTHS)]
-    phase = random_phase(len(image.target), bench.spec.shape, length, bench.generator("pattern", number))
-    return {"phase": phase, "capture": bench.photograph(phase, image, "pattern")}
+def _pattern(bench: TrainingBench, number: int) -> Tensor:
+    length, draw = LENGTHS[number % len(LENGTHS)], bench.generator("pattern", number)
+    return random_phase(len(bench.spec.wavelengths), bench.spec.shape, length, draw)
 
 
 def random_phase(colours: int, shape: tuple[int, int], length: float, draw: torch.Generator) -> Tensor:

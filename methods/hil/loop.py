@@ -6,8 +6,9 @@ a training can be killed at any moment and ends with the weights of one that was
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import torch
@@ -106,24 +107,29 @@ def train_in_the_loop(
     def begin(image: TrainingImage) -> Tensor:
         return bench.kept(f"start {image.item}", lambda: {"phase": start(image)})["phase"]
 
-    def show(image: TrainingImage, number: int, purpose: str) -> Sample:
-        """Retrieve with the approximator held (not in the first round), and capture."""
+    def retrieve(image: TrainingImage, number: int) -> dict[str, Tensor]:
+        """The phase of a round: retrieved with the approximator held, but in the first one."""
+        phase = begin(image)
+        return {"phase": phase if number == 1 else search(approximator.image(bench.light(image)), image.target, phase)}
 
-        def make() -> dict[str, Any]:
-            phase = begin(image)
-            if number > 1:
-                phase = search(approximator.image(bench.light(image)), image.target, phase)
-            return {"phase": phase, "capture": bench.photograph(phase, image, purpose, number)}
-
-        made = bench.kept(f"{purpose} {number} {image.item}", make)
-        return Sample(made["phase"], made["capture"], image.target, bench.light(image))
+    def show(images: Sequence[TrainingImage], number: int, purpose: str) -> Iterator[Sample]:
+        """Retrieve a phase for every image, then capture them."""
+        keys = [f"{purpose} {number} {image.item}" for image in images]
+        phases = [
+            bench.kept(f"phase of {key}", partial(retrieve, image, number))["phase"]
+            for key, image in zip(keys, images, strict=True)
+        ]
+        bench.announce((phase, image, (purpose, number)) for phase, image in zip(phases, images, strict=True))
+        for key, phase, image in zip(keys, phases, images, strict=True):
+            capture = bench.kept(key, partial(captured, bench, phase, image, purpose, number))["capture"]
+            yield Sample(phase, capture, image.target, bench.light(image))
 
     saved = bench.load("approximator") or {"round": 0, "step": 0}
     samples = list(before)
     for number in range(1, settings.rounds + 1):
         fresh = []
-        for image in settings.shown(bench.images, number):
-            fresh.append(show(image, number, "round"))
+        for sample in show(settings.shown(bench.images, number), number, "round"):
+            fresh.append(sample)
             if number > saved["round"]:
                 bench.log(round=number, step=0, images=len(fresh))
         samples = [*(samples if settings.keep_captures else before), *fresh]
@@ -135,8 +141,13 @@ def train_in_the_loop(
             continue  # learned and watched before an interruption
         steps = range(saved["step"] if number == saved["round"] else 0, _steps(settings, number))
         refine(bench, approximator, samples, number, steps)
-        seen = [show(image, number + 1, "held out") for image in bench.held_out]
+        seen = list(show(bench.held_out, number + 1, "held out"))
         bench.log(round=number, step=steps.stop, **fidelity(approximator, seen))
+
+
+def captured(bench: TrainingBench, phase: Tensor, image: TrainingImage, *names: object) -> dict[str, Tensor]:
+    """A photograph under a name to keep it by; see ``TrainingBench.photograph``."""
+    return {"capture": bench.photograph(phase, image, *names)}
 
 
 def refine(

@@ -30,12 +30,18 @@ def best_offset(bench: TrainingBench, start: Wirtinger, offsets: int) -> float:
         return 0.0
 
     def search() -> dict[str, list[float]]:
+        images = bench.images[:TRIED_IMAGES]
+        phases = [start.solve(image.target[None], bench)[0] for image in images]
+        shown = [
+            (phase + offset, image, ("offset", index))
+            for image, phase in zip(images, phases, strict=True)
+            for index, offset in enumerate(tried)
+        ]
+        bench.announce(shown)
         errors = [0.0] * offsets
-        for image in bench.images[:TRIED_IMAGES]:
-            phase = start.solve(image.target[None], bench)[0]
-            for index, offset in enumerate(tried):
-                capture = bench.photograph(phase + offset, image, "offset", index)
-                errors[index] += float(functional.mse_loss(matched(capture, image.target), image.target))
+        for phase, image, (name, index) in shown:
+            capture = bench.photograph(phase, image, name, index)
+            errors[index] += float(functional.mse_loss(matched(capture, image.target), image.target))
         return {"errors": errors}
 
     errors = bench.kept("offset", search)["errors"]

@@ -33,7 +33,7 @@ class Privileged:
 
 @pytest.fixture
 def display():
-    return LearnedBench(SPEC, Shade(), {"level": torch.tensor(0.25, requires_grad=True)}, (3,))
+    return LearnedBench(SPEC, Shade(), {"level": torch.tensor(0.25, requires_grad=True)}, 3)
 
 
 def test_a_capture_is_what_the_network_predicts(display):

@@ -117,6 +117,9 @@ class Lucky(ToyDisplay):
     def session(self, names, target):
         return self
 
+    def announce(self, phases):
+        pass
+
     def capture(self, phase):
         capture = super().capture(phase)
         self.noise = 2.0

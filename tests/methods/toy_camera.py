@@ -52,6 +52,9 @@ class ToyDisplay:
     def session(self, names: tuple[object, ...], target: Tensor) -> ToyDisplay:
         return replace(self, names=names, noise=self.noise * concentration(target, self.spec)[:, None, None])
 
+    def announce(self, phases):
+        pass
+
     def capture(self, phase: Tensor) -> Capture:
         draw = seeds.generator("toy", *self.names, self.frames)
         self.frames += 1
@@ -87,6 +90,9 @@ class Plug:
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._handle, name)
+
+    def announce(self, phases):
+        pass
 
     def capture(self, phase: Tensor) -> Capture:
         if self._handle.captures >= self._at:

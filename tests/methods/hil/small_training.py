@@ -71,8 +71,11 @@ class BentDisplay:
     def exposure(self, target: Tensor) -> tuple[float, ...]:
         return (1.0,) * len(target)
 
-    def session(self, *names: object, exposure: object = None) -> BentDisplay:
+    def session(self, names: tuple[object, ...], target: Tensor) -> BentDisplay:
         return BentDisplay(self.spec, self.fate, names)
+
+    def announce(self, phases):
+        pass
 
     def capture(self, phase: Tensor) -> Capture:
         self.fate.meets("before a photograph")

@@ -169,7 +169,9 @@ def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None
     memory = Memory()
     bench = training_bench(SPEC, memory)
     run(bench, Rounds(2, steps=2, refine_steps=2), memory)
-    start, first, second = (memory.load(f"{name} picture 0") for name in ("start", "round 1", "round 2"))
+    start, first, second = (
+        memory.load(f"{name} picture 0") for name in ("start", "phase of round 1", "phase of round 2")
+    )
     assert start is not None
     assert first is not None
     assert second is not None
