@@ -18,6 +18,14 @@ class BudgetError(CellError):
     """A method asked the display for more captures than it may use."""
 
 
+class LostDeviceError(UserError):
+    """A device does not answer any more: no further cell of the run would get its photograph."""
+
+
+class Pending(Exception):  # noqa: N818 - nothing is wrong
+    """A photograph was asked for that somebody still has to take: the cell waits, it has not failed."""
+
+
 def suggest(word: str, allowed: Iterable[str]) -> str:
     """``"did you mean 'x'? "`` for a near miss, then the allowed words; for the end of an error line."""
     words = sorted(allowed)

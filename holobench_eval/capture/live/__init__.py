@@ -1,0 +1,1 @@
+"""Drivers of real panels and cameras; each imports its library only when it is opened."""

@@ -1,0 +1,53 @@
+"""What a camera gave of one hologram, in linear light, and who can be asked for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """One colour-sequential photograph.
+
+    light: ``(C, Hs, Ws)`` float32, proportional to the light on the sensor, dark frame subtracted in float, divided
+    by the exposure: counts per second, or counts where nobody told the exposure; saturated: fraction of samples that
+    no exposure of a bracket measured; exposure: seconds per channel (1 where nobody told it).
+    """
+
+    light: Tensor
+    saturated: float
+    exposure: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """A hologram to be shown and photographed.
+
+    phase: ``(C, H, W)`` [rad]; relative_exposure: of the bench's own exposure time, for targets whose white pixels get
+    more or less light; role: what it is for, ``hologram`` or ``fiducial``; names: tell it from others with the same
+    phase, as they name the noise of a simulated bench.
+    """
+
+    phase: Tensor
+    relative_exposure: float
+    role: str
+    names: tuple[object, ...]
+
+
+class Photographer(Protocol):
+    """Shows holograms on a real panel and photographs them: live, or by an exchange of files."""
+
+    def announce(self, requests: Sequence[Request]) -> None:
+        """Tell what is asked for next, none of which depends on a photograph of another.
+
+        An exchange of files sends them out together; a live one has nothing to do.
+        """
+        ...
+
+    def photograph(self, request: Request) -> Photograph:
+        """Show a phase and photograph it. Pending: somebody still has to. CellError: it cannot be used."""
+        ...
