@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from . import cli_capture
+from .cli_output import console as console_for_people
+from .cli_output import write_report
 from .errors import UserError
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from .config import Study
-    from .report import Results
 
 INTERRUPTED = 130
 LARGE_PANEL = 512 * 1024
@@ -28,6 +28,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+cli_capture.add_to(app)
 
 Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as configs/table3.yaml.")]
 Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]
@@ -44,13 +46,6 @@ def main() -> None:
     except (UserError, OSError) as error:
         print(f"holoeval: {' '.join(str(error).split())}", file=sys.stderr)
         sys.exit(2)
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    console = Console()
-    return console if console.is_terminal else Console(width=160)
 
 
 def _output(study: Study, output: Path | None) -> Path:
@@ -111,18 +106,29 @@ def _run(
     from .study.run import run as compute
     from .study.training_record import keep_training_records
 
-    console, study = _console(), load_study(config)
-    chosen = executors.executor(executor, workers, _small(study))
+    console, study = console_for_people(), load_study(config)
+    chosen = executors.Serial() if study.display.real else executors.executor(executor, workers, _small(study))
+    if study.display.real:
+        _prepare_bench(study)
     folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers, study)
     with progress.watching(console) as watch:
         outcome = compute(study, grid, folder, chosen, watch, many, artifacts, **again)
     keep_training_records(grid, Artifacts(artifacts), folder)
     _sheets(study, folder)
-    _report(console, study, outcome.records, folder, outcome.provenance)
+    write_report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
         console.print(f"reasons: {folder}/report.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
     return outcome.failed
+
+
+def _prepare_bench(study: Study) -> None:
+    """Open a real bench before anything is computed, so that what is wrong with it is told first."""
+    from .study.bench import workbench
+    from .study.plan import displays
+
+    for place in displays(study).values():
+        _ = workbench(place, study.seed)
 
 
 def _sheets(study: Study, output: Path) -> None:
@@ -132,7 +138,7 @@ def _sheets(study: Study, output: Path) -> None:
     from .study.bench import condition, workbench
     from .study.identity import digest, harness_digest
 
-    for source in study.display.profiles:  # a learned display has no stages
+    for source in study.display.profiles:  # learned and real displays have no stages
         place = condition(source, study.display.panel, study.folder)
         path = output / "figures" / f"stages-{place.name}.png"
         wanted = digest([place.digest, list(place.spec.shape), study.seed, harness_digest()])
@@ -142,30 +148,6 @@ def _sheets(study: Study, output: Path) -> None:
                 save_sheet(workbench(place, study.seed), note, path, wanted)
             except Exception as error:  # a picture must not cost the report
                 print(f"holoeval: no stage sheet of {place.name}: {error}", file=sys.stderr)
-
-
-def _report(
-    console: Console, study: Study, records: list[dict[str, object]], output: Path, known: dict[str, object]
-) -> None:
-    from .report import build_report, results_of
-
-    written = build_report(study, records, output, known)
-    _print_headline(console, results_of(study, records))
-    console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
-
-
-def _print_headline(console: Console, results: Results) -> None:
-    from rich.markup import escape
-    from rich.table import Table
-
-    from .report import headline_rows
-
-    for condition in results.conditions:
-        headings, rows = headline_rows(results, condition)
-        table = Table(*map(escape, headings), title=escape(condition), title_justify="left")
-        for row in rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
 
 
 @app.command()
@@ -180,7 +162,7 @@ def plan(
     from .study.preview import preview, table, training_table, trainings
     from .study.store import Store
 
-    console, study = _console(), load_study(config)
+    console, study = console_for_people(), load_study(config)
     folder, workers = _output(study, output), executors.executor("auto", None, _small(study)).workers
     grid = planning.plan(study)
     rows = preview(study, grid, Store(folder), _threads(threads, workers, study), workers)
@@ -203,7 +185,7 @@ def report(config: Config, output: Output = None) -> None:
     store = Store(folder)
     if not store.folder.is_dir():
         raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
-    _report(_console(), study, store.load(planning.plan(study)), folder, provenance.read(folder))
+    write_report(console_for_people(), study, store.load(planning.plan(study)), folder, provenance.read(folder))
 
 
 @app.command("list")
@@ -219,7 +201,7 @@ def list_(
 
     if kind is not None and kind not in KINDS:
         raise UserError(f"unknown kind '{kind}'; {suggest(kind, KINDS)}")
-    console = _console()
+    console = console_for_people()
     for name in [kind] if kind else KINDS:
         table = Table(title=name, title_justify="left", show_header=False)
         for entry, text in KINDS[name]():
@@ -270,7 +252,7 @@ def show(
         table.add_column(heading)
     for name, text, modelled in effects(profile):
         table.add_row(name, escape(text), "has it" if modelled else "lacks it")
-    _console().print(table)
+    console_for_people().print(table)
     print(path)
 
 

@@ -16,7 +16,7 @@ from annotated_types import Interval, MinLen
 from . import registry
 from .config_sweeps import subset, sweep_of
 from .errors import UserError, suggest
-from .study.bench import LEARNED, condition
+from .study.bench import LEARNED, condition, real_condition
 from .study.identity import params_of
 from .study.plan import FLOORS, REFERENCE, scored_dataset
 from .study.stacks import SCORES, planes_of
@@ -40,20 +40,28 @@ class Learned:
 class DisplayGrid:
     """The displays of a study.
 
-    profiles: names of profiles or paths of profile files; learned: a trained network in their place; panel: rows and
-    columns in pixels (None: the profile's full panel); exposure: ``equal`` (the same light for every method) or
-    ``matched`` (equal brightness of the pictures).
+    profiles: names of profiles or paths of profile files; in their place learned: a trained network, or bench: the file
+    of a real bench (``display.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
+    exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures). session:
+    the folder that stands for the display, when photographs are exchanged as files.
     """
 
     profiles: tuple[Text, ...] = ()
     learned: Learned | None = None
+    bench: Text | None = None
     panel: tuple[PanelSide, PanelSide] | None = None
     exposure: Literal["equal", "matched"] = "equal"
+    session: Path | None = field(default=None, metadata={"key": False})
 
     @property
     def sources(self) -> tuple[str, ...]:
         """The displays by the names they have in a config."""
-        return (LEARNED,) if self.learned else self.profiles
+        return (LEARNED,) if self.learned else (self.bench,) if self.bench else self.profiles
+
+    @property
+    def real(self) -> bool:
+        """Whether the display exists."""
+        return self.bench is not None or self.session is not None
 
 
 @dataclass(frozen=True)
@@ -256,9 +264,13 @@ def _holograms(study: Study, document: Document) -> Probe:
 
 def _display(study: Study, document: Document) -> DisplayGrid:
     display = study.display
-    if bool(display.profiles) == bool(display.learned):
-        where: Keys = ("display", "profiles" if display.learned is None else "learned")
-        raise document.error(where, "display.profiles or display.learned: name displays in one of the two")
+    named = [name for name in ("profiles", "learned", "bench") if getattr(display, name)]
+    if len(named) != 1:
+        where: Keys = ("display", *named[-1:])
+        message = "display.profiles, display.learned or display.bench: name displays in one of the three"
+        raise document.error(where, message)
+    if display.bench:
+        return _bench(study, document)
     if display.learned is None:
         return display
     if study.measure != "picture":
@@ -269,6 +281,14 @@ def _display(study: Study, document: Document) -> DisplayGrid:
         if not (getattr(method, "trains", False) and hasattr(method, "predict")):
             raise UserError(f"method '{display.learned.method}' learns no display; name one that predicts captures")
     return replace(display, learned=replace(display.learned, params=params_of(method)))
+
+
+def _bench(study: Study, document: Document) -> DisplayGrid:
+    if study.display.panel is not None:
+        raise document.error(("display", "panel"), "a bench has the panel that its file says; remove 'panel'")
+    if study.measure == "focus":
+        raise document.error(("measure",), "focal stacks need a camera that refocuses; measure pictures or predictions")
+    return study.display
 
 
 def _protocol(study: Study, document: Document) -> Protocol:
@@ -290,10 +310,13 @@ def _check_profiles(study: Study, document: Document) -> None:
 
     seen: dict[str, str] = {}
     learned = study.display.learned
-    for index, profile in enumerate([learned.profile] if learned else study.display.profiles):
+    bench = study.display.bench
+    for index, profile in enumerate([learned.profile] if learned else study.display.sources):
         where: Keys = ("display", "learned", "profile") if learned else ("display", "profiles", index)
+        where = ("display", "bench") if bench else where
         with placed(document, where, where):
-            place = condition(profile, study.display.panel, study.folder)
+            read = real_condition(bench, study.folder) if bench else None
+            place = read or condition(profile, study.display.panel, study.folder)
         name, region = place.name, place.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
@@ -313,6 +336,9 @@ def _entry(study: Study, document: Document, index: int) -> MethodEntry:
         method = registry.build("methods", entry.name, dict(entry.params), study.folder)
         if study.measure == "prediction" and not hasattr(method, "predict"):
             raise UserError(f"method '{entry.name}' predicts no captures; measure: prediction needs methods that do")
+    if study.display.real and getattr(method, "privileged", False):
+        message = f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one"
+        raise document.error((*where, "name") if (*where, "name") in document.keys else where, message)
     if entry.captures is not None and (not getattr(method, "camera", False) or study.measure == "prediction"):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)

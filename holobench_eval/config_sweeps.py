@@ -19,7 +19,7 @@ def sweep_of(study: Study, document: Document, index: int) -> Sweep:
     from .display.profile import load_profile
 
     sweep, where = study.sweeps[index], ("sweeps", index)
-    if study.display.learned or study.measure != "picture":
+    if study.display.learned or study.display.real or study.measure != "picture":
         raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
     if sweep.condition not in KINDS:
         near = suggest(sweep.condition, KINDS)

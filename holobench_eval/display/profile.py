@@ -38,19 +38,33 @@ class Panel:
     """The nominal, public part of a profile.
 
     shape (rows, columns) and distance [m] belong together: on a smaller panel the distance shrinks with the rows.
-    pitch [m]; wavelengths [m] of red, green, blue; bits; pupil: diameter of the iris as a fraction of the band
-    (null: none); blaze: (vertical, horizontal) cycles per pixel that the display adds and re-centres;
+    pitch [m]; wavelengths [m] of red, green, blue, or a single one; bits; pupil: diameter of the iris as a fraction of
+    the band (null: none); blaze: (vertical, horizontal) cycles per pixel that the display adds and re-centres;
     region: side of the scored window as a fraction of the panel's.
     """
 
     shape: tuple[int, int]
     pitch: Annotated[float, Interval(gt=0, lt=1e-3)]
-    wavelengths: tuple[float, float, float]
+    wavelengths: tuple[float] | tuple[float, float, float]
     distance: Annotated[float, Interval(gt=0, lt=10)]
     bits: Annotated[int, Interval(ge=1, le=16)]
     pupil: Annotated[float, Interval(gt=0, le=1)] | None = None
     blaze: tuple[float, float] = (0.0, 0.0)
     region: Annotated[float, Interval(gt=0.1, le=1)] = 1.0
+
+    def spec(self, name: str) -> DisplaySpec:
+        """The nominal optics of a display of that name."""
+        height, width = (max(1, round(self.region * size)) for size in self.shape)
+        return DisplaySpec(
+            name=name,
+            shape=self.shape,
+            pitch=self.pitch,
+            wavelengths=self.wavelengths,
+            distance=self.distance,
+            bits=self.bits,
+            pupil=self.pupil,
+            region=Region((self.shape[0] - height) // 2, (self.shape[1] - width) // 2, height, width),
+        )
 
 
 @dataclass(frozen=True)
@@ -98,20 +112,8 @@ class Profile:
 
     def spec(self, shape: tuple[int, int] | None = None) -> DisplaySpec:
         """Nominal optics on a panel of ``shape`` (the profile's own by default)."""
-        panel = self.scaled(shape).panel
-        height, width = (max(1, round(panel.region * size)) for size in panel.shape)
-        top, left = (panel.shape[0] - height) // 2, (panel.shape[1] - width) // 2
-        return DisplaySpec(
-            name=self.name,
-            shape=panel.shape,
-            pitch=panel.pitch,
-            wavelengths=panel.wavelengths,
-            distance=panel.distance,
-            bits=panel.bits,
-            pupil=panel.pupil,
-            region=Region(top, left, height, width),
-            eye=self.eye.focus if self.eye.known else (0.0, 0.0, 0.0),
-        )
+        nominal = self.scaled(shape).panel.spec(self.name)
+        return replace(nominal, eye=self.eye.focus) if self.eye.known else nominal
 
     def scaling_note(self, shape: tuple[int, int] | None) -> str:
         """One sentence for a report on how the panel was scaled."""

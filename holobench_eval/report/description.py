@@ -63,7 +63,9 @@ class Description:
 
 def describe(study: Study) -> Description:
     """The description of a checked study; reads its profiles."""
-    if study.display.learned is None:
+    if study.display.real:
+        displays = tuple(_real(place) for place in conditions(study).values())
+    elif study.display.learned is None:
         profiles = [load_profile(source, study.folder) for source in study.display.profiles]
         displays = tuple(_display(profile, study.display.panel) for profile in profiles)
     else:
@@ -78,6 +80,23 @@ def _learned(place: Condition, profile: str) -> Display:
         name=place.name,
         heading=f"The frozen network of {needed.method}, trained on captures of {profile}; no noise, no camera.",
         lines=(f"artifact: {needed.name}", f"parameters: {plain(dict(needed.params))}"),
+    )
+
+
+def _real(place: Condition) -> Display:
+    rig, spec = place.real, place.spec
+    assert rig is not None
+    way = f"photographs exchanged as files, session {rig.session[:16]}" if rig.session else "photographed live"
+    wavelengths = ", ".join(f"{value * 1e9:.4g}" for value in spec.wavelengths)
+    iris = f"an iris of {spec.pupil:g} of the band" if spec.pupil else "no iris"
+    return Display(
+        name=place.name,
+        heading=f"Version {place.version}, sha256 {place.digest[:16]}. A real bench, {way}; only its nominal optics "
+        "are known, and an efficiency of 1 is the nominal one.",
+        lines=(
+            f"panel: {spec.shape[0]} x {spec.shape[1]} pixels, {spec.distance * 1e3:.4g} mm",
+            f"optics: pitch {spec.pitch * 1e6:.4g} um, wavelengths {wavelengths} nm, {spec.bits} bit, {iris}",
+        ),
     )
 
 

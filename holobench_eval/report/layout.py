@@ -65,7 +65,7 @@ class Layout:
     that is a trained network (None: benches).
     trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
     camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
-    of others.
+    of others. real: whether the display exists.
     """
 
     title: str
@@ -88,6 +88,7 @@ class Layout:
     sweeps: tuple[Swept, ...] = ()
     planes: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     stacked: frozenset[str] = frozenset()
+    real: bool = False
 
     def track(self, label: str) -> str:
         """The track that a method competes in."""
@@ -105,7 +106,7 @@ class Layout:
     @property
     def wording(self) -> Wording:
         """What is compared, in words."""
-        return wording(self.measure, self.holograms.partition(" (")[0], self.learned_display is not None)
+        return wording(self.measure, self.holograms.partition(" (")[0], self.learned_display is not None, self.real)
 
     def published(self, label: str, condition: str) -> Mapping[str, float]:
         """Published figures of a row, by metric."""
@@ -169,6 +170,7 @@ def layout_of(study: Study) -> Layout:
         camera=marked("camera"),
         sweeps=tuple(_sweeps(study, shown)),
         planes=planes_of(scored_dataset(study), study.targets.dataset) if study.measure == "focus" else {},
+        real=study.display.real,
         stacked=marked("planes") if study.measure == "focus" else frozenset(),
     )
 

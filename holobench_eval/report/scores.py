@@ -10,8 +10,8 @@ import numpy as np
 
 from ..metrics.catalogue import catalogue, direction
 
-DOMAINS = ("linear", "amplitude", "srgb")
-DOMAIN_NAMES = {"linear": "linear light", "amplitude": "amplitude", "srgb": "sRGB"}
+DOMAINS = ("linear", "amplitude", "srgb", "stored")
+DOMAIN_NAMES = {"linear": "linear light", "amplitude": "amplitude", "srgb": "sRGB", "stored": "values as stored"}
 
 _TITLES = {
     "psnr": "PSNR",

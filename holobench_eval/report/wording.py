@@ -176,8 +176,23 @@ FOCUS = replace(
 )
 
 
-def wording(measure: str, holograms: str, on_a_network: bool) -> Wording:
-    """The words for a measure; holograms: the method whose captures are predicted."""
+REAL = (
+    "The display is a real bench that was photographed. Listed are its nominal optics, which methods know; what "
+    "separates it from them nobody knows."
+)
+REAL_SEEDS = (
+    "The noise of a photograph is the camera's own, so that the same study photographed again gives other numbers; "
+    "methods are shown in mixed order, so that a slow drift favours none."
+)
+
+
+def wording(measure: str, holograms: str, on_a_network: bool, real: bool = False) -> Wording:
+    """The words for a measure; holograms: the method whose captures are predicted; real: whether the display exists."""
+    words = _of_measure(measure, holograms, on_a_network)
+    return replace(words, displays=REAL, seeds=REAL_SEEDS) if real else words
+
+
+def _of_measure(measure: str, holograms: str, on_a_network: bool) -> Wording:
     if measure == "prediction":
         return replace(
             PREDICTION,

@@ -88,6 +88,14 @@ class Artifacts:
         write_atomically(self.place(needed) / FAILURE, f"{reason}\n\n{trace}".encode())
         return reason
 
+    def has_failed(self, needed: Preparation) -> bool:
+        """Whether the last attempt to make the artifact failed."""
+        return (self.place(needed) / FAILURE).is_file()
+
+    def forget_failure(self, needed: Preparation) -> None:
+        """Training goes on after all."""
+        (self.place(needed) / FAILURE).unlink(missing_ok=True)
+
     def failure(self, needed: Preparation) -> str:
         """Why an artifact is not there, in one line."""
         try:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ..display import Workbench
     from ..display.conditions import Value
     from ..display.contract import DisplaySpec
+    from ..display.real import RealBench
     from .preparation import Preparation
 
 Panel = tuple[int, int]
@@ -23,13 +24,27 @@ OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
 
 
 @dataclass(frozen=True)
+class Rig:
+    """A real bench.
+
+    bench: the file that describes it (None: it is described by a profile's panel); folder, session: the folder that
+    photographs are exchanged in, and its name (none: the devices of the bench file take them).
+    """
+
+    bench: Path | None = None
+    folder: Path | None = None
+    session: str = ""
+
+
+@dataclass(frozen=True)
 class Condition:
     """A display that a study shows its methods on.
 
     source: the profile's name or path as the config gives it; folder: where a relative path starts; name,
     version, digest: those of the profile; spec: its nominal optics at the study's panel size; learned: what has to be
     prepared for a display that is a trained network (the other fields are those of the display it was trained on,
-    except for its name); change: kind and value of what has changed on it since methods were prepared (None: nothing).
+    except for its name); change: kind and value of what has changed on it since methods were prepared (None: nothing);
+    real: where its photographs come from (None: it is simulated).
     """
 
     source: str
@@ -40,6 +55,7 @@ class Condition:
     spec: DisplaySpec
     learned: Preparation | None = None
     change: tuple[str, Value] | None = None
+    real: Rig | None = None
 
     @property
     def nominal(self) -> Condition:
@@ -68,12 +84,22 @@ def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
     return Condition(source, folder, profile.name, profile.version, profile.digest, profile.spec(panel))
 
 
-def workbench(shown: Condition, seed: int) -> Workbench:
+def real_condition(source: str, folder: Path) -> Condition:
+    """Read the file of a real bench without opening its devices. UserError for a file that is none."""
+    from ..display.bench_file import load_bench_file
+
+    path = folder / source
+    bench = load_bench_file(path)
+    spec = bench.panel.spec(bench.name)
+    return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=Rig(bench=path))
+
+
+def workbench(shown: Condition, seed: int) -> Workbench | RealBench:
     """The bench of a condition, built and calibrated once in a process.
 
     CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
     """
-    key = (shown.source, shown.folder, shown.digest, shown.spec.shape, shown.change, seed)
+    key = (shown.source, shown.folder, shown.digest, shown.spec.shape, shown.change, shown.real, seed)
     if key not in _open:
         _open[key] = _opened(shown, seed)
         pixels = shown.spec.shape[0] * shown.spec.shape[1]
@@ -86,12 +112,22 @@ def workbench(shown: Condition, seed: int) -> Workbench:
     return opened
 
 
-_open: OrderedDict[object, Workbench | CellError] = OrderedDict()
+_open: OrderedDict[object, Workbench | RealBench | CellError] = OrderedDict()
 """Those used least recently come first."""
 
 
-def _opened(shown: Condition, seed: int) -> Workbench | CellError:
-    from ..display import load_profile, open_bench
+def forget_sessions() -> None:
+    """Open the benches behind session folders anew when they are next asked for: their files may have changed."""
+    for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
+        del _open[key]
+
+
+def _opened(shown: Condition, seed: int) -> Workbench | RealBench | CellError:
+    if shown.real is not None:
+        from .real_bench import open_real
+
+        return open_real(shown, shown.real, seed)
+    from ..display import Workbench, load_profile, open_bench
     from ..display.conditions import KINDS, altered
 
     profile = load_profile(shown.source, folder=shown.folder)
@@ -101,7 +137,9 @@ def _opened(shown: Condition, seed: int) -> Workbench | CellError:
     try:
         if shown.change is not None:
             if not KINDS[shown.change[0]].moves:
-                unmoved = workbench(shown.nominal, seed)
+                before = workbench(shown.nominal, seed)
+                assert isinstance(before, Workbench)
+                unmoved = before
             profile = altered(profile, *shown.change)
         opened = open_bench(profile, shown.spec.shape, seed, unmoved)
         _ = opened.registration  # calibrated now, so that no method's time includes it

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import traceback
 
-from ..errors import CellError
+from ..errors import CellError, LostDeviceError, Pending
 from . import focus
 from .bench import Condition
 from .job import Job, repeatable
@@ -18,16 +18,25 @@ FLOORS = {"picture": floor, "prediction": floor, "focus": focus.floor}
 
 
 def work(job: Job) -> list[Record]:
-    """Compute and write the wanted records of a task. A failure of a cell becomes a failed record, never an error."""
+    """Compute and write the wanted records of a task. A failure of a cell becomes a failed record, never an error.
+
+    A cell that waits for a photograph (``Pending``) gets no record.
+    """
     with repeatable(job.setting.threads):
         try:
             measure = (FLOORS if job.task.is_floor else MEASURES)[job.task.cells[0].measure](job)
+        except LostDeviceError:
+            raise
+        except Pending:
+            return []
         except (Exception, SystemExit) as error:
             return [_note_failure(job, cell, error) for cell, _ in job.cells]
-        return [_recorded(job, cell, place, measure) for cell, place in job.cells]
+        recorded = [_recorded(job, cell, place, measure) for cell, place in job.cells]
+        return [record for record in recorded if record is not None]
 
 
-def _recorded(job: Job, cell: Cell, place: Condition, measure: Measure) -> Record:
+def _recorded(job: Job, cell: Cell, place: Condition, measure: Measure) -> Record | None:
+    """The record; None for a cell that waits for a photograph."""
     store = Store(job.setting.output)
     try:
         record = measure(cell, place)
@@ -35,6 +44,10 @@ def _recorded(job: Job, cell: Cell, place: Condition, measure: Measure) -> Recor
             if not math.isfinite(value):
                 raise CellError(f"the score {name} is {value}")
         store.write(record)
+    except LostDeviceError:
+        raise
+    except Pending:
+        return None
     except Exception as error:
         return _note_failure(job, cell, error)
     store.log(cell.id).unlink(missing_ok=True)

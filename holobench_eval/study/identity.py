@@ -72,6 +72,10 @@ def _own_folder(file: Path) -> Path:
     return shipped if file.is_relative_to(shipped) else file.parent
 
 
+REGISTRATION = ("circles", "grid", "refine", "registration", "subpixel", "warp")
+"""Modules of ``capture`` that every score depends on."""
+
+
 @lru_cache(maxsize=256)
 def _code(file: Path, _modified: int) -> tuple[str, frozenset[Path]]:
     """A file's code in one normal form, and the files it may import relatively; cached until it is modified."""
@@ -91,9 +95,10 @@ def _code(file: Path, _modified: int) -> tuple[str, frozenset[Path]]:
 def harness_digest() -> str:
     """SHA-256 of the code between a phase and its score: a record of another simulator is another record.
 
-    Comments and docstrings do not count.
+    Comments and docstrings do not count; nor do drivers and the exchange of files with a real bench.
     """
     package = Path(__file__).parents[1]
-    folders = [package / name for name in ("optics", "display", "capture", "metrics")]
-    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
+    folders = [package / name for name in ("optics", "display", "metrics")]
+    files = [file for folder in folders for file in folder.rglob("*.py")]
+    files = sorted([*files, *(package / "capture" / f"{name}.py" for name in REGISTRATION)])
     return digest([_code(file, file.stat().st_mtime_ns)[0] for file in files])

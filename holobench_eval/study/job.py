@@ -13,7 +13,7 @@ from torch import Tensor
 
 from .. import registry
 from ..config import Save
-from ..errors import CellError
+from ..errors import CellError, Pending
 from ..seeds import seed
 from .artifacts import Artifact, Artifacts
 from .bench import Condition, workbench
@@ -24,6 +24,7 @@ from .store import Record
 if TYPE_CHECKING:
     from ..display import Workbench
     from ..display.learned import LearnedBench
+    from ..display.real import RealBench
 
 
 @dataclass(frozen=True)
@@ -71,10 +72,12 @@ class Job:
             return None
         artifacts = Artifacts(self.setting.artifacts)
         if not artifacts.has(needed):
+            if needed.place.real and not artifacts.has_failed(needed):
+                raise Pending("its training waits for photographs")
             raise CellError(f"not trained: {artifacts.failure(needed)}")
         return artifacts.load(needed)
 
-    def bench(self, cell: Cell, place: Condition) -> Workbench | LearnedBench:
+    def bench(self, cell: Cell, place: Condition) -> Workbench | RealBench | LearnedBench:
         """The display of a cell: a simulated bench, or a trained network."""
         learned = self.learned(place.learned)
         if place.learned is None or learned is None:
@@ -83,7 +86,7 @@ class Job:
 
         needed = place.learned
         method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
-        return LearnedBench(place.spec, method, learned.state, (cell.seed,))
+        return LearnedBench(place.spec, method, learned.state, cell.seed)
 
 
 def target_of(cell: Cell, place: Condition, folder: Path) -> Tensor:

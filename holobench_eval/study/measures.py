@@ -6,7 +6,7 @@ Focal stacks are in ``focus``.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,18 +14,21 @@ from typing import TYPE_CHECKING, Any
 from torch import Tensor
 
 from .. import registry
+from ..display.real import RealBench
 from ..errors import BudgetError, CellError
 from ..metrics import floor_captures, match, score
-from . import effort, timings
+from . import effort, solutions, timings
 from .artifacts import Artifact
 from .bench import Condition, workbench
-from .effort import Effort
 from .images import write_capture, write_phase, write_thumbnail
 from .job import Job, target_of
 from .plan import Cell
+from .solutions import Solution
 from .store import Record, Store, file_name
 
 if TYPE_CHECKING:
+    from ..display import Workbench
+    from ..display.learned import LearnedBench
     from ..display.workbench import MeteredBench, Shot
 
 MOST_SATURATED = 0.001
@@ -34,18 +37,6 @@ MOST_SATURATED = 0.001
 Measure = Callable[[Cell, Condition], Record]
 Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]
 """The scores of an image ``(C, h, w)`` against the wanted one."""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What a method made: the phase ``(C, H, W)`` [rad], the captures and the effort it took, why the display ended it
-    (empty: it did not), and what it had learned."""
-
-    phase: Tensor
-    captures: int
-    taken: Effort
-    stopped: str
-    learned: Artifact | None
 
 
 def plain(job: Job, _: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
@@ -57,7 +48,12 @@ def picture(job: Job) -> Measure:
     """Solve the task's target on its first display; the result shows the phase on any of its displays."""
     place = job.task.conditions[0]
     target = target_of(job.task.cells[0], place, job.setting.folder)
-    made = solution(job, place, target, lambda method, handle: method.solve(target[None].clone(), handle))
+
+    def make() -> Solution:
+        return solution(job, place, target, lambda method, handle: method.solve(target[None].clone(), handle))
+
+    in_session = place.real is not None and place.real.folder is not None
+    made = solutions.kept(job, make) if in_session else make()
     return lambda cell, place: captured(job, made, cell, place, target)
 
 
@@ -96,7 +92,7 @@ def captured(job: Job, made: Solution, cell: Cell, place: Condition, target: Ten
     )
     _refuse_saturated(shot)
     _save(job, cell, shot.image, made.phase)
-    scores = scored(job, cell, shot.image, target)
+    scores = scored(job, cell, shot.image, target) | _second_scores(job.bench(cell, place), shot, target)
     write_thumbnail(Store(job.setting.output).thumbnail(cell.id), match(shot.image, target)[0])
     return Record(
         cell=cell.description(),
@@ -111,6 +107,15 @@ def captured(job: Job, made: Solution, cell: Cell, place: Condition, target: Ten
         learned=_account(made.learned),
         stopped=made.stopped,
     )
+
+
+def _second_scores(bench: Workbench | RealBench | LearnedBench, shot: Shot, target: Tensor) -> dict[str, float]:
+    """PSNR and SSIM of a real photograph by the geometry that another algorithm found."""
+    image = bench.second_image(shot, target) if isinstance(bench, RealBench) else None
+    if image is None:
+        return {}
+    again = score(image, target, refine=False, blur=(), metrics=("psnr", "ssim"))
+    return {f"{name}_linear_second": again[f"{name}_linear"] for name in ("psnr", "ssim")}
 
 
 def _within_budget(method: Any, solve: Callable[[Any, MeteredBench], Any], handle: MeteredBench) -> tuple[Any, str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from .. import registry
 from ..errors import UserError
-from .bench import LEARNED, Condition, condition
+from .bench import LEARNED, Condition, Rig, condition, real_condition
 from .identity import code_digest, digest, harness_digest
 from .preparation import Preparation, check_unseen, preparation
 from .stacks import VERSION as IN_FOCUS
@@ -46,7 +46,8 @@ class Cell:
     is scored, ``picture``, ``prediction`` or ``focus``; holograms: whose captures are predicted (empty for pictures);
     prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the
     most that the display allows while the target is solved (None: no limit); change: kind and value of what has changed
-    on the display since methods were prepared for it (empty: nothing).
+    on the display since methods were prepared for it (empty: nothing); session: name of the series of photographs that
+    stands for the display (empty: none does).
     """
 
     method: str
@@ -72,15 +73,18 @@ class Cell:
     prepared: tuple[str, ...] = ()
     captures: int | None = None
     change: Mapping[str, Any] = field(default_factory=dict)
+    session: str = ""
 
     def description(self) -> dict[str, Any]:
-        """The cell as plain JSON values; without ``captures`` where there is no limit, and ``change`` where none is."""
+        """The cell as plain JSON values; without ``captures`` where there is no limit, and what is empty of the last
+        two."""
         lists = {name: list(getattr(self, name)) for name in ("panel", "metrics", "prepared")}
         plain = {**asdict(self), **lists}
         if self.captures is None:
             del plain["captures"]
-        if not self.change:
-            del plain["change"]
+        for name in ("change", "session"):
+            if not plain[name]:
+                del plain[name]
         return plain
 
     @cached_property
@@ -172,12 +176,25 @@ def plan(study: Study) -> Plan:
 def displays(study: Study) -> dict[str, Condition]:
     """The displays of a study by the names they have in its config."""
     grid, learned = study.display, study.display.learned
+    if grid.bench is not None:
+        return {grid.bench: _real(study, real_condition(grid.bench, study.folder))}
     if learned is None:
-        return {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
+        shown = {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
+        return {source: _real(study, place) for source, place in shown.items()}
     place = condition(learned.profile, grid.panel, study.folder)
     needed = preparation(study, learned.method, learned.params, place)
     name = f"{learned.method.rpartition(':')[2]} trained on {place.name}"
     return {LEARNED: replace(place, name=name, learned=needed)}
+
+
+def _real(study: Study, place: Condition) -> Condition:
+    """The display with a session folder in its place, if the study has one."""
+    folder = study.display.session
+    if folder is None:
+        return place
+    from ..capture.session import read_manifest
+
+    return replace(place, real=replace(place.real or Rig(), folder=folder, session=read_manifest(folder).session))
 
 
 def changed(study: Study, source: str, place: Condition) -> list[Condition]:
@@ -254,6 +271,7 @@ class _Ground:
             prepared=prepared,
             captures=captures,
             change=dict([place.change]) if place.change and condition != REFERENCE else {},
+            session=place.real.session if place.real and condition != REFERENCE else "",
         )
 
     def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[Target]) -> Iterator[Task]:

@@ -59,6 +59,7 @@ class Preparation:
             "held_out": self.held_out,
             "captures": self.captures,
             "seed": self.seed,
+            **({"session": self.place.real.session} if self.place.real else {}),
         }
 
     @cached_property

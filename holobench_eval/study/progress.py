@@ -17,6 +17,7 @@ from .artifacts import read_log
 from .plan import Task
 from .run import Watch
 from .store import Record
+from .training import WAITS
 
 SECONDS_BETWEEN_LINES = 5.0
 
@@ -31,7 +32,7 @@ def _failure(record: Record) -> str:
 
 
 def _untrained(name: str, reason: str) -> str:
-    return f"failed: training {name}: {reason}"
+    return f"training {name}: {reason}" if reason == WAITS else f"failed: training {name}: {reason}"
 
 
 @dataclass
@@ -93,7 +94,8 @@ class Bar:
     def trained(self, name: str, failure: str) -> None:
         """Advance, and print a failure above the bar."""
         if failure:
-            self.progress.console.print(escape(_untrained(name, failure)), style="red", highlight=False, soft_wrap=True)
+            style = None if failure == WAITS else "red"
+            self.progress.console.print(escape(_untrained(name, failure)), style=style, highlight=False, soft_wrap=True)
         self.progress.update(self.bar, advance=1)
         self.follower.ended(name)
 

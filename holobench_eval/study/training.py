@@ -12,14 +12,17 @@ from ..display.effects import effects
 from ..display.estimates import joined
 from ..display.training import TrainingBench, TrainingImage
 from ..display.truth import truth
-from ..display.workbench import Workbench
-from ..errors import CellError
+from ..display.workbench import Source, Workbench
+from ..errors import CellError, LostDeviceError, Pending
 from .artifacts import Artifacts
 from .bench import workbench
 from .identity import code_digest, harness_digest
 from .job import repeatable
 from .preparation import Preparation
 from .provenance import now
+
+WAITS = "waits for photographs"
+"""In the place of a reason why a training failed."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,11 @@ def train(job: TrainingJob) -> str:
             return ""
         try:
             _train(job.needed, artifacts, job.threads)
+        except LostDeviceError:
+            raise
+        except Pending:
+            artifacts.forget_failure(job.needed)
+            return WAITS
         except (Exception, SystemExit) as error:
             return artifacts.fail(job.needed, error)
         return ""
@@ -74,18 +82,20 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
     artifacts.write(needed, state, facts | diagnosis(method, state, place))
 
 
-def diagnosis(method: object, state: Mapping[str, Any], place: Workbench) -> dict[str, Any]:
+def diagnosis(method: object, state: Mapping[str, Any], place: Source) -> dict[str, Any]:
     """What a method says of the display it learned, beside the truth, for methods that say something.
 
     estimates: see ``display.estimates.joined``; missing: effects of the bench that the form of the method's model has
     no term for, each in words, if the method says what its ``form`` is; diagnosis_failed: why there is neither.
+    Of a real bench the truth is not known.
     """
     estimates, form = getattr(method, "estimates", None), getattr(method, "form", None)
     found: dict[str, Any] = {}
     try:
         if estimates is not None:
-            found["estimates"] = joined(estimates(state, place.spec), truth(place.bench))
-        if form is not None:
+            known = truth(place.bench) if isinstance(place, Workbench) else ()
+            found["estimates"] = joined(estimates(state, place.spec), known)
+        if form is not None and isinstance(place, Workbench):
             found["missing"] = [one.text for one in effects(place.bench.profile) if one.name not in form]
     except Exception as error:  # must not cost what was learned
         found["diagnosis_failed"] = " ".join(f"{type(error).__name__}: {error}".split())[:300]

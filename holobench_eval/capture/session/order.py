@@ -1,0 +1,43 @@
+"""In which order the patterns of a round are shown: mixed, with dark frames and repeats, so that drift is seen."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from ..photograph import Request
+from .manifest import DARK, FIDUCIAL, HOLOGRAM, REPEAT
+
+BETWEEN_REPEATS = 24
+"""Holograms between two showings of the repeated pattern."""
+
+
+@dataclass(frozen=True)
+class Showing:
+    """A request at its place in a round. request: None for a dark frame."""
+
+    role: str
+    request: Request | None
+    copy: int = 0
+
+
+def ordered(requests: Sequence[Request], repeated: Request, seed: str) -> Iterator[Showing]:
+    """The showings of a round.
+
+    A dark frame first and last; then the fiducial holograms; then everything else in a random order that ``seed``
+    names, since a slow drift must not favour the methods that are shown first; and one hologram of the fiducial grid,
+    ``repeated``, at the beginning, every so often, and at the end.
+    """
+    copies = iter(range(1_000_000))
+    yield Showing(DARK, None, 0)
+    yield Showing(REPEAT, repeated, next(copies))
+    yield from (Showing(FIDUCIAL, request) for request in requests if request.role == FIDUCIAL)
+    mixed = [request for request in requests if request.role == HOLOGRAM]
+    random.Random(seed).shuffle(mixed)
+    for index, request in enumerate(mixed):
+        if index and index % BETWEEN_REPEATS == 0:
+            yield Showing(REPEAT, repeated, next(copies))
+        yield Showing(HOLOGRAM, request)
+    yield Showing(REPEAT, repeated, next(copies))
+    yield Showing(DARK, None, 1)

@@ -1,0 +1,245 @@
+"""A study on a bench that other software drives: ``holoeval session export`` and ``import``, round by round."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
+
+from ..capture.convention import Convention
+from ..capture.session import Manifest, Pattern, read_manifest, write_manifest
+from ..capture.session.manifest import CAPTURES, FORMAT, PATTERNS
+from ..errors import UserError, suggest
+from .bench import condition, forget_sessions, real_condition, workbench
+from .executors import Serial
+from .identity import digest
+from .plan import displays, plan
+from .real_bench import session_photographer
+from .run import Outcome, Watch, run
+from .session_checks import look
+from .store import write_atomically
+
+if TYPE_CHECKING:
+    from ..config import Study
+    from ..display.real import RealBench
+
+STUDY, BENCH, REPORT, ARTIFACTS, SOLUTIONS = "study.yaml", "bench.yaml", "report", "artifacts", "solutions"
+
+
+@dataclass(frozen=True)
+class Advance:
+    """What an import or export came to.
+
+    study: on the session's display; patterns: of the new round that has to be photographed, none when the study is
+    complete; outcome: of the cells. The study's note says what is to be known of the photographs.
+    """
+
+    study: Study
+    patterns: tuple[Pattern, ...]
+    outcome: Outcome
+
+
+def export(
+    config: Path,
+    folder: Path,
+    watch: Watch,
+    threads: int,
+    bench: Path | None = None,
+    display: str | None = None,
+    convention: Convention | None = None,
+    fixed_exposure: bool = False,
+) -> Advance:
+    """Make a session folder for a study and write its first round of patterns.
+
+    bench: file of the real bench; without it ``display``, one of the study's profiles, says the nominal optics (not
+    needed where the study has one). convention: what the panel's levels mean (None: as the bench file says).
+    UserError: the folder is not empty, or the study cannot be shown on one real display.
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise UserError(f"{folder}: not empty; give a new folder, or go on there with holoeval session import {folder}")
+    from ..config import load_study
+
+    chosen = _on_one_display(load_study(config), bench, display)
+    if fixed_exposure and chosen.display.exposure == "matched":
+        raise UserError(f"{config}: display.exposure: matched sets exposures one by one; not with --fixed-exposure")
+    folder.mkdir(parents=True, exist_ok=True)
+    write_atomically(folder / STUDY, chosen.text.encode())
+    if bench is not None:
+        shutil.copyfile(bench, folder / BENCH)
+    place = next(iter(displays(chosen).values()))
+    spec, described = place.spec, place.digest
+    if spec.bits != 8:
+        raise UserError(f"'{place.name}' has {spec.bits} bits; patterns are written with 8")
+    if convention is None and place.real is not None and place.real.bench is not None:
+        from ..display.bench_file import load_bench_file
+
+        convention = load_bench_file(place.real.bench).phase
+    text = digest(chosen.text)
+    manifest = Manifest(
+        format=FORMAT,
+        session=digest([text, described, str(config), digest(folder.resolve().as_posix())]),
+        study_sha256=text,
+        bench_sha256=described,
+        display=place.name,
+        panel=spec.shape,
+        wavelengths=spec.wavelengths,
+        phase=convention or Convention(),
+        fixed_exposure=fixed_exposure,
+    )
+    write_manifest(folder, manifest)
+    forget_sessions()
+    session_photographer.cache_clear()
+    return _advance(chosen, folder, watch, threads)
+
+
+def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], config: Path | None = None) -> Advance:
+    """Read the photographs of all rounds so far, score what can be scored, and write the next round if one is needed.
+
+    config: the study's config, where the copy in the folder cannot stand for it (see ``study_of``); say: is told
+    what was found, line by line. UserError with every fault of the photographs; nothing is scored then.
+    """
+    manifest = read_manifest(folder)
+    study = study_of(folder, manifest, config)
+    forget_sessions()
+    session_photographer.cache_clear()
+    photographer = session_photographer(folder)
+    for number in range(1, manifest.rounds + 1):
+        faults, captures = photographer.check_round(number)
+        if faults:
+            raise UserError(f"round {number}: nothing was scored. " + " | ".join(faults))
+        photographer.accept(captures)
+        say(f"round {number}: {len(captures)} photographs read")
+    for note in photographer.notes:
+        say(note)
+    notes = [study.note, *photographer.notes, *look(_bench(study), photographer, folder / REPORT, say)]
+    advance = _advance(study, folder, watch, threads)
+    return replace(advance, study=replace(advance.study, note=" ".join(_sentence(note) for note in notes if note)))
+
+
+def _sentence(note: str) -> str:
+    text = note.strip()
+    return f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
+
+
+def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
+    """The study of a session. UserError: another one, or one whose copy may not be trusted with this machine.
+
+    A session folder comes from somewhere else, so its copy of the config is used only where it names nothing but what
+    is installed: code in files, datasets in folders and weights need the user's own config.
+    """
+    from ..config import load_study
+
+    path = folder / STUDY if config is None else config
+    if not path.is_file() or (config is None and path.is_symlink()):
+        raise UserError(f"{path}: no such file; give --study with the config that was exported")
+    if digest(path.read_text(encoding="utf-8")) != manifest.study_sha256:
+        raise UserError(f"{path}: is not the config that this session was exported from")
+    if config is None and (reason := _reaches_out(path)):
+        raise UserError(f"{path}: {reason}; give --study with your own copy of the config")
+    bench = folder / BENCH
+    study = _on_one_display(load_study(path), bench if bench.is_file() else None, manifest.display)
+    place = next(iter(displays(study).values()))
+    if place.digest != manifest.bench_sha256:
+        raise UserError(f"'{place.name}' has changed since the session was exported; export a new one")
+    if (place.spec.shape, place.spec.wavelengths) != (tuple(manifest.panel), tuple(manifest.wavelengths)):
+        raise UserError(f"{folder}: the manifest's panel or wavelengths are not those of '{place.name}'")
+    return replace(study, display=replace(study.display, session=folder))
+
+
+def _reaches_out(path: Path) -> str:
+    """What a config names that is not installed here, empty for nothing."""
+
+    def walk(value: object, key: str) -> str:
+        if isinstance(value, dict):
+            return next((found for name, item in value.items() if (found := walk(item, str(name)))), "")
+        if isinstance(value, list):
+            return next((found for item in value if (found := walk(item, key))), "")
+        file = isinstance(value, str) and (".py:" in value or value.endswith((".yaml", ".yml")) or "/" in value)
+        told = key in ("title", "note", "label", "source")
+        reaches = (file and not told) or key in ("path", "manifest", "lpips_weights", "weights")
+        return f"names a file ({key}: {str(value)[:60]})" if reaches else ""
+
+    return walk(yaml.safe_load(path.read_text(encoding="utf-8")), "")
+
+
+def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:
+    """The study with one display, that photographs can be exchanged for. UserError says what stands against it."""
+    if study.measure == "focus" or study.sweeps or study.display.learned:
+        what = "focal stacks" if study.measure == "focus" else "changes of a display" if study.sweeps else "a network"
+        raise UserError(f"{study.file}: a session measures pictures on one real display, not {what}")
+    if bench is not None:
+        grid = replace(study.display, bench=str(bench.resolve()), profiles=(), panel=None)
+        real_condition(str(bench.resolve()), study.folder)
+    elif study.display.bench:
+        grid = study.display
+    else:
+        grid = replace(study.display, profiles=(_profile(study, display),))
+    from ..registry import find
+
+    source = grid.sources[0]
+    methods = tuple(
+        replace(entry, profiles=(source,))
+        for entry in study.methods
+        if (bench is not None or source in entry.profiles)
+        and not getattr(find("methods", entry.name, study.folder), "privileged", False)
+    )
+    if not methods:
+        raise UserError(f"{study.file}: no method of it can be shown on a real display")
+    labels = {entry.label for entry in methods}
+    baseline = study.baseline if study.baseline in labels else methods[0].label
+    reported = None
+    if study.reported is not None:
+        rows = {label: row for label, row in study.reported.rows.items() if label in labels}
+        reported = replace(study.reported, rows=rows, beside=None)
+    return replace(study, display=grid, methods=methods, baseline=baseline, reported=reported)
+
+
+def _profile(study: Study, display: str | None) -> str:
+    """The profile that a display is named by. UserError: several, or none of the name."""
+    names = {condition(one, study.display.panel, study.folder).name: one for one in study.display.profiles}
+    if display is None and len(names) > 1:
+        raise UserError(f"{study.file}: several displays; choose one with --display, or describe yours with --bench")
+    if display is None:
+        return study.display.profiles[0]
+    if display not in names:
+        raise UserError(f"unknown display '{display}'; {suggest(display, names)}")
+    return names[display]
+
+
+def _bench(study: Study) -> RealBench:
+    from ..display.real import RealBench
+
+    bench = workbench(next(iter(displays(study).values())), study.seed)
+    assert isinstance(bench, RealBench)
+    return bench
+
+
+def _advance(study: Study, folder: Path, watch: Watch, threads: int) -> Advance:
+    """Compute what can be computed; write the patterns of what waits."""
+    study = replace(study, display=replace(study.display, session=folder))
+    _bench(study).announce_grid()
+    photographer = session_photographer(folder)
+    outcome = run(study, plan(study), folder / REPORT, Serial(), watch, threads, folder / ARTIFACTS)
+    patterns = photographer.write_round() if photographer.wanted else []
+    if patterns:
+        _write_note(folder, patterns)
+    return Advance(study, tuple(patterns), outcome)
+
+
+def _write_note(folder: Path, patterns: list[Pattern]) -> None:
+    """What to do with the round, in words, beside its pictures."""
+    number = patterns[0].round
+    text = f"""Round {number}: {len(patterns)} patterns.
+
+1. Show the pictures of {PATTERNS}/round-{number} in the order of order.csv, gray level for gray level, one panel pixel
+   a picture pixel. Light each with the laser of its wavelength; block the laser for role 'dark'.
+2. Photograph each after the panel has settled, with gamma, gain control, white balance and denoising off, and the
+   exposure times its relative_exposure. Take the session's own exposure so that no photograph of a hologram saturates.
+3. Save each under the name in 'save_photograph_as' ({CAPTURES}/round-{number}/NNNN.png; 16-bit PNG or TIFF, or RAW).
+4. holoeval session import {folder.name}
+"""
+    write_atomically(folder / PATTERNS / f"round-{number}" / "README.txt", text.encode())
