@@ -258,10 +258,11 @@ def show(
 
 @app.command()
 def conformance() -> None:
-    """Check the propagators against direct integration and analytic gradients."""
+    """Check the propagators against direct integration, and registration over random poses of a camera."""
+    from .capture.conformance import main as check_registration
     from .optics.conformance import main as check_optics
 
-    raise typer.Exit(check_optics())
+    raise typer.Exit(max(check_optics(), check_registration()))
 
 
 @app.command()

@@ -15,7 +15,8 @@ BLUR = 0.35  # of a circle's radius: about 2 region pixels for the smallest circ
 FILLED = (0.75, 0.5, 0.33, 1.0, 0.22)  # the part of the frame's side that the region may fill, likely ones first
 DETECTION_RADIUS = 6.0  # pixels; larger circles are detected on a smaller picture
 CLUTTER = 1.5  # blobs for each circle; the search among more is slow and hopeless
-MARK_MARGIN = 0.25
+MARK_AGREEMENT = 0.8  # correlation of the circles' sizes with the marks: 0.86 and more in speckle, others below 0.76
+MARK_MARGIN = 0.3  # by which no other order agrees as well, of what it is for perfect marks: 0.56 and more in speckle
 
 
 def find_circles(frame: Frame, grid: FiducialGrid) -> Array | None:
@@ -26,13 +27,14 @@ def find_circles(frame: Frame, grid: FiducialGrid) -> Array | None:
     """
     largest = min(max(frame.shape) / max(grid.shape), min(frame.shape) / min(grid.shape))
     for filled in FILLED:
-        points = _find_at(frame, grid, filled * largest)
-        if points is not None:
-            return _orient(frame, points, grid)
+        for points in _find_at(frame, grid, filled * largest):
+            ordered = _orient(frame, points, grid)
+            if ordered is not None:
+                return ordered
     return None
 
 
-def _find_at(frame: Frame, grid: FiducialGrid, scale: float) -> Array | None:
+def _find_at(frame: Frame, grid: FiducialGrid, scale: float) -> Iterator[Array]:
     """The circles in any of the lattice's orders, when the sensor has about ``scale`` pixels a region pixel."""
     shrink = max(1, int(scale * grid.radius / DETECTION_RADIUS))
     height, width = (side // shrink * shrink for side in frame.shape)
@@ -49,8 +51,8 @@ def _find_at(frame: Frame, grid: FiducialGrid, scale: float) -> Array | None:
                 blobDetector=detector,
             )
             if found:
-                return (np.asarray(points, dtype=np.float64).reshape(-1, 2) + 0.5) * shrink - 0.5
-    return None
+                yield (np.asarray(points, dtype=np.float64).reshape(-1, 2) + 0.5) * shrink - 0.5
+                break
 
 
 def _detector(grid: FiducialGrid, scale: float) -> cv2.SimpleBlobDetector:
@@ -90,8 +92,10 @@ def _orient(frame: Frame, points: Array, grid: FiducialGrid) -> Array | None:
     if sizes.std() == 0:
         return None
     scores = np.array([np.corrcoef(sizes[order.ravel()], grid.marks)[0, 1] for order in orders])
+    perfect = np.array([np.corrcoef(grid.marks[order.ravel()], grid.marks)[0, 1] for order in orders[1:]])
     best, second = np.argsort(scores)[::-1][:2]
-    if not scores[best] - scores[second] > MARK_MARGIN:
+    margin = (scores[best] - scores[second]) / (1 - perfect.max())
+    if not (scores[best] > MARK_AGREEMENT and margin > MARK_MARGIN):
         return None
     return np.asarray(points[orders[best].ravel()])
 

@@ -21,6 +21,7 @@ from torch import Tensor
 
 from ..errors import CellError
 from .circles import find_circles
+from .genuine import impostor
 from .grid import FiducialGrid
 from .subpixel import correlation, even_picture, offsets
 from .warp import Array, Frame, Warp, quadratic_terms, remap
@@ -87,7 +88,7 @@ def register(image: Tensor, grid: FiducialGrid, bound: float = 0.3) -> Registrat
     """Register a capture ``(C, Hs, Ws)`` of the grid's hologram, linear light, dark level subtracted.
 
     Raises `CellError`, with the channel and the reason, when the grid is not found, lies partly outside the sensor,
-    or fits worse than ``bound`` [region px, RMS].
+    is not the one that was shown, or fits worse than ``bound`` [region px, RMS].
     """
     if image.ndim != 3 or not bool(torch.isfinite(image).all()):
         raise CellError(f"registration needs a finite capture (C, Hs, Ws), got shape {tuple(image.shape)}")
@@ -113,6 +114,9 @@ def _register_channel(frame: Frame, grid: FiducialGrid, channel: int) -> tuple[W
     height, width = frame.shape
     if np.any(corners < -0.5) or np.any(corners > (width - 0.5, height - 0.5)):
         raise CellError(f"registration of channel {channel}: the region lies partly outside the sensor")
+    doubt = impostor(frame, warp, grid)
+    if doubt is not None:
+        raise CellError(f"registration of channel {channel}: {doubt}")
     residual = offsets(even_picture(frame, warp, grid), grid)
     return warp, float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
 

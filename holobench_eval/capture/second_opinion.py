@@ -7,10 +7,12 @@ homography to their displacements. A score that depends on which of the two is r
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from skimage.registration import phase_cross_correlation
 
 from .warp import Array, Frame, Warp, quadratic_terms
@@ -88,10 +90,12 @@ def _sampled(frame: Frame, warp: Warp, border: int) -> Frame:
     """The region and ``border`` pixels around it as ``warp`` sees them; the edge of the frame repeats outside it."""
     height, width = warp.shape
     x, y = np.meshgrid(np.arange(-border, width + border), np.arange(-border, height + border))
-    where = warp.to_sensor(np.stack([x, y], axis=-1).reshape(-1, 2).astype(np.float64))
-    where = where.astype(np.float32).reshape(*x.shape, 2)
-    smooth = cv2.GaussianBlur(frame, (0, 0), 0.4 * warp.scale())
-    return np.asarray(cv2.remap(smooth, where, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+    points = warp.to_sensor(np.stack([x, y], axis=-1).reshape(-1, 2).astype(np.float64))
+    where = points.astype(np.float32).reshape(*x.shape, 2)
+    smooth = np.asarray(cv2.GaussianBlur(frame, (0, 0), 0.4 * warp.scale()))
+    return np.asarray(
+        cv2.remap(smooth, where[..., 0], where[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    )
 
 
 def _relief(light: Frame) -> Frame:
@@ -105,6 +109,8 @@ def _moved(frame: Frame, wanted: Frame, warp: Warp, parts: int) -> Blocks | None
     """How far blocks of a ``parts``-th of the region's sides lie from where ``warp`` has them; None: too few found."""
     border = _border(warp.shape)
     seen = _relief(_sampled(frame, warp, border))
+    if not seen.std() > 0:
+        return None
     if parts == 1:
         return _whole(seen, np.pad(wanted, border), warp.shape)
     seen = seen[border:-border, border:-border]
@@ -118,9 +124,16 @@ def _moved(frame: Frame, wanted: Frame, warp: Warp, parts: int) -> Blocks | None
 
 
 def _whole(seen: Frame, wanted: Frame, shape: tuple[int, int]) -> Blocks:
-    shift, _, _ = phase_cross_correlation(seen, wanted, normalization=None)
+    shift = _shift(seen, wanted, 1)
     centre = np.array([[shape[1] - 1.0, shape[0] - 1.0]]) / 2
-    return Blocks(centre, np.array([shift[::-1]], dtype=np.float64), np.eye(2)[None])
+    return Blocks(centre, shift[None], np.eye(2)[None])
+
+
+def _shift(seen: NDArray[np.floating], wanted: NDArray[np.floating], fineness: int) -> Array:
+    """How far ``seen`` lies from ``wanted``, x and y, in steps of 1 / ``fineness`` pixel."""
+    correlate: Callable[..., tuple[Array, float, float]] = phase_cross_correlation
+    shift, _, _ = correlate(seen, wanted, normalization=None, upsample_factor=fineness)
+    return np.array(shift[::-1], dtype=np.float64)
 
 
 def _spans(side: int, parts: int) -> list[tuple[int, int]]:
@@ -139,8 +152,7 @@ def _block(
     a, b = ((part[window] - part[window].mean()) * taper for part in (seen, wanted))
     if min(a.std(), b.std()) < 1e-6 * max(wanted.std(), 1e-12):
         return None
-    shift, _, _ = phase_cross_correlation(a, b, normalization=None, upsample_factor=FINENESS)
-    displacement = np.array(shift[::-1], dtype=np.float64)
+    displacement = _shift(a, b, FINENESS)
     if np.any(np.abs(displacement) > FURTHEST * np.array([column[1] - column[0], row[1] - row[0]])):
         return None
     matrix = np.array([[1.0, 0.0, displacement[0]], [0.0, 1.0, displacement[1]]])

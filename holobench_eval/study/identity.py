@@ -72,7 +72,7 @@ def _own_folder(file: Path) -> Path:
     return shipped if file.is_relative_to(shipped) else file.parent
 
 
-REGISTRATION = ("circles", "grid", "refine", "registration", "subpixel", "warp")
+REGISTRATION = ("circles", "genuine", "grid", "refine", "registration", "subpixel", "warp")
 """Modules of ``capture`` that every score depends on."""
 
 
