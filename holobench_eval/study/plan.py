@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -78,8 +78,9 @@ class Cell:
     def description(self) -> dict[str, Any]:
         """The cell as plain JSON values; without ``captures`` where there is no limit, and what is empty of the last
         two."""
-        lists = {name: list(getattr(self, name)) for name in ("panel", "metrics", "prepared")}
-        plain = {**asdict(self), **lists}
+        plain: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
+        plain |= {name: list(plain[name]) for name in ("panel", "metrics", "prepared")}
+        plain |= {name: dict(plain[name]) for name in ("params", "dataset_params", "holograms", "change")}
         if self.captures is None:
             del plain["captures"]
         for name in ("change", "session"):
@@ -232,6 +233,11 @@ class _Ground:
         """The code of the method whose captures are predicted."""
         return code_digest(registry.find("methods", self.study.holograms.name, self.study.folder))
 
+    @cached_property
+    def harness_sha256(self) -> str:
+        """The code between a phase and its score."""
+        return harness_digest()
+
     def cell(
         self,
         target: Target,
@@ -263,7 +269,7 @@ class _Ground:
             repeat=repeat,
             seed=study.seed,
             protocol=study.protocol.version,
-            harness_sha256=harness_digest(),
+            harness_sha256=self.harness_sha256,
             metrics=self.metrics,
             exposure=study.display.exposure,
             measure=study.measure,

@@ -43,6 +43,12 @@ def cpu_model() -> str:
     return named[0] if named else platform.processor() or platform.machine()
 
 
+@cache
+def _torch() -> str:
+    """Its version, read from its metadata once: that takes longer than all the rest of a name."""
+    return version("torch")
+
+
 def key(task: Task, threads: int, workers: int) -> str:
     """Name of a task's timing: the hash of everything its wall time should depend on."""
     cell, place = task.cells[0], task.conditions[0]
@@ -55,7 +61,7 @@ def key(task: Task, threads: int, workers: int) -> str:
             "learned": [cell.measure, *cell.prepared],
             "measure": cell.measure,
             "machine": [cpu_model(), platform.machine(), threads, workers],
-            "versions": [version("torch"), __version__],
+            "versions": [_torch(), __version__],
         }
     )
 
