@@ -66,6 +66,21 @@ def _told(advance: Advance, folder: Path) -> None:
     raise typer.Exit(1 if advance.outcome.failed else 0)
 
 
+def score(
+    captures: Annotated[Path, typer.Option(help="Folder with captures, METHOD/TARGET.png.")],
+    targets: Annotated[Path, typer.Option(help="Folder with targets, TARGET.png.")],
+    output: Annotated[Path, typer.Option(help="Where to write the report.")],
+    values: Annotated[str, typer.Option(help="stored: compared as they are; srgb or linear: what they mean.")] = "stored",
+    baseline: Annotated[str | None, typer.Option(help="The method that others are tested against.")] = None,
+    lpips_weights: Annotated[Path | None, typer.Option(help="File or folder of the LPIPS trunk.")] = None,
+) -> None:
+    """Score pictures that were taken long ago: align each with its target by what it shows, and write a report."""
+    from .study.score_folders import score_folders
+
+    weights = None if lpips_weights is None else str(lpips_weights)
+    print(score_folders(captures, targets, output, values, baseline, weights, console()))
+
+
 def doctor() -> None:
     """List what is installed, which panels and cameras answer, and what to do about each thing missing."""
     from .study.doctor import main
@@ -76,4 +91,5 @@ def doctor() -> None:
 def add_to(app: typer.Typer) -> None:
     """Make the commands part of the command line."""
     app.add_typer(session, name="session")
+    app.command()(score)
     app.command()(doctor)

@@ -34,7 +34,7 @@ def direction(column: str) -> Literal["higher", "lower"] | None:
     if column == "speckle_contrast":
         return "lower"
     for metric in catalogue():
-        for domain in metric.domains:
+        for domain in (*metric.domains, "stored"):
             stem = f"{metric.name}_{domain}"
             if column in (stem, f"{stem}_refined") or column.startswith(f"{stem}_blur"):
                 return metric.direction

@@ -30,6 +30,7 @@ _ENCODINGS: dict[Domain, Callable[[Tensor], Tensor]] = {
     "linear": lambda light: light,
     "amplitude": torch.sqrt,
     "srgb": srgb_encode,
+    "stored": lambda values: values,
 }
 _REPEATED = ("psnr", "ssim")  # also given after refinement and after blur
 
@@ -64,17 +65,21 @@ def score(
     blur: Sequence[float] = (0.5, 1.0),
     metrics: Collection[str] | None = None,
     lpips_weights: str | Path | None = None,
+    stored: bool = False,
 ) -> dict[str, float]:
     """All scores of a capture against its target, after the intensity match.
 
     capture: (C, h, w) linear light in any unit, dark level subtracted (noise may make it negative).
     target: (C, h, w) linear light in [0, 1]; C = 1 or 3, sides of at least 16 px.
+    stored: both are values as pictures store them, display-encoded, and are compared as they are: matched, refined,
+    blurred and scored without decoding. The only domain is then ``stored``, and there is no speckle contrast.
     refine: also score after the bounded rigid refinement, whose move is given.
     blur: widths [px] of Gaussians by which capture and target alike are blurred, in linear light and before the match.
     metrics: names to compute (as in ``catalogue``, and ``speckle_contrast``), default all.
     lpips_weights: file or folder of the LPIPS trunk, default torch's hub cache.
 
-    Returns ``<metric>_<domain>``; ``<metric>_linear_refined`` and ``<metric>_linear_blur<width>`` for PSNR and SSIM;
+    Returns ``<metric>_<domain>``; ``<metric>_linear_refined`` and ``<metric>_linear_blur<width>`` for PSNR and SSIM
+    (``stored`` in the place of ``linear`` where values are stored ones);
     ``refine_dx_px``, ``refine_dy_px``, ``refine_theta_deg``; ``speckle_contrast``; ``brightness_ratio`` (mean of the
     capture over mean of the target, before the match); ``scale_<channel>``, the match's factors. What cannot be given
     is absent: a metric without its weights or for a larger image, the speckle contrast without a flat patch.
@@ -83,23 +88,25 @@ def score(
     """
     light, wanted = _checked(capture, target)
     names, chosen = _chosen(metrics, lpips_weights)
+    first: Domain = "stored" if stored else "linear"
     image, factors = match(light, wanted)
     pairs = {domain: (encode(image), encode(wanted)) for domain, encode in _ENCODINGS.items()}
     scores: dict[str, float] = {}
     for metric in chosen:
         if min(image.shape[1:]) >= metric.smallest:
-            scores |= {f"{metric.name}_{domain}": float(metric.function(*pairs[domain])) for domain in metric.domains}
+            domains: tuple[Domain, ...] = (first,) if stored else metric.domains
+            scores |= {f"{metric.name}_{domain}": float(metric.function(*pairs[domain])) for domain in domains}
     repeated = [metric for metric in chosen if metric.name in _REPEATED]
     if refine and repeated:
         moved = align(factors.view(-1, 1, 1) * light, wanted)
         again, _ = match(moved.image.to(wanted), wanted)
-        scores |= {f"{metric.name}_linear_refined": float(metric.function(again, wanted)) for metric in repeated}
+        scores |= {f"{metric.name}_{first}_refined": float(metric.function(again, wanted)) for metric in repeated}
         scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
     for sigma in blur if repeated else ():
         soft_capture, soft_target = _blurred(light, sigma), _blurred(wanted, sigma).clamp(0, 1)
         soft, _ = match(soft_capture, soft_target)
-        scores |= {f"{m.name}_linear_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
-    if "speckle_contrast" in names:
+        scores |= {f"{m.name}_{first}_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
+    if "speckle_contrast" in names and not stored:
         contrast = speckle_contrast(light, wanted)
         scores |= {} if math.isnan(contrast) else {"speckle_contrast": contrast}
     if float(wanted.mean()) > 0:

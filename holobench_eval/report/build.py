@@ -11,6 +11,7 @@ from markupsafe import Markup
 from ..study.store import write_atomically
 from . import (
     leaderboard,
+    section_alignment,
     section_diagnosis,
     section_focus,
     section_ranks,
@@ -29,6 +30,7 @@ from .section_training import Trained
 from .statistics import RESAMPLES
 from .sweeps import sweeps
 from .tables import MEMORY_COLUMN, csv_text, read_records, records_frame
+from .wording import FILES
 
 if TYPE_CHECKING:
     from ..config import Study
@@ -177,7 +179,10 @@ def _words(
         "parameters": sections.parameters(method_parameters(results, records)),
         "reported_source": layout.reported_source,
         "seed": layout.seed,
-        "command": f"holoeval run {description.config_file or 'CONFIG.yaml'}",
+        "command": description.command or f"holoeval run {description.config_file or 'CONFIG.yaml'}",
+        "from_files": layout.measure == FILES,
+        "alignments": section_alignment.table_of(results, records) if layout.measure == FILES else "",
+        "alignment_sentences": section_alignment.sentences(results, records) if layout.measure == FILES else [],
         "config_name": description.config_file,
         "config_text": description.config_text,
         "environment": environment(provenance),
@@ -205,6 +210,7 @@ def _pictures(figures: Figures) -> dict[str, Any]:
         "rank_figures": figures.ranks,
         "comparisons": figures.comparisons,
         "stages": figures.stages,
+        "alignment_figures": figures.alignments,
         "training_figures": figures.trainings,
         "absent": figures.absent,
     }

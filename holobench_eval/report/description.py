@@ -14,7 +14,7 @@ from ..study.plan import displays as conditions
 from .layout import TrainingSet
 from .results import Results
 from .tables import DONE
-from .wording import plain
+from .wording import FILES, plain
 
 if TYPE_CHECKING:
     from ..config import Study
@@ -30,6 +30,13 @@ ON_A_NETWORK = {
     "registration": "None: the network predicts in the frame of the target, and nothing is captured.",
     "saturation": "None: there is no sensor.",
     "exposure": "Without effect: there is no noise, so that the unit of light changes no score.",
+}
+
+FROM_FILES = {
+    "registration": "None by fiducials. Each target was found in its capture by the two pictures alone, as told "
+    'under "Alignment".',
+    "exposure": "Not known: pictures do not tell it, and the intensity match takes its effect on brightness away, not "
+    "that on noise.",
 }
 
 EXPOSURES = {
@@ -53,12 +60,14 @@ class Display:
 class Description:
     """What the report says of a study besides its numbers; every field may be empty.
 
-    config_file: the config as the user named it; config_text: what is in it.
+    config_file: the config as the user named it; config_text: what is in it; command: what writes the report again
+    (empty: a run of the config).
     """
 
     displays: tuple[Display, ...] = ()
     config_file: str = ""
     config_text: str = ""
+    command: str = ""
 
 
 def describe(study: Study) -> Description:
@@ -142,6 +151,8 @@ def counts(results: Results) -> str:
 
 def setup(results: Results, records: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     """Name and value of everything that was the same for all methods."""
+    if results.layout.measure == FILES:
+        return _files(results, records)
     cells = [record["cell"] for record in records]
     named = ", ".join(results.targets[:TARGETS_NAMED])
     more = len(results.targets) - TARGETS_NAMED
@@ -170,6 +181,31 @@ def training_images(given: TrainingSet) -> str:
     return f"{given.images} of {given.dataset}, of which {given.held_out} only watch the training; {limit}"
 
 
+def _files(results: Results, records: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """What was the same for all methods whose pictures were given."""
+    cells = [record["cell"] for record in records if record["cell"]["condition"] != REFERENCE]
+    sizes = dict.fromkeys(" x ".join(map(str, cell["panel"])) for cell in cells if cell["panel"])
+    named = ", ".join(results.targets[:TARGETS_NAMED])
+    more = len(results.targets) - TARGETS_NAMED
+    return [
+        ("targets", f"{len(results.targets)}: {named}{f' and {more} more' if more > 0 else ''}"),
+        ("size of the captures", f"{'; '.join(sizes)} pixels"),
+        ("compared", results.layout.wording.compared),
+        ("metric protocol", _distinct(results.frame, "protocol")),
+        ("headline metric", results.headline.axis),
+        ("baseline", results.layout.baseline or "none"),
+    ]
+
+
+def _at_full_scale(results: Results) -> str:
+    done = results.frame[(results.frame["state"] == DONE) & (results.frame["condition"] != REFERENCE)]
+    most = done["saturated"].max() if len(done) else float("nan")
+    if not most >= 0:
+        return "Not recorded."
+    doubt = " Above 0.1 % highlights were cut, and a study on a bench would refuse the capture." if most > 0.001 else ""
+    return f"At most {100 * most:.3g} % of a capture's samples in the scored region are at full scale.{doubt}"
+
+
 def _distinct(frame: pd.DataFrame, column: str) -> str:
     return ", ".join(sorted(set(frame[column]) - {""}))
 
@@ -194,6 +230,8 @@ def rules(results: Results) -> dict[str, str]:
     """Sentences on registration, exposure and saturation, with this study's figures."""
     if results.layout.learned_display is not None:
         return ON_A_NETWORK
+    if results.layout.measure == FILES:
+        return FROM_FILES | {"saturation": _at_full_scale(results)}
     done = results.frame[(results.frame["state"] == DONE) & (results.frame["condition"] != REFERENCE)]
     saturated = done["saturated"].dropna()
     changed = done["condition"].isin(results.layout.changed)

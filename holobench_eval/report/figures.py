@@ -13,6 +13,7 @@ import pandas as pd
 from ..study.plan import REFERENCE
 from ..study.store import Store
 from . import figure_ranks, frontiers, sweep_figures
+from .figure_alignment import alignment_name
 from .figure_charts import Chart, quality_bars, target_dots
 from .figure_comparison import draw_comparison, tile_size
 from .figure_style import slugs
@@ -29,6 +30,7 @@ FOLDER = "figures"
 TARGETS_SHOWN = 4
 TARGETS_A_PAGE = 4
 METHODS_A_PAGE = 8
+ALIGNMENTS_SHOWN = 8
 PIXELS = 5e6
 """Pixels of all comparison pages of a condition, at most: full-panel captures are shown for fewer targets."""
 
@@ -52,6 +54,7 @@ class Figures:
     ranks: list[Drawn]
     comparisons: list[Drawn]
     stages: list[Drawn]
+    alignments: list[Drawn]
     trainings: list[Drawn]
     absent: list[str]
 
@@ -76,12 +79,13 @@ def draw_figures(results: Results, trained: Sequence[Trained], output: Path) -> 
         [Drawn(f"{FOLDER}/{path.name}", caption) for path, caption in figure_ranks.draw(ranks(results), folder)],
         comparisons,
         _stages(results, folder),
+        _alignments(results, folder),
         _trainings(trained, folder),
     )
-    charts, costs, changes, stability, captures, stages, trainings = (
+    charts, costs, changes, stability, captures, stages, alignments, trainings = (
         [replace(drawn, number=next(number)) for drawn in kind] for kind in kinds
     )
-    return Figures(charts, costs, changes, stability, captures, stages, trainings, sorted(set(absent)))
+    return Figures(charts, costs, changes, stability, captures, stages, alignments, trainings, sorted(set(absent)))
 
 
 def _sweeps(results: Results, output: Path, absent: list[str]) -> list[Drawn]:
@@ -237,3 +241,19 @@ def _stages(results: Results, folder: Path) -> list[Drawn]:
     profiles = [name for name in dict.fromkeys(results.frame["profile"]) if name]
     found = [name for name in profiles if (folder / f"stages-{name}.png").is_file()]
     return [Drawn(f"{FOLDER}/stages-{name}.png", f"Stages of the simulated bench {name}.") for name in found]
+
+
+def _alignments(results: Results, folder: Path) -> list[Drawn]:
+    """Pictures of captures that were aligned with their targets, drawn elsewhere, where they are; the first so many."""
+    done = results.frame[results.frame["state"] == DONE]
+    places = [(method, target) for method, target in zip(done["method"], done["target"], strict=True)]
+    found = [(name, *place) for place in places if (folder / (name := alignment_name(*place))).is_file()]
+    more = f" {len(found) - ALIGNMENTS_SHOWN} more are in `{FOLDER}/`." if len(found) > ALIGNMENTS_SHOWN else ""
+    return [
+        Drawn(
+            f"{FOLDER}/{name}",
+            f"{method}, {target}: the outline of the target on the capture, a dot at the target's upper left corner; "
+            f"and squares of the target and of the aligned, matched capture in turn.{more}",
+        )
+        for name, method, target in found[:ALIGNMENTS_SHOWN]
+    ]

@@ -81,7 +81,8 @@ def _leading(results: Results, condition: str, ranking: Sequence[str], among: st
     score, baseline, best = results.headline, results.layout.baseline, ranking[0]
     row = results.row(best, condition)
     value = score.interval(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
-    sentence = f"{among}: {best}, {score.title} {value}{f' {score.unit}' if score.unit else ''} over {row['n']} targets"
+    over = f"over {row['n']} target{'' if row['n'] == 1 else 's'}"
+    sentence = f"{among}: {best}, {score.title} {value}{f' {score.unit}' if score.unit else ''} {over}"
     if best == baseline:
         compared, intro = list(ranking[1:2]), "; it is the baseline, and from it the next,"
     else:

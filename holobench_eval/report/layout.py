@@ -11,8 +11,8 @@ from ..display.conditions import draws
 from ..display.profile import load_profile
 from ..study.plan import changed, displays, scored_dataset
 from ..study.stacks import planes_of
-from .tracks import CALIBRATED, CEILING, ONLINE, OPEN_LOOP
-from .wording import Wording, plain, wording
+from .tracks import CALIBRATED, CEILING, GIVEN, ONLINE, OPEN_LOOP
+from .wording import FILES, Wording, from_files, plain, wording
 
 if TYPE_CHECKING:
     from ..config import Study
@@ -59,7 +59,8 @@ class Layout:
     privileged: labels of methods that may differentiate through the bench; they are the ceiling, not competitors.
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
-    note: a paragraph that the study wants beside its tables. measure: ``picture``, ``prediction`` or ``focus``;
+    note: a paragraph that the study wants beside its tables. measure: ``picture``, ``prediction``, ``focus`` or
+    ``files`` (pictures that were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
     holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
     stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
     that is a trained network (None: benches).
@@ -89,9 +90,12 @@ class Layout:
     planes: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     stacked: frozenset[str] = frozenset()
     real: bool = False
+    values: str = ""
 
     def track(self, label: str) -> str:
         """The track that a method competes in."""
+        if self.measure == FILES:
+            return GIVEN
         if label in self.privileged:
             return CEILING
         if label in self.camera:
@@ -106,6 +110,8 @@ class Layout:
     @property
     def wording(self) -> Wording:
         """What is compared, in words."""
+        if self.measure == FILES:
+            return from_files(self.values)
         return wording(self.measure, self.holograms.partition(" (")[0], self.learned_display is not None, self.real)
 
     def published(self, label: str, condition: str) -> Mapping[str, float]:

@@ -15,8 +15,11 @@ from .results import Results
 from .scores import DOMAINS, Score
 from .statistics import PairedTest
 from .tables import DONE, MEMORY_COLUMN
+from .wording import FILES
 
 MEMORY = "memory [MiB]"
+ELSEWHERE = ("refine_", "second_")
+"""How the keys of figures begin that are told where the geometry is."""
 LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd")
 
 
@@ -56,6 +59,8 @@ def _effort(results: Results, each: str = "") -> dict[str, str]:
 
     Captures for training and those while solving stay apart: the former are taken once. each: added to the latter.
     """
+    if results.layout.measure == FILES:
+        return {}
     trained = "training_captures" in results.table
     training = {"training_captures": "captures for training", "training_seconds": "seconds of training"}
     solving = {"captures": f"captures{each}{' while solving' * trained}", "seconds": f"seconds{each}"}
@@ -171,7 +176,7 @@ def geometry(results: Results, condition: str) -> Markup:
 
 def light_and_time(results: Results, condition: str) -> Markup:
     """Captures, computing time and the figures that describe a capture and are no image metric."""
-    figures = [score for score in results.scores if not score.domain and not score.key.startswith("refine_")]
+    figures = [score for score in results.scores if not score.domain and not score.key.startswith(ELSEWHERE)]
     effort, sensor = _effort(results, " per target"), results.layout.learned_display is None
     effort |= {MEMORY_COLUMN: MEMORY} if MEMORY_COLUMN in results.table else {}
     rows = []

@@ -21,6 +21,7 @@ from .layout import Layout
 from .scores import order_scores, parse
 from .statistics import bootstrap_mean
 from .tracks import CEILING
+from .wording import FILES
 
 TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
 LEARNED_COLUMN = "learned_sha256"
@@ -67,6 +68,7 @@ def _row(record: Mapping[str, Any], identity: str, layout: Layout) -> dict[str, 
     numbers = {
         "repeat": cell.get("repeat", 0),
         **{key: record.get(key) for key in (*MEASURED_COLUMNS, MEMORY_COLUMN)},
+        **({"captures": None} if layout.measure == FILES else {}),  # how many somebody else took is not known
         **scores,
     }
     clash = set(scores) & _NOT_SCORES
@@ -177,9 +179,10 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
 def total_captures(done: pd.DataFrame) -> float:
     """Every capture behind the done cells of a row: those of the training once, and those of every target.
 
-    Repeats are averaged within a target, since only the measurement is repeated. NaN for no cells.
+    Repeats are averaged within a target, since only the measurement is repeated. NaN for no cells, and where no number
+    of captures is known.
     """
-    if done.empty:
+    if done.empty or done["captures"].isna().all():
         return float("nan")
     trained = done["training_captures"].mean() if LEARNED_COLUMN in done else 0.0
     return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())

@@ -8,12 +8,14 @@ OPEN_LOOP = "open loop"
 CALIBRATED = "calibrated"
 ONLINE = "online"
 CEILING = "ceiling"
+GIVEN = "given"
 
-TRACKS = (OPEN_LOOP, CALIBRATED, ONLINE, CEILING)
+TRACKS = (OPEN_LOOP, CALIBRATED, ONLINE, CEILING, GIVEN)
 """In the order of tables."""
 
-OFFLINE = (OPEN_LOOP, CALIBRATED)
-"""The tracks whose methods never see a capture of the scored image: their holograms are ready before it is shown."""
+OFFLINE = (OPEN_LOOP, CALIBRATED, GIVEN)
+"""The tracks whose methods never see a capture of the scored image, as far as is known: their holograms are ready
+before it is shown."""
 
 _MEANINGS = {
     OPEN_LOOP: "knows the nominal optics and takes no captures at all.",
@@ -22,6 +24,7 @@ _MEANINGS = {
     ONLINE: "sees, through the camera, captures of the very image that is scored while it solves; it spends captures "
     "on every image, and needs the camera in front of the display for as long as the display is in use.",
     CEILING: "may differentiate through the simulated bench, which no real method can, and is not ranked.",
+    GIVEN: "gave pictures alone; what it was given of the camera is not known.",
 }
 
 

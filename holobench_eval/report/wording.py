@@ -40,7 +40,8 @@ class Wording:
     is introduced; other: the same for another metric. procedure: what is done; caution: what the figures do not say;
     displays: what the displays are; floor, instead: the reference images and the heading of their column. looked_at:
     heading of the pictures; picture: what a tile of the comparison is. geometry, blur, effort: first sentences of these
-    sections. seeds: what is random.
+    sections. seeds: what is random. compared: in which values pictures are matched and blurred; domains: what the
+    domains of metrics mean.
     """
 
     scored: str = "capture"
@@ -63,6 +64,11 @@ class Wording:
         "The same targets, scored against images that no method made, through the same intensity match and metrics."
     )
     instead: str = "shown instead of a capture"
+    compared: str = "in linear light"
+    domains: str = (
+        "Linear: light intensity in [0, 1], as the sensor measures it. Amplitude: its square root. sRGB: as a monitor "
+        "would be given it; perceptual metrics are defined there."
+    )
     looked_at: str = "Captures to look at"
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
     geometry: str = (
@@ -174,6 +180,52 @@ FOCUS = replace(
         "one plane, or of all planes of a scene for a method that makes one of them."
     ),
 )
+
+
+FILES = "files"
+"""The measure of pictures that were given as files."""
+
+_COMPARED = {
+    "stored": "in the values as stored",
+    "srgb": "in linear light, for which captures and targets were decoded from sRGB",
+    "linear": "in linear light, for which targets were decoded from sRGB and captures taken as they are",
+}
+
+GIVEN = replace(
+    PICTURE,
+    best="Of the {count} methods with a capture of every target the best is",
+    only="The only method with a capture of every target",
+    procedure=(
+        "Photographs of a display and the pictures that it was to show were given as files; what made the photographs, "
+        "and what was done to them afterwards, is not known. No fiducials were photographed: the geometry comes from "
+        "the pictures themselves, each capture being aligned with its target. On the pixels of its target a capture is "
+        "matched in intensity and scored."
+    ),
+    floor="The same targets, scored against images that nobody photographed, through the same match and metrics.",
+    picture="Each capture is aligned with its target and matched in intensity",
+    geometry=(
+        '"Refined" lets each aligned capture move rigidly by at most 2 px and 0.1 degree, found by correlation and '
+        "never by maximising the score; a large difference means that the common alignment does not fit the capture."
+    ),
+    effort="What the captures cost to make is not known.",
+    seeds="Nothing is random but the speckle of the floor, which depends on the target's name alone.",
+)
+
+
+def from_files(values: str) -> Wording:
+    """The words for pictures that were given as files; values: how they were read."""
+    if values != "stored":
+        return replace(GIVEN, compared=_COMPARED[values])
+    return replace(
+        GIVEN,
+        compared=_COMPARED[values],
+        domains=(
+            "Values as stored: the numbers in the files over their full scale, without any decoding. If the pictures "
+            "are sRGB, as most are, equal differences of values are not equal differences of light, and these scores "
+            "must not stand beside those in linear light. Perceptual metrics take the values for display-encoded "
+            "pictures, as they are defined."
+        ),
+    )
 
 
 REAL = (

@@ -216,3 +216,13 @@ def test_named_lpips_weights_that_are_not_there_are_an_error(capture: Tensor, ta
         score(capture, target, lpips_weights=tmp_path)
     with pytest.raises(UserError, match="no such file"):
         score(capture, target, lpips_weights=str(tmp_path / "absent"))
+
+
+def test_stored_values_are_compared_as_they_are_and_named_so(capture: Tensor, target: Tensor) -> None:
+    found = score(capture, target, metrics=QUICK, stored=True)
+    light = score(capture, target, metrics=QUICK)
+    assert not any(domain in key for key in found for domain in ("linear", "amplitude", "srgb"))
+    assert found["psnr_stored"] == light["psnr_linear"]  # the same numbers, without a claim that they are light
+    assert found["ssim_stored_blur1"] == light["ssim_linear_blur1"]
+    assert "speckle_contrast" not in score(capture, target, refine=False, blur=(), stored=True)
+    assert direction("mofd_stored") == direction("flip_stored") == "lower"

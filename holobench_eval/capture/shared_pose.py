@@ -1,0 +1,62 @@
+"""One alignment for captures that were taken in one pose, and a capture's values on the pixels of its target."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .align import OVERHANG, Alignment
+from .warp import Warp
+
+AGREE = 1.0  # capture pixels, or target pixels where those are larger: corners further apart are another pose
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+def shared(found: Mapping[Key, Alignment]) -> tuple[Warp, frozenset[Key]] | None:
+    """One warp for those of several alignments that agree, and which these are; None where no two agree.
+
+    For captures of one size and targets of one shape. Alignments agree whose corners lie within `AGREE` of their
+    median. Each has an error of its own, by the speckle of its capture; the common corners are their mean, weighted by
+    the inverse of the variance that a correlation leaves unexplained.
+    """
+    if len(found) < 2:
+        return None
+    corners = {key: one.warp.corners() for key, one in found.items()}
+    middle = np.median(list(corners.values()), axis=0)
+    first = next(iter(found.values())).warp
+    allowed = AGREE * max(1.0, first.scale())
+    near = [key for key in found if np.linalg.norm(corners[key] - middle, axis=1).max() <= allowed]
+    if len(near) < 2:
+        return None
+    weights = [1 / max(1 - found[key].correlation ** 2, 1e-6) for key in near]
+    common = np.average([corners[key] for key in near], axis=0, weights=weights)
+    height, width = first.shape
+    ends = np.array([[0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]], dtype=np.float32)
+    homography = cv2.getPerspectiveTransform(ends, common.astype(np.float32))
+    return replace(first, homography=np.asarray(homography, dtype=np.float64)), frozenset(near)
+
+
+def sampled(capture: NDArray[np.float32], warp: Warp) -> NDArray[np.float32]:
+    """A capture ``(C, Hs, Ws)`` on the pixels of its target, ``(C, h, w)``.
+
+    Where the capture is finer than the target, each target pixel is the mean over its area, as a camera with pixels of
+    this size would have seen it; else it is interpolated (bilinear, as cubic overshoots at the edges of speckle).
+    """
+    fineness = max(1, math.ceil(warp.scale() - 0.05))
+    reach = math.ceil(OVERHANG * warp.scale()) + 1
+    padded = [np.pad(plane, reach, mode="edge") for plane in capture]
+    total = np.zeros((len(padded), *warp.shape), dtype=np.float64)
+    steps = (np.arange(fineness) + 0.5) / fineness - 0.5
+    for y in steps:
+        for x in steps:
+            offset = np.array([[1, 0, x], [0, 1, y], [0, 0, 1]])
+            across, down = replace(warp, homography=warp.homography @ offset).coordinates()
+            total += [cv2.remap(plane, across + reach, down + reach, cv2.INTER_LINEAR) for plane in padded]
+    return np.asarray(total / fineness**2, dtype=np.float32)
