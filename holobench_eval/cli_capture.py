@@ -70,7 +70,7 @@ def score(
     captures: Annotated[Path, typer.Option(help="Folder with captures, METHOD/TARGET.png.")],
     targets: Annotated[Path, typer.Option(help="Folder with targets, TARGET.png.")],
     output: Annotated[Path, typer.Option(help="Where to write the report.")],
-    values: Annotated[str, typer.Option(help="stored: compared as they are; srgb or linear: what they mean.")] = "stored",
+    values: Annotated[str, typer.Option(help="Values in the files: stored (as they are), srgb or linear.")] = "stored",
     baseline: Annotated[str | None, typer.Option(help="The method that others are tested against.")] = None,
     lpips_weights: Annotated[Path | None, typer.Option(help="File or folder of the LPIPS trunk.")] = None,
 ) -> None:

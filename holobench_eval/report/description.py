@@ -13,6 +13,7 @@ from ..study.plan import REFERENCE
 from ..study.plan import displays as conditions
 from .layout import TrainingSet
 from .results import Results
+from .section_alignment import agreement
 from .tables import DONE
 from .wording import FILES, plain
 
@@ -247,6 +248,8 @@ def rules(results: Results) -> dict[str, str]:
         if residuals
         else "No residual was recorded."
     )
+    if results.layout.real:
+        registration = f"{registration} {agreement(results)}".strip()
     refused = "; above 0.1 % a capture is refused" if results.layout.measure != "prediction" else ""
     saturation = (
         f"At most {100 * saturated.max():.3g} % of a capture's samples{refused}." if len(saturated) else "Not recorded."

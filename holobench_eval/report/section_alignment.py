@@ -43,7 +43,7 @@ def sentences(results: Results, records: Records) -> list[str]:
         )
     if none:
         told.append(f"Refused, and without a score: {_count(none)}.")
-    return [*told, *_second(results, found)]
+    return [*told, *filter(None, [agreement(results)])]
 
 
 def table_of(results: Results, records: Records) -> Markup:
@@ -93,31 +93,34 @@ def _doubled(results: Results) -> Score | None:
     return score if f"{score.key}_second" in results.frame else None
 
 
-def _second(results: Results, found: Records) -> list[str]:
-    score = _doubled(results)
-    done = [record for record in found if record["state"] == DONE]
-    if not done:
-        return []
+def agreement(results: Results) -> str:
+    """Whether the scores depend on which of two aligners is right, with a warning where they do; empty without scores.
+
+    The first one fixes circles of a fiducial grid, or features of the pictures; the second correlates blocks.
+    """
+    frame, score = results.frame, _doubled(results)
+    done = frame[(frame["state"] == DONE) & (frame["condition"] != REFERENCE)]
+    if not len(done):
+        return ""
     if score is None:
-        return ["Warning: the second aligner has no opinion of any capture."]
-    known = [record for record in done if f"{score.key}_second" in record["scores"]]
-    apart = {
-        f"{record['label']}, {record['cell']['target']}": record["scores"][f"{score.key}_second"]
-        - record["scores"][score.key]
-        for record in known
-    }
-    silent = f" It has no opinion of {_count(len(done) - len(known))}." if len(known) < len(done) else ""
+        return "Warning: the second aligner has no opinion of any capture."
+    differences = done[f"{score.key}_second"] - done[score.key]
+    names = done["method"] + ", " + done["target"].astype(str)
+    apart = {name: value for name, value in zip(names, differences, strict=True) if np.isfinite(value)}
+    silent = f" It has no opinion of {_count(len(done) - len(apart))}." if len(apart) < len(done) else ""
+    if not apart:
+        return "Warning: the second aligner has no opinion of any capture."
     most = max(apart.values(), key=abs)
     beyond = [f"{name}: {value:+.2f} dB" for name, value in apart.items() if abs(value) > AGREE]
     if not beyond:
-        return [
+        return (
             f"A second aligner, which shares no algorithm with the first, agrees within {AGREE} dB on "
-            f"{_count(len(known))}; it differs by {most:+.2f} dB at most.{silent}"
-        ]
-    return [
+            f"{_count(len(apart))}; it differs by {most:+.2f} dB at most.{silent}"
+        )
+    return (
         f"Warning: a second aligner, which shares no algorithm with the first, gives scores that differ by more than "
         f"{AGREE} dB ({'; '.join(beyond)}). These scores depend on the alignment.{silent}"
-    ]
+    )
 
 
 def _pair(scores: Mapping[str, float], score: Score) -> list[str]:
