@@ -1,23 +1,17 @@
-"""Where tasks are computed: in this process, or in several processes of this machine."""
+"""Where tasks are computed: in this process, in several of this machine, or on a cluster."""
 
 from __future__ import annotations
 
 import os
-import signal
-import threading
-import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from ..errors import UserError, suggest
+from .clusters import Address, Local, Slurm
 
 J = TypeVar("J")
 R = TypeVar("R")
-
-WORKER_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-"""Dask's own, without its MALLOC_TRIM_THRESHOLD_: that gives every freed tensor back to the system, and getting the
-next one from there doubles the time of a step."""
 
 
 class Executor(Protocol):
@@ -51,91 +45,30 @@ class Serial:
                 yield job, function(job)
 
 
-@dataclass(frozen=True)
-class Local:
-    """Jobs in worker processes of this machine (Dask). A worker that dies costs one job, after a second try."""
-
-    workers: int
-
-    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
-        """Results as they come. No more jobs are taken than there are workers."""
-        import dask
-        from distributed import Client, LocalCluster, as_completed
-
-        # A worker lost twice on the same job is the job's fault; and no worker may die because others fill the memory.
-        settings = {
-            "distributed.scheduler.allowed-failures": 1,
-            "distributed.logging.distributed": "critical",
-            "distributed.nanny.pre-spawn-environ": WORKER_ENVIRONMENT,
-        }
-        with (
-            dask.config.set(settings),
-            LocalCluster(  # type: ignore[no-untyped-call]
-                n_workers=self.workers,
-                threads_per_worker=1,
-                processes=True,
-                memory_limit=0,
-                dashboard_address=None,
-                silence_logs=50,
-            ) as cluster,
-            Client(cluster) as client,  # type: ignore[no-untyped-call]
-        ):
-            client.register_plugin(_bound_to_the_parent())
-            waiting = iter(jobs)
-            running: dict[Any, J] = {}
-            completed = as_completed()  # type: ignore[no-untyped-call]
-
-            def fill() -> None:
-                while len(running) < self.workers and (job := next(waiting, None)) is not None:
-                    future = client.submit(function, job, pure=False)
-                    running[future] = job
-                    completed.add(future)  # type: ignore[no-untyped-call]
-
-            fill()
-            for future in completed:
-                job = running.pop(future)
-                error = future.exception()
-                yield job, error if error is not None else future.result()
-                fill()
+NAMES = ("auto", "serial", "local", "slurm", "address")
 
 
-def _bound_to_the_parent() -> Any:
-    """A plugin by which every worker, a restarted one too, leaves Ctrl-C to the process that started it and dies with
-    it: a killed run must not go on training in the background."""
-    from distributed import WorkerPlugin
-
-    class BoundToParent(WorkerPlugin):
-        def setup(self, worker: object) -> None:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-            threading.Thread(target=_die_with, args=(os.getppid(),), daemon=True).start()
-
-    return BoundToParent()
-
-
-def _die_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
-
-
-NAMES = ("auto", "serial", "local")
-
-
-def executor(name: str, workers: int | None, small: bool = True) -> Executor:
+def executor(name: str, workers: int | None, small: bool = True, address: str | None = None) -> Executor:
     """The executor of a name; ``workers`` defaults to the number of processors.
 
     "auto" is local where the study's panel is small and there is more than one worker to have, else serial: a small
-    panel does not keep several threads busy, a large one fills the memory.
+    panel does not keep several threads busy, a large one fills the memory. address: of a running Dask scheduler.
     """
     if name not in NAMES:
         raise UserError(f"unknown executor '{name}'; {suggest(name, NAMES)}")
     if workers is not None and workers < 1:
         raise UserError(f"--workers should be at least 1, got {workers}")
-    if name == "serial":
-        if workers not in (None, 1):
-            raise UserError(f"--workers {workers} needs --executor local; the serial executor has one")
-        return Serial()
-    if name == "auto" and ((workers or _cores()) == 1 or (not small and workers is None)):
+    if (name == "address") != (address is not None):
+        raise UserError("--executor address and --address tcp://HOST:PORT belong together")
+    if name in ("serial", "address") and workers not in (None, 1):
+        raise UserError(f"--workers {workers} needs --executor local or slurm; {name} has its own")
+    if address is not None:
+        return Address(address)
+    if name == "slurm":
+        if workers is None:
+            raise UserError("--executor slurm needs --workers, how many SLURM jobs to start")
+        return Slurm(workers)
+    if name == "serial" or (name == "auto" and ((workers or _cores()) == 1 or (not small and workers is None))):
         return Serial()
     return Local(workers or _cores())
 

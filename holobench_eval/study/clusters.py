@@ -1,0 +1,195 @@
+"""Tasks on the workers of a Dask cluster: processes of this machine, jobs of a SLURM queue, or a running scheduler."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
+
+from ..errors import UserError
+
+J = TypeVar("J")
+R = TypeVar("R")
+
+WORKER_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
+}
+"""Dask's own, without its MALLOC_TRIM_THRESHOLD_ (that gives every freed tensor back to the system, and getting the
+next one from there doubles the time of a step), and without a look at every worker's stack a hundred times a second."""
+ANSWER = 30.0
+"""Seconds that a scheduler has to answer."""
+SETTINGS = {
+    # A worker lost twice on the same job is the job's fault.
+    "distributed.scheduler.allowed-failures": 1,
+    "distributed.logging.distributed": "critical",
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.nanny.pre-spawn-environ": WORKER_ENVIRONMENT,
+}
+
+
+@dataclass(frozen=True)
+class Local:
+    """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try."""
+
+    workers: int
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
+        """Results as they come. No more jobs are taken than there are workers."""
+        from distributed import Client, LocalCluster
+
+        with (
+            _settings(),
+            LocalCluster(  # type: ignore[no-untyped-call]
+                n_workers=self.workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=0,  # no worker may die because others fill the memory
+                dashboard_address=None,
+                silence_logs=50,
+            ) as cluster,
+            Client(cluster) as client,  # type: ignore[no-untyped-call]
+        ):
+            client.register_plugin(_bound_to_the_parent())
+            yield from _results(client, lambda: self.workers, function, jobs)
+
+
+@dataclass(frozen=True)
+class Slurm:
+    """Jobs in worker processes that a SLURM queue starts (dask-jobqueue), a worker a SLURM job.
+
+    Queue, memory, cores, walltime and what else the site wants are those of Dask's own configuration
+    (``~/.config/dask/jobqueue.yaml``, section ``jobqueue.slurm``). Records, artifacts and data lie in folders that all
+    nodes see under the same names. A worker that the queue ends costs the job it had, after a second try elsewhere.
+    """
+
+    workers: int
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
+        """Results as they come, from the first worker that the queue starts on. UserError without dask-jobqueue."""
+        try:
+            from dask_jobqueue import SLURMCluster
+        except ImportError:
+            raise UserError(
+                "the executor slurm needs dask-jobqueue: pip install -c constraints.txt 'holobench_eval[cluster]'"
+            ) from None
+        from distributed import Client
+
+        with _settings():
+            try:
+                cluster = SLURMCluster(processes=1, job_script_prologue=_exports())
+                cluster.scale(jobs=self.workers)
+            except (ValueError, TypeError) as error:  # a configuration that says too little, or what cannot be
+                raise UserError(f"the SLURM cluster: {error}; see jobqueue.slurm in Dask's configuration") from error
+            with cluster, Client(cluster) as client:  # type: ignore[no-untyped-call]
+                yield from _results(client, lambda: _there(client), function, jobs)
+
+
+@dataclass(frozen=True)
+class Address:
+    """Jobs on the workers of a Dask scheduler that runs already, which may come and go.
+
+    Each worker has one thread (``dask worker --nthreads 1``): torch's settings are those of a process. Folders are as
+    for ``Slurm``. address: such as ``tcp://host:8786``.
+    """
+
+    address: str
+
+    @cached_property
+    def workers(self) -> int:
+        """Workers that are there now. UserError: the scheduler does not answer, or has none that can be used."""
+        with self._client() as client:
+            return _there(client)
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
+        """Results as they come."""
+        with _settings(), self._client() as client:
+            yield from _results(client, lambda: _there(client), function, jobs)
+
+    @contextmanager
+    def _client(self) -> Iterator[Any]:
+        from distributed import Client
+
+        try:
+            client = Client(self.address, timeout=ANSWER)  # type: ignore[no-untyped-call]
+        except (OSError, ValueError, TimeoutError) as error:
+            raise UserError(f"no Dask scheduler answers at '{self.address}' ({type(error).__name__})") from error
+        with client:
+            workers = client.scheduler_info(n_workers=-1)["workers"]
+            several = [name for name, worker in workers.items() if worker["nthreads"] != 1]
+            if several:
+                raise UserError(f"worker {several[0]} has several threads; start workers with --nthreads 1")
+            if not workers:
+                raise UserError(f"the Dask scheduler at '{self.address}' has no workers")
+            yield client
+
+
+def _there(client: Any) -> int:
+    """Workers at this moment, at least one so that a job is always waiting for the first."""
+    return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+
+
+@contextmanager
+def _settings() -> Iterator[None]:
+    import dask
+
+    with dask.config.set(SETTINGS):
+        yield
+
+
+def _results(
+    client: Any, workers: Callable[[], int], function: Callable[[J], R], jobs: Iterable[J | None]
+) -> Iterator[tuple[J, R | Exception]]:
+    """Results as they come; as many jobs are taken as there are workers, so the scheduler never holds a whole study."""
+    from distributed import as_completed
+
+    waiting = iter(jobs)
+    running: dict[Any, J] = {}
+    completed = as_completed()  # type: ignore[no-untyped-call]
+
+    def fill() -> None:
+        while len(running) < workers() and (job := next(waiting, None)) is not None:
+            future = client.submit(function, job, pure=False)
+            running[future] = job
+            completed.add(future)  # type: ignore[no-untyped-call]
+
+    fill()
+    for future in completed:
+        job = running.pop(future)
+        error = future.exception()
+        yield job, error if error is not None else future.result()
+        fill()
+
+
+def _exports() -> list[str]:
+    """Lines of a job script that give a worker one thread."""
+    return [f"export {name}={value}" for name, value in WORKER_ENVIRONMENT.items()]
+
+
+def _bound_to_the_parent() -> Any:
+    """A plugin by which every worker, a restarted one too, leaves Ctrl-C to the process that started it and dies with
+    it: a killed run must not go on training in the background."""
+    from distributed import WorkerPlugin
+
+    class BoundToParent(WorkerPlugin):
+        def setup(self, worker: object) -> None:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            threading.Thread(target=_die_with, args=(os.getppid(),), daemon=True).start()
+
+    return BoundToParent()
+
+
+def _die_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)
