@@ -8,10 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from fake_study import write_config
+from fake_study import fake_work, write_config
 from test_executors import compute, untimed
 
 from holobench_eval.errors import UserError
+from holobench_eval.study import run as running
 from holobench_eval.study.clusters import Address, Slurm
 from holobench_eval.study.executors import Serial, executor
 
@@ -43,11 +44,12 @@ def importable(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics", "importable")
-def test_a_running_scheduler_gives_the_table_of_one_process(tmp_path: Path) -> None:
+def test_a_running_scheduler_gives_the_table_of_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from distributed import LocalCluster
 
     config = write_config(tmp_path)
     serial = compute(config, tmp_path / "serial", Serial())
+    monkeypatch.setattr(running, "step", fake_work)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         chosen = Address(cluster.scheduler_address)
         assert chosen.workers == 2
@@ -86,6 +88,7 @@ def test_a_slurm_queue_gives_the_table_of_one_process(tmp_path: Path, monkeypatc
     monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
     config = write_config(tmp_path)
     serial = compute(config, tmp_path / "serial", Serial())
+    monkeypatch.setattr(running, "step", fake_work)
     site = {"queue": "normal", "cores": 1, "memory": "2GB", "interface": None, "local-directory": str(tmp_path)}
     with dask.config.set({"jobqueue.slurm": {**dask.config.get("jobqueue.slurm", {}), **site}}):
         assert untimed(compute(config, tmp_path / "queued", Slurm(2))) == untimed(serial)
