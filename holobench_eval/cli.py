@@ -34,8 +34,11 @@ cli_capture.add_to(app)
 Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as configs/table3.yaml.")]
 Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
-Workers = Annotated[int | None, typer.Option(help="Worker processes of the local executor.")]
-Where = Annotated[str, typer.Option(help="Where to compute: serial, local (worker processes), or auto.")]
+Workers = Annotated[int | None, typer.Option(help="Worker processes of the local executor, or SLURM jobs.")]
+Where = Annotated[
+    str, typer.Option(help="Where to compute: serial, local (worker processes), slurm, address, or auto.")
+]
+Address = Annotated[str | None, typer.Option(help="Of a running Dask scheduler, for --executor address.")]
 Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
 
 
@@ -75,6 +78,7 @@ def run(
     executor: Where = "auto",
     workers: Workers = None,
     threads: Threads = None,
+    address: Address = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
     retime: Annotated[bool, typer.Option("--retime", help="Measure solving times again.")] = False,
     retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
@@ -83,7 +87,7 @@ def run(
     """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
     again = {"retry_failed": retry_failed, "retime": retime, "retrain": retrain}
     try:
-        failed = _run(config, output, executor, workers, threads, artifacts, again)
+        failed = _run(config, output, (executor, workers, address), threads, artifacts, again)
     except KeyboardInterrupt:
         print("holoeval: stopped; what was computed is kept, resume with the same command", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
@@ -93,13 +97,12 @@ def run(
 def _run(
     config: Path,
     output: Path | None,
-    executor: str,
-    workers: int | None,
+    where: tuple[str, int | None, str | None],
     threads: int | None,
     artifacts: Path,
     again: dict[str, bool],
 ) -> int:
-    """Run, report, and give the number of failed cells."""
+    """Run, report, and give the number of failed cells. where: executor, workers and address."""
     from .config import load_study
     from .study import executors, plan, progress
     from .study.artifacts import Artifacts
@@ -107,7 +110,9 @@ def _run(
     from .study.training_record import keep_training_records
 
     console, study = console_for_people(), load_study(config)
-    chosen = executors.Serial() if study.display.real else executors.executor(executor, workers, _small(study))
+    name, workers, address = where
+    wanted = executors.executor(name, workers, _small(study), address)
+    chosen = executors.Serial() if study.display.real else wanted  # there is one bench
     if study.display.real:
         _prepare_bench(study)
     folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers, study)
@@ -135,7 +140,7 @@ def _sheets(study: Study, output: Path) -> None:
     """Draw the stages of every display of a study beside its report, where it is not there as this code draws it."""
     from .display import load_profile
     from .report.sheet import drawn_from, save_sheet
-    from .study.bench import condition, workbench
+    from .study.bench import condition, simulated
     from .study.identity import digest, harness_digest
 
     for source in study.display.profiles:  # learned and real displays have no stages
@@ -145,7 +150,7 @@ def _sheets(study: Study, output: Path) -> None:
         if drawn_from(path) != wanted:
             note = load_profile(source, study.folder).scaling_note(study.display.panel)
             try:
-                save_sheet(workbench(place, study.seed), note, path, wanted)
+                save_sheet(simulated(place, study.seed), note, path, wanted)
             except Exception as error:  # a picture must not cost the report
                 print(f"holoeval: no stage sheet of {place.name}: {error}", file=sys.stderr)
 

@@ -116,6 +116,15 @@ _open: OrderedDict[object, Workbench | RealBench | CellError] = OrderedDict()
 """Those used least recently come first."""
 
 
+def simulated(shown: Condition, seed: int) -> Workbench:
+    """``workbench`` of a display that does not exist."""
+    from ..display import Workbench
+
+    opened = workbench(shown, seed)
+    assert isinstance(opened, Workbench)
+    return opened
+
+
 def forget_sessions() -> None:
     """Open the benches behind session folders anew when they are next asked for: their files may have changed."""
     for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
@@ -127,7 +136,7 @@ def _opened(shown: Condition, seed: int) -> Workbench | RealBench | CellError:
         from .real_bench import open_real
 
         return open_real(shown, shown.real, seed)
-    from ..display import Workbench, load_profile, open_bench
+    from ..display import load_profile, open_bench
     from ..display.conditions import KINDS, altered
 
     profile = load_profile(shown.source, folder=shown.folder)
@@ -137,9 +146,7 @@ def _opened(shown: Condition, seed: int) -> Workbench | RealBench | CellError:
     try:
         if shown.change is not None:
             if not KINDS[shown.change[0]].moves:
-                before = workbench(shown.nominal, seed)
-                assert isinstance(before, Workbench)
-                unmoved = before
+                unmoved = simulated(shown.nominal, seed)
             profile = altered(profile, *shown.change)
         opened = open_bench(profile, shown.spec.shape, seed, unmoved)
         _ = opened.registration  # calibrated now, so that no method's time includes it

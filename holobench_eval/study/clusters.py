@@ -78,7 +78,7 @@ class Slurm:
     def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results as they come, from the first worker that the queue starts on. UserError without dask-jobqueue."""
         try:
-            from dask_jobqueue import SLURMCluster
+            from dask_jobqueue.slurm import SLURMCluster
         except ImportError:
             raise UserError(
                 "the executor slurm needs dask-jobqueue: pip install -c constraints.txt 'holobench_eval[cluster]'"
@@ -88,7 +88,7 @@ class Slurm:
         with _settings():
             try:
                 cluster = SLURMCluster(processes=1, job_script_prologue=_exports())
-                cluster.scale(jobs=self.workers)
+                cluster.scale(jobs=self.workers)  # type: ignore[no-untyped-call]
             except (ValueError, TypeError) as error:  # a configuration that says too little, or what cannot be
                 raise UserError(f"the SLURM cluster: {error}; see jobqueue.slurm in Dask's configuration") from error
             with cluster, Client(cluster) as client:  # type: ignore[no-untyped-call]

@@ -12,7 +12,7 @@ import yaml
 
 from ..capture.convention import Convention
 from ..capture.session import Manifest, Pattern, read_manifest, write_manifest
-from ..capture.session.manifest import CAPTURES, FORMAT, PATTERNS
+from ..capture.session.manifest import CAPTURES, PATTERNS
 from ..errors import UserError, suggest
 from .bench import condition, forget_sessions, real_condition, workbench
 from .executors import Serial
@@ -80,7 +80,7 @@ def export(
         convention = load_bench_file(place.real.bench).phase
     text = digest(chosen.text)
     manifest = Manifest(
-        format=FORMAT,
+        format=1,
         session=digest([text, described, str(config), digest(folder.resolve().as_posix())]),
         study_sha256=text,
         bench_sha256=described,

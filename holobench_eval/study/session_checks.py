@@ -89,7 +89,9 @@ def drift(bench: RealBench, photographer: FolderPhotographer) -> tuple[float, fl
         if before is seen:
             continue
         pair = (np.sqrt(np.maximum(one, 0)) for one in (before, seen))
-        shift, _, _ = phase_cross_correlation(*pair, upsample_factor=FINENESS, normalization=None)
+        shift, _, _ = phase_cross_correlation(  # type: ignore[no-untyped-call]
+            *pair, upsample_factor=FINENESS, normalization=None
+        )
         moved = max(moved, float(np.hypot(*shift)))
         dimmed = max(dimmed, abs(float(seen.mean() / before.mean()) - 1))
     return moved, dimmed

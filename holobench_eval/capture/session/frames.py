@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -118,7 +119,7 @@ def _raw(path: Path, colour: int, sha256: str) -> Frame:
     return Frame(np.ascontiguousarray(raw.counts[..., colour], dtype=np.float32), raw.white, 1, sha256, linear=True)
 
 
-def _step(levels: NDArray[np.unsignedinteger]) -> int:
+def _step(levels: NDArray[Any]) -> int:
     """The largest power of two, up to 256, that divides every level."""
     joined = int(np.bitwise_or.reduce(levels, axis=None))
     return min(joined & -joined, 256) if joined else 1
