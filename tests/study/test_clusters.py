@@ -21,7 +21,8 @@ SBATCH = """\
 import pathlib, subprocess, sys
 script = pathlib.Path(sys.argv[-1])
 (pathlib.Path({log!r}) / "jobs").open("a").write(script.read_text())
-job = subprocess.Popen(["bash", str(script)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+nowhere = dict(stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+job = subprocess.Popen(["bash", str(script)], start_new_session=True, **nowhere)
 print("Submitted batch job", job.pid)
 """
 SCANCEL = """\
@@ -68,7 +69,7 @@ def test_workers_with_several_threads_are_refused() -> None:
 
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("holobench_eval.study.clusters.ANSWER", 1.0)
-    with pytest.raises(UserError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'") as caught:
+    with pytest.raises(UserError, match="no Dask scheduler answers at 'tcp:") as caught:
         _ = Address("tcp://127.0.0.1:9").workers
     assert "\n" not in str(caught.value)
 
