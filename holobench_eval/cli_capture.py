@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_output import console, write_report
+from .cli_output import console, print_headline, write_report
 
 if TYPE_CHECKING:
     from .study.session import Advance
@@ -78,7 +78,10 @@ def score(
     from .study.score_folders import score_folders
 
     weights = None if lpips_weights is None else str(lpips_weights)
-    print(score_folders(captures, targets, output, values, baseline, weights, console()))
+    report, results = score_folders(captures, targets, output, values, baseline, weights, console())
+    print_headline(console(), results)
+    print(f"{report}\n{output / 'table.csv'}\n{output / 'records.csv'}")
+    raise typer.Exit(1 if len(results.holes) else 0)
 
 
 def doctor() -> None:

@@ -27,11 +27,12 @@ def write_report(
     from .report import build_report, results_of
 
     written = build_report(study, records, output, known)
-    _print_headline(console, results_of(study, records))
+    print_headline(console, results_of(study, records))
     console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
 
 
-def _print_headline(console: Console, results: Results) -> None:
+def print_headline(console: Console, results: Results) -> None:
+    """Print the headline table of every condition."""
     from rich.markup import escape
     from rich.table import Table
 

@@ -20,6 +20,8 @@ from ..errors import UserError, suggest
 from ..report.build import write_report
 from ..report.description import Description
 from ..report.layout import Layout
+from ..report.results import Results
+from ..report.tables import records_frame
 from ..report.wording import FILES
 from . import provenance
 from .identity import harness_digest
@@ -40,8 +42,8 @@ def score_folders(
     baseline: str | None = None,
     lpips_weights: str | None = None,
     console: Console | None = None,
-) -> Path:
-    """Score ``captures/<method>/<target>.png`` against ``targets/<target>.png`` and return the path of report.md.
+) -> tuple[Path, Results]:
+    """Score ``captures/<method>/<target>.png`` against ``targets/<target>.png``: path and numbers of the report.
 
     values: see `VALUES`; baseline: the method that every other one is tested against. What was computed before in
     ``output`` for the same files by the same code is taken from there. UserError for input that cannot be used, in one
@@ -68,7 +70,9 @@ def score_folders(
         words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
         words += ["--baseline", baseline] if baseline else []
         described = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
-        return write_report(_layout(folders, scoring.domain, values, baseline), records, output, known, described)
+        layout = _layout(folders, scoring.domain, values, baseline)
+        report = write_report(layout, records, output, known, described)
+        return report, Results(records_frame(records, layout), layout)
 
 
 def _layout(folders: Folders, domain: str, values: str, baseline: str | None) -> Layout:

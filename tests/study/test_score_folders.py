@@ -57,7 +57,7 @@ def lay_out(root: Path) -> Path:
 
 
 def run(root: Path, **options: str) -> str:
-    report = score_folders(root / "captures", root / "targets", root / "out", console=quiet(), **options)
+    report, _ = score_folders(root / "captures", root / "targets", root / "out", console=quiet(), **options)
     return report.read_text()
 
 
