@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import yaml
-
 from ..capture.convention import Convention
 from ..capture.session import Manifest, Pattern, read_manifest, write_manifest
-from ..capture.session.manifest import CAPTURES, PATTERNS
+from ..capture.session.manifest import CAPTURES, PATTERNS, refuse_links_out
 from ..errors import UserError, suggest
+from ..yaml_source import load
 from .bench import condition, forget_sessions, real_condition, workbench
 from .executors import Serial
 from .identity import digest
@@ -102,6 +101,7 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     config: the study's config, where the copy in the folder cannot stand for it (see ``study_of``); say: is told
     what was found, line by line. UserError with every fault of the photographs; nothing is scored then.
     """
+    refuse_links_out(folder)
     manifest = read_manifest(folder)
     study = study_of(folder, manifest, config)
     forget_sessions()
@@ -163,7 +163,7 @@ def _reaches_out(path: Path) -> str:
         reaches = (file and not told) or key in ("path", "manifest", "lpips_weights", "weights")
         return f"names a file ({key}: {str(value)[:60]})" if reaches else ""
 
-    return walk(yaml.safe_load(path.read_text(encoding="utf-8")), "")
+    return walk(load(path).data, "")
 
 
 def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:

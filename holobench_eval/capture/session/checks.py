@@ -30,10 +30,12 @@ CLEARLY = 0.1
 class Series:
     """The photographs of a round that can be used.
 
-    white: counts from which a sample is saturated; notes: what a reader of the scores should know, a line each.
+    white: counts from which a sample is saturated; saturated: fraction of such samples by capture name; notes: what a
+    reader of the scores should know, a line each.
     """
 
     white: float
+    saturated: Mapping[str, float]
     notes: tuple[str, ...]
 
 
@@ -53,8 +55,9 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
     shown = [(pattern, facts[pattern.capture]) for pattern in patterns]
     white, notes = _white([frame for _, frame in shown])
     faults = _sizes(shown) or [*_repeated(shown), *_dark(shown)]
+    shares: dict[str, float] = {}
     for pattern, frame in shown:
-        share = frame.at_highest if frame.highest >= white else 0.0
+        shares[pattern.capture] = share = frame.at_highest if frame.highest >= white else 0.0
         if share > MOST_SATURATED and pattern.role != DARK:
             faults.append(
                 f"saturated: {share:.2%} of {pattern.capture} is at {white:g} counts, more than {MOST_SATURATED:.1%}; "
@@ -62,7 +65,7 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
             )
     if not all(frame.linear for _, frame in shown):
         notes.append("photographs are JPEG, decoded as sRGB: not linear in light, so that scores are indicative only")
-    return Series(white, tuple(notes)), _shortened(faults)
+    return Series(white, shares, tuple(notes)), _shortened(faults)
 
 
 def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:

@@ -74,7 +74,8 @@ class FolderPhotographer:
             raise Pending("this hologram has not been photographed yet")
         planes = [self.light(pattern) for pattern in taken]
         exposures = tuple(pattern.exposure for pattern in taken)
-        return Photograph(torch.from_numpy(np.stack(planes)), 0.0, exposures)
+        saturated = max(self._series[pattern.round].saturated[pattern.capture] for pattern in taken)
+        return Photograph(torch.from_numpy(np.stack(planes)), saturated, exposures)
 
     def light(self, pattern: Pattern) -> Plane:
         """A photograph ``(Hs, Ws)`` with the dark level taken off, in counts per relative exposure, float32."""

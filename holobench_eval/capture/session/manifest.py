@@ -7,6 +7,7 @@ for other people's scripts only.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -150,6 +151,16 @@ def _check(path: Path, patterns: Sequence[Pattern]) -> None:
         if pattern.capture != capture_of(*here):
             raise UserError(f"{path}: capture {pattern.capture[:60]!r} should be {capture_of(*here)!r}")
         last = here
+
+
+def refuse_links_out(folder: Path) -> None:
+    """UserError for any link in a session folder that leads out of it: nothing else is read, or written to."""
+    home = folder.resolve()
+    for place, folders, files in os.walk(home):
+        for name in (*folders, *files):
+            path = Path(place, name)
+            if path.is_symlink() and not path.resolve().is_relative_to(home):
+                raise UserError(f"{path}: leads out of the session folder; put the file itself there")
 
 
 def inside(folder: Path, name: str) -> Path:

@@ -13,6 +13,7 @@ from holobench_eval.capture.session.manifest import (
     file_of,
     inside,
     read_manifest,
+    refuse_links_out,
     write_manifest,
 )
 from holobench_eval.errors import UserError
@@ -98,6 +99,19 @@ def test_a_link_out_of_the_folder_is_refused(tmp_path):
     (session / "patterns").symlink_to(tmp_path)
     with pytest.raises(UserError, match="leads out"):
         inside(session, "patterns/round-1/0001.png")
+
+
+@pytest.mark.parametrize("name", ["report", "report/records", "captures", "study.yaml", "artifacts/one/learned.pt"])
+def test_no_link_anywhere_in_a_session_leads_out_of_it(tmp_path, name):
+    session, outside = tmp_path / "session", tmp_path / "outside"
+    outside.mkdir()
+    (session / name).parent.mkdir(parents=True)
+    (session / name).symlink_to(outside)
+    with pytest.raises(UserError, match="leads out of the session folder"):
+        refuse_links_out(session)
+    (session / name).unlink()
+    (session / "inner").symlink_to(session)
+    refuse_links_out(session)
 
 
 def test_rounds_follow_each_other():
