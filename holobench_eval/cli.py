@@ -223,7 +223,7 @@ def new_method(
     from .study.scaffold import new_method as write
 
     method, test, named = write(name, folder)
-    print(f"{method}\n{test}\nnext: pytest {test}; then name it in a config as '{named}'")
+    print(f"{method}\n{test}\nnext: pytest {test} (pip install pytest brings it); name it in a config as '{named}'")
 
 
 @app.command()

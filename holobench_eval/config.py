@@ -266,7 +266,7 @@ def _display(study: Study, document: Document) -> DisplayGrid:
     display = study.display
     named = [name for name in ("profiles", "learned", "bench") if getattr(display, name)]
     if len(named) != 1:
-        where: Keys = ("display", *named[-1:])
+        where: Keys = ("display", named[-1] if named else "profiles")
         message = "display.profiles, display.learned or display.bench: name displays in one of the three"
         raise document.error(where, message)
     if display.bench:

@@ -22,8 +22,11 @@ class LostDeviceError(UserError):
     """A device does not answer any more: no further cell of the run would get its photograph."""
 
 
-class Pending(Exception):  # noqa: N818 - nothing is wrong
-    """A photograph was asked for that somebody still has to take: the cell waits, it has not failed."""
+class Pending(BaseException):
+    """A photograph was asked for that somebody still has to take: the cell waits, it has not failed.
+
+    Not an `Exception`, so that a method which catches those cannot go on without the photograph.
+    """
 
 
 def suggest(word: str, allowed: Iterable[str]) -> str:

@@ -8,6 +8,9 @@ from typing import Protocol
 
 from torch import Tensor
 
+BLUE_BELOW, RED_ABOVE = 490e-9, 580e-9
+"""Metres."""
+
 
 @dataclass(frozen=True)
 class Photograph:
@@ -21,6 +24,11 @@ class Photograph:
     light: Tensor
     saturated: float
     exposure: tuple[float, ...]
+
+
+def plane_of(wavelength: float) -> int:
+    """The plane (red, green, blue) of a colour camera that sees light of a wavelength [m]."""
+    return 0 if wavelength > RED_ABOVE else 2 if wavelength < BLUE_BELOW else 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,11 @@ from ..optics.phase import blaze
 from .contract import Capture, DisplaySpec
 from .workbench import DARKEST_MEAN, Exposure, Shot, Shows, Simulation, check_phase, concentration, fiducial_phases
 
+MOST_SATURATED = 0.001
+"""Largest fraction of saturated samples with which a capture is used (protocol v1, step 1)."""
+BRIGHTER = 100.0
+"""Most that matched brightness may change an exposure time."""
+
 
 @dataclass(frozen=True)
 class RealBench(Shows):
@@ -134,8 +139,10 @@ class RealBench(Shows):
         if exposure == "matched":
             metering = Request(self.shown(phase), relative, "hologram", (*names, "metering"))
             metered = self.rectified(self.capture(self.photographer.photograph(metering)), target)
-            ratio = target.mean((-2, -1)) / metered.mean((-2, -1)).clamp_min(1e-3)
-            relative = float(f"{relative * float(ratio.min()):.3g}")
+            wanted = target.mean((-2, -1))
+            ratio = (wanted / metered.mean((-2, -1)).clamp_min(1e-3))[wanted > DARKEST_MEAN]
+            brighter = float(ratio.min().clamp(1 / BRIGHTER, BRIGHTER)) if len(ratio) else 1.0
+            relative = float(f"{relative * brighter:.3g}")
         request = Request(self.shown(phase), relative, "hologram", names)
         self.photographer.announce([request])
         registered = self.registration
@@ -183,7 +190,10 @@ class RealSession:
         request = self._request(phase, 0)
         self.bench.photographer.announce([request])
         self.frames += 1
-        return self.bench.capture(self.bench.photographer.photograph(request))
+        photo = self.bench.photographer.photograph(request)
+        if photo.saturated > MOST_SATURATED:
+            raise CellError(f"{photo.saturated:.2%} of a capture is saturated, more than {MOST_SATURATED:.1%}")
+        return self.bench.capture(photo)
 
     def _request(self, phase: Tensor, ahead: int) -> Request:
         shown = self.bench.shown(phase.detach())

@@ -80,7 +80,9 @@ def describe(study: Study) -> Description:
         displays = tuple(_display(profile, study.display.panel) for profile in profiles)
     else:
         displays = tuple(_learned(place, study.display.learned.profile) for place in conditions(study).values())
-    return Description(displays, study.file.name if study.file.is_absolute() else study.file.as_posix(), study.text)
+    command = "holoeval session import with the session's folder" if study.display.session else ""
+    file = study.file.name if study.file.is_absolute() else study.file.as_posix()
+    return Description(displays, file, study.text, command)
 
 
 def _learned(place: Condition, profile: str) -> Display:

@@ -189,9 +189,18 @@ def _sheets(results: Results, condition: str, targets: dict[str, Picture]) -> li
     """The targets of each page: of focal stacks every plane, a scene a page."""
     planes = results.layout.planes
     if not planes:
-        return list(chunks(_selection(results, condition, targets), TARGETS_A_PAGE))
+        pages = chunks(_selection(results, condition, targets), TARGETS_A_PAGE)
+        return [group for page in pages for group in _of_one_size(page, targets)]
     stacks = [[t for t in targets if planes[t][0] == scene] for scene in dict.fromkeys(planes[t][0] for t in targets)]
     return [sheet for stack in stacks for sheet in chunks(stack, TARGETS_A_PAGE)]
+
+
+def _of_one_size(names: Sequence[str], targets: dict[str, Picture]) -> list[list[str]]:
+    """The targets in groups that one page can show; pictures that were given as files may differ in size."""
+    groups: dict[tuple[int, ...], list[str]] = {}
+    for name in names:
+        groups.setdefault(targets[name].shape, []).append(name)
+    return list(groups.values())
 
 
 def _selection(results: Results, condition: str, targets: dict[str, Picture]) -> list[str]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from ..capture.convention import Convention
 from ..capture.session import Manifest, Pattern, read_manifest, write_manifest
-from ..capture.session.manifest import CAPTURES, PATTERNS, refuse_links_out
-from ..errors import UserError, suggest
+from ..capture.session.manifest import refuse_links_out
+from ..errors import Pending, UserError, suggest
 from ..yaml_source import load
 from .bench import condition, forget_sessions, real_condition, workbench
 from .executors import Serial
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from ..display.real import RealBench
 
 STUDY, BENCH, REPORT, ARTIFACTS, SOLUTIONS = "study.yaml", "bench.yaml", "report", "artifacts", "solutions"
+
+OWN = ("photographs", "dead_leaves", "charts")
+"""Datasets that come with the package and read no folder."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +65,17 @@ def export(
         raise UserError(f"{folder}: not empty; give a new folder, or go on there with holoeval session import {folder}")
     from ..config import load_study
 
-    chosen = _on_one_display(load_study(config), bench, display)
+    study = load_study(config)
+    chosen = _on_one_display(study, bench, display)
     if fixed_exposure and chosen.display.exposure == "matched":
         raise UserError(f"{config}: display.exposure: matched sets exposures one by one; not with --fixed-exposure")
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / STUDY, chosen.text.encode())
+    named = study.display.bench
     if bench is not None:
         shutil.copyfile(bench, folder / BENCH)
+    if named and Path(named).name == named:
+        shutil.copyfile(study.folder / named, folder / named)
     place = next(iter(displays(chosen).values()))
     spec, described = place.spec, place.digest
     if spec.bits != 8:
@@ -107,15 +114,23 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     forget_sessions()
     session_photographer.cache_clear()
     photographer = session_photographer(folder)
+    if not manifest.rounds:  # its export was interrupted
+        return _advance(study, folder, watch, threads)
+    read: dict[str, str] = {}
     for number in range(1, manifest.rounds + 1):
         faults, captures = photographer.check_round(number)
         if faults:
             raise UserError(f"round {number}: nothing was scored. " + " | ".join(faults))
-        photographer.accept(captures)
+        read |= captures
         say(f"round {number}: {len(captures)} photographs read")
     for note in photographer.notes:
         say(note)
-    notes = [study.note, *photographer.notes, *look(_bench(study), photographer, folder / REPORT, say)]
+    try:
+        found = look(_bench(study), photographer, folder / REPORT, say)
+    except Pending:
+        raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
+    photographer.accept(read)
+    notes = [study.note, *photographer.notes, *found]
     advance = _advance(study, folder, watch, threads)
     return replace(advance, study=replace(advance.study, note=" ".join(_sentence(note) for note in notes if note)))
 
@@ -136,7 +151,7 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
     path = folder / STUDY if config is None else config
     if not path.is_file() or (config is None and path.is_symlink()):
         raise UserError(f"{path}: no such file; give --study with the config that was exported")
-    if digest(path.read_text(encoding="utf-8")) != manifest.study_sha256:
+    if digest(load(path).text) != manifest.study_sha256:
         raise UserError(f"{path}: is not the config that this session was exported from")
     if config is None and (reason := _reaches_out(path)):
         raise UserError(f"{path}: {reason}; give --study with your own copy of the config")
@@ -150,8 +165,20 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
     return replace(study, display=replace(study.display, session=folder))
 
 
+def _is_beside(bench: object, folder: Path) -> bool:
+    """Whether a bench file is one of the session folder's own: data that is read, and devices that are not opened."""
+    return isinstance(bench, str) and Path(bench).name == bench and (folder / bench).is_file()
+
+
 def _reaches_out(path: Path) -> str:
-    """What a config names that is not installed here, empty for nothing."""
+    """What a config names that is not installed here, empty for nothing.
+
+    Datasets that read folders are known by not being in ``OWN``; code in files and profiles in files by their names.
+    """
+    study = load(path).data
+    display = study.get("display")
+    if isinstance(display, dict) and _is_beside(display.get("bench"), path.parent):
+        study = {**study, "display": {key: value for key, value in display.items() if key != "bench"}}
 
     def walk(value: object, key: str) -> str:
         if isinstance(value, dict):
@@ -163,7 +190,12 @@ def _reaches_out(path: Path) -> str:
         reaches = (file and not told) or key in ("path", "manifest", "lpips_weights", "weights")
         return f"names a file ({key}: {str(value)[:60]})" if reaches else ""
 
-    return walk(load(path).data, "")
+    for section in ("targets", "training"):
+        given = study.get(section)
+        dataset = given.get("dataset", "dead_leaves") if isinstance(given, dict) else "dead_leaves"
+        if dataset not in OWN:
+            return f"names the dataset '{str(dataset)[:60]}', which may read any folder"
+    return walk(study, "")
 
 
 def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:
@@ -223,23 +255,6 @@ def _advance(study: Study, folder: Path, watch: Watch, threads: int) -> Advance:
     study = replace(study, display=replace(study.display, session=folder))
     _bench(study).announce_grid()
     photographer = session_photographer(folder)
-    outcome = run(study, plan(study), folder / REPORT, Serial(), watch, threads, folder / ARTIFACTS)
+    outcome = run(study, plan(study), folder / REPORT, Serial(), watch, threads, folder / ARTIFACTS, retry_failed=True)
     patterns = photographer.write_round() if photographer.wanted else []
-    if patterns:
-        _write_note(folder, patterns)
     return Advance(study, tuple(patterns), outcome)
-
-
-def _write_note(folder: Path, patterns: list[Pattern]) -> None:
-    """What to do with the round, in words, beside its pictures."""
-    number = patterns[0].round
-    text = f"""Round {number}: {len(patterns)} patterns.
-
-1. Show the pictures of {PATTERNS}/round-{number} in the order of order.csv, gray level for gray level, one panel pixel
-   a picture pixel. Light each with the laser of its wavelength; block the laser for role 'dark'.
-2. Photograph each after the panel has settled, with gamma, gain control, white balance and denoising off, and the
-   exposure times its relative_exposure. Take the session's own exposure so that no photograph of a hologram saturates.
-3. Save each under the name in 'save_photograph_as' ({CAPTURES}/round-{number}/NNNN.png; 16-bit PNG or TIFF, or RAW).
-4. holoeval session import {folder.name}
-"""
-    write_atomically(folder / PATTERNS / f"round-{number}" / "README.txt", text.encode())

@@ -14,8 +14,8 @@ from skimage.registration import phase_cross_correlation
 
 from ..capture.grid import fiducial
 from ..capture.grid_picture import grid_picture
-from ..capture.session.checks import check_order
-from ..capture.session.manifest import HOLOGRAM, REPEAT, Pattern, inside
+from ..capture.session.checks import check_order, thumbnail
+from ..capture.session.manifest import DARK, REPEAT, Pattern, inside
 from ..errors import CellError, UserError
 from ..optics.phase import blaze
 from .store import write_atomically
@@ -105,11 +105,11 @@ def misplaced(bench: RealBench, photographer: FolderPhotographer) -> list[str]:
         patterns = manifest.of_round(number)
         seen, wanted = {}, {}
         for pattern in patterns:
-            if pattern.role == HOLOGRAM:
-                seen[pattern.capture] = _rectified(bench, photographer, pattern)
+            if pattern.role != DARK:
+                seen[pattern.capture] = thumbnail(_rectified(bench, photographer, pattern))
                 phase = manifest.phase.phase(_levels(photographer.folder, pattern)) - carrier
                 field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
-                wanted[pattern.capture] = bench.spec.region.crop(field.abs().square()).numpy()
+                wanted[pattern.capture] = thumbnail(bench.spec.region.crop(field.abs().square()).numpy())
         faults += check_order(patterns, seen, wanted)
     return faults
 

@@ -10,9 +10,10 @@ from typing import Any
 from .. import __version__, registry
 from ..display.effects import effects
 from ..display.estimates import joined
+from ..display.real import RealBench
 from ..display.training import TrainingBench, TrainingImage
 from ..display.truth import truth
-from ..display.workbench import Source, Workbench
+from ..display.workbench import Workbench
 from ..errors import CellError, LostDeviceError, Pending
 from .artifacts import Artifacts
 from .bench import workbench
@@ -82,7 +83,7 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
     artifacts.write(needed, state, facts | diagnosis(method, state, place))
 
 
-def diagnosis(method: object, state: Mapping[str, Any], place: Source) -> dict[str, Any]:
+def diagnosis(method: object, state: Mapping[str, Any], place: Workbench | RealBench) -> dict[str, Any]:
     """What a method says of the display it learned, beside the truth, for methods that say something.
 
     estimates: see ``display.estimates.joined``; missing: effects of the bench that the form of the method's model has
@@ -93,9 +94,9 @@ def diagnosis(method: object, state: Mapping[str, Any], place: Source) -> dict[s
     found: dict[str, Any] = {}
     try:
         if estimates is not None:
-            known = truth(place.bench) if isinstance(place, Workbench) else ()
+            known = () if isinstance(place, RealBench) else truth(place.bench)
             found["estimates"] = joined(estimates(state, place.spec), known)
-        if form is not None and isinstance(place, Workbench):
+        if form is not None and not isinstance(place, RealBench):
             found["missing"] = [one.text for one in effects(place.bench.profile) if one.name not in form]
     except Exception as error:  # must not cost what was learned
         found["diagnosis_failed"] = " ".join(f"{type(error).__name__}: {error}".split())[:300]

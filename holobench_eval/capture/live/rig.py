@@ -15,14 +15,13 @@ from torch import Tensor
 from ...errors import CellError, LostDeviceError, UserError
 from ..convention import Convention
 from ..devices import Camera, DeviceError, Slm
-from ..photograph import Photograph, Request
+from ..photograph import Photograph, Request, plane_of
 from .exposure import Dark, auto_exposure, averaged, combined, dark_frames, dark_level
 from .gates import Gate, full_turn, linearity, phase_sign
 from .laser import Laser
 from .settings import Procedure
 from .settle import PATIENCE, Toggle, settle_time
 
-BLUE_BELOW, RED_ABOVE = 490e-9, 580e-9  # metres
 DARK_SPAN = 1 / 8, 2.0  # of the exposures in use: between these, dark counts are measured, beyond extrapolated
 TRIES = 2  # of every photograph, since drivers drop a frame now and then
 
@@ -104,8 +103,10 @@ class Rig:
         """Lasers off, devices given back."""
         with suppress(DeviceError):  # the devices have to be given back all the same
             self.laser.close()
-        self.slm.close()
-        self.camera.close()
+        try:
+            self.slm.close()
+        finally:
+            self.camera.close()
 
     def _prepare(self, letter: Request, say: Callable[[str], None]) -> Prepared:
         exposures = tuple(self._exposure(letter, channel) for channel in range(len(self.planes)))
@@ -200,13 +201,6 @@ class Rig:
         if self.prepared is None:
             raise UserError("the bench takes no photographs before it has been prepared and has passed its gates")
         return self.prepared
-
-
-def plane_of(wavelength: float) -> int:
-    """The plane (red 0, green 1, blue 2) of a colour camera that sees a wavelength [m] best."""
-    if wavelength < BLUE_BELOW:
-        return 2
-    return 0 if wavelength > RED_ABOVE else 1
 
 
 def _patiently(take: Callable[[], Photograph]) -> Photograph:

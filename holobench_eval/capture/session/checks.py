@@ -16,6 +16,9 @@ from .manifest import DARK, HOLOGRAM, Pattern
 DEPTHS = (8, 10, 12, 14, 16)
 MOST_SATURATED = 0.001
 """Fraction of saturated samples with which a photograph is scored (protocol v1, step 1)."""
+DIM = 0.4
+"""Of the camera's range: a series whose brightest sample stays below is told to be exposed too short."""
+EIGHT_BITS = 255.0
 BRIGHTEST_DARK = 0.2
 """Of the mean of the other photographs: a dark frame as bright as this was taken with the laser on."""
 SHOWN = 5
@@ -53,8 +56,8 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
     facts: by the name of a pattern's capture, complete.
     """
     shown = [(pattern, facts[pattern.capture]) for pattern in patterns]
+    faults = _kinds(shown) or _sizes(shown) or [*_repeated(shown), *_dark(shown)]
     white, notes = _white([frame for _, frame in shown])
-    faults = _sizes(shown) or [*_repeated(shown), *_dark(shown)]
     shares: dict[str, float] = {}
     for pattern, frame in shown:
         shares[pattern.capture] = share = frame.at_highest if frame.highest >= white else 0.0
@@ -63,23 +66,46 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
                 f"saturated: {share:.2%} of {pattern.capture} is at {white:g} counts, more than {MOST_SATURATED:.1%}; "
                 "shorten the session's exposure and photograph all patterns again"
             )
+    highest = max(frame.highest for pattern, frame in shown if pattern.role != DARK)
+    if highest < DIM * white:
+        notes.append(
+            f"the brightest photograph uses {highest / white:.0%} of the camera's {white:g} counts: expose longer, "
+            "since noise and rounding weigh more than they need"
+        )
+    if white <= EIGHT_BITS:
+        notes.append("photographs have 8 bits or fewer: what is dark is rounded, which can change a ranking")
     if not all(frame.linear for _, frame in shown):
         notes.append("photographs are JPEG, decoded as sRGB: not linear in light, so that scores are indicative only")
     return Series(white, shares, tuple(notes)), _shortened(faults)
 
 
 def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:
-    """Counts of a saturated sample: of the fewest bits that hold every photograph, wherever in 16 they lie."""
+    """Counts of a saturated sample: of the fewest bits that hold every photograph, wherever in 16 they lie.
+
+    Or less, where several photographs share a brightest count that many of their samples have: a camera, or what came
+    after it, that clips before the last level.
+    """
     highest = max(frame.highest for frame in frames)
-    top, step = frames[0].top, min(frame.step for frame in frames)
+    top, step = frames[0].top, min((frame.step for frame in frames if frame.step), default=1)
     if top not in (255.0, 65535.0):
         return top, []
+    clipped = [frame for frame in frames if frame.highest == highest]
+    if len(clipped) > 1 and max(frame.at_highest for frame in clipped) > MOST_SATURATED:
+        return highest, []
     if top == 65535.0 and step >= 4:
         bits = 16 - int(np.log2(step))
         return top - step + 1, [f"photographs have {bits} bits at the upper end of 16: steps of {step} counts"]
     bits = next(depth for depth in DEPTHS if highest <= 2**depth - 1)
     notes = [f"photographs have {bits} bits at the lower end of 16"] if top == 65535.0 and bits < 16 else []
     return float(2**bits - 1), notes
+
+
+def _kinds(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
+    """Photographs saved in another way than most: their counts cannot be compared."""
+    kinds = [(frame.top, frame.linear) for _, frame in shown]
+    usual = max(set(kinds), key=kinds.count)
+    odd = [pattern.capture for (pattern, _), kind in zip(shown, kinds, strict=True) if kind != usual]
+    return _told(odd, "another kind of file: {}; save all photographs with the same depth and format")
 
 
 def _sizes(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
@@ -91,16 +117,18 @@ def _sizes(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
 
 
 def _repeated(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
-    """Files with the same bytes: noise alone makes two photographs differ."""
+    """Photographs with the same counts: noise alone makes two differ. Dark frames may have none at all."""
     faults, first = [], dict[str, Pattern]()
     for pattern, frame in shown:
-        before = first.setdefault(frame.sha256, pattern)
+        if pattern.role == DARK and not frame.highest:
+            continue
+        before = first.setdefault(frame.content, pattern)
         if before is pattern:
             continue
         if before.number + 1 == pattern.number:
             faults.append(f"stale frame: {pattern.capture} is {before.capture} again; the camera gave an old frame")
         else:
-            faults.append(f"duplicated: {pattern.capture} and {before.capture} are the same file")
+            faults.append(f"duplicated: {pattern.capture} and {before.capture} are the same picture")
     return faults
 
 
@@ -122,36 +150,37 @@ def _dark(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
 
 
 def check_order(
-    patterns: Sequence[Pattern], seen: Mapping[str, NDArray[np.float32]], wanted: Mapping[str, NDArray[np.float32]]
+    patterns: Sequence[Pattern], seen: Mapping[str, NDArray[np.float64]], wanted: Mapping[str, NDArray[np.float64]]
 ) -> list[str]:
     """Faults: photographs that show another hologram of their round than their name says.
 
-    seen: registered photographs ``(h, w)`` by name; wanted: what the nominal optics predict for each. Holograms of one
-    picture look alike whoever made them, so this finds photographs of another *picture*.
+    seen, wanted: ``thumbnail`` of the registered photograph, and of what the nominal optics predict, by capture name.
+    Holograms of one picture look alike whoever made them, and so do all of the fiducial grid: this finds photographs of
+    another *picture*.
     """
-    holograms = [pattern for pattern in patterns if pattern.role == HOLOGRAM and pattern.capture in seen]
+    known = [pattern for pattern in patterns if pattern.capture in seen]
     faults = []
-    for colour in sorted({pattern.colour for pattern in holograms}):
-        same = [pattern for pattern in holograms if pattern.colour == colour]
-        expected, found = (_normalised([pictures[one.capture] for one in same]) for pictures in (wanted, seen))
+    for colour in sorted({pattern.colour for pattern in known}):
+        same = [pattern for pattern in known if pattern.colour == colour]
+        expected, found = (np.stack([rows[one.capture] for one in same]) for rows in (wanted, seen))
         likeness = expected @ found.T
+        grids = np.array([pattern.role != HOLOGRAM for pattern in same])
         for index, pattern in enumerate(same):
-            best = int(likeness[:, index].argmax())
-            if likeness[best, index] > likeness[index, index] + CLEARLY:
+            alike = likeness[:, index]
+            own = alike[grids].max() if grids[index] else alike[index]
+            best = int(np.where(grids, -np.inf, alike).argmax()) if grids[index] else int(alike.argmax())
+            if alike[best] > own + CLEARLY:
                 faults.append(f"wrong order: {pattern.capture} shows pattern {same[best].number:04d}")
     return _shortened(faults)
 
 
-def _normalised(pictures: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:
-    """Small pictures of square-root light as rows of zero mean and length one."""
-    rows = []
-    for picture in pictures:
-        shrink = max(1.0, max(picture.shape) / THUMBNAIL)
-        size = (max(1, round(picture.shape[1] / shrink)), max(1, round(picture.shape[0] / shrink)))
-        small = cv2.resize(np.sqrt(np.maximum(picture, 0)), size, interpolation=cv2.INTER_AREA)
-        row = np.asarray(small, dtype=np.float64).ravel() - float(small.mean())
-        rows.append(row / max(float(np.linalg.norm(row)), 1e-12))
-    return np.stack(rows)
+def thumbnail(picture: NDArray[np.float32]) -> NDArray[np.float64]:
+    """A small picture of square-root light as a row of zero mean and length one."""
+    shrink = max(1.0, max(picture.shape) / THUMBNAIL)
+    size = (max(1, round(picture.shape[1] / shrink)), max(1, round(picture.shape[0] / shrink)))
+    small = cv2.resize(np.sqrt(np.maximum(picture, 0)), size, interpolation=cv2.INTER_AREA)
+    row = np.asarray(small, dtype=np.float64).ravel() - float(small.mean())
+    return np.asarray(row / max(float(np.linalg.norm(row)), 1e-12))
 
 
 def _told(names: Sequence[str], line: str) -> list[str]:

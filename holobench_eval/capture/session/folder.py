@@ -17,12 +17,14 @@ from ...study.identity import digest
 from ...study.images import write_png
 from ...study.store import write_atomically
 from ..convention import Levels
-from ..photograph import Photograph, Request
+from ..photograph import Photograph, Request, plane_of
 from .checks import Series, check_present, check_series
 from .frames import Facts, Plane, facts, find, read_frame
 from .manifest import (
+    CAPTURES,
     DARK,
     FIDUCIAL,
+    PATTERNS,
     REPEAT,
     Manifest,
     Pattern,
@@ -34,15 +36,12 @@ from .manifest import (
 )
 from .order import Showing, ordered
 
-RED, BLUE = 580e-9, 490e-9
-"""Wavelengths [m] beyond which light belongs to the red and to the blue channel of a colour camera."""
-
 
 class FolderPhotographer:
     """Photographs that people take with their own software.
 
     What is asked for and not there is noted in ``wanted``; ``write_round`` writes the patterns for it. The dark level
-    is the mean of a round's dark frames, pixel by pixel. ``series`` of a round is known once its photographs were
+    comes from a round's dark frames, pixel by pixel. ``series`` of a round is known once its photographs were
     checked.
     """
 
@@ -52,7 +51,7 @@ class FolderPhotographer:
         self.wanted: dict[str, Request] = {}
         self.repeated: Request | None = None
         self._series: dict[int, Series] = {}
-        self._dark: dict[tuple[int, int], Plane] = {}
+        self._dark: dict[tuple[int, int], tuple[Plane, Plane]] = {}
         self._known = {(one.key, one.colour): one for one in self.manifest.patterns}
 
     def announce(self, requests: Sequence[Request]) -> None:
@@ -79,33 +78,32 @@ class FolderPhotographer:
 
     def light(self, pattern: Pattern) -> Plane:
         """A photograph ``(Hs, Ws)`` with the dark level taken off, in counts per relative exposure, float32."""
-        frame = self._frame(pattern)
-        place = (pattern.round, pattern.colour)
-        if place not in self._dark:
-            dark = [
-                self._frame(one)
-                for one in self.manifest.of_round(pattern.round)
-                if one.role == DARK and one.colour == pattern.colour
-            ]
-            self._dark[place] = np.mean(dark, axis=0, dtype=np.float32)
-        return np.asarray((frame - self._dark[place]) / np.float32(pattern.exposure))
+        bias, rate = self._dark_of(pattern.round, pattern.colour)
+        dark = bias + rate * np.float32(pattern.exposure)
+        return np.asarray((self._frame(pattern) - dark) / np.float32(pattern.exposure))
+
+    def _dark_of(self, round_: int, colour: int) -> tuple[Plane, Plane]:
+        """Counts without light, and by how much they grow with the relative exposure, sample by sample."""
+        if (round_, colour) not in self._dark:
+            frames: dict[float, list[Plane]] = {}
+            for one in self.manifest.of_round(round_):
+                if one.role == DARK and one.colour == colour:
+                    frames.setdefault(one.exposure, []).append(self._frame(one))
+            short, long = min(frames), max(frames)
+            low, high = (np.mean(frames[exposure], axis=0, dtype=np.float32) for exposure in (short, long))
+            rate = (high - low) / np.float32(long - short) if long > short else np.zeros_like(low)
+            self._dark[round_, colour] = low - rate * np.float32(short), rate
+        return self._dark[round_, colour]
 
     def _frame(self, pattern: Pattern) -> Plane:
         path = find(self.folder, pattern.capture)
         known = (self.manifest.photographed or {}).get(pattern.capture)
         if path is None:
             raise CellError(f"{pattern.capture}: the photograph is gone")
-        frame = read_frame(path, self._channel(pattern.colour))
+        frame = read_frame(path, plane_of(self.manifest.wavelengths[pattern.colour]))
         if known is not None and frame.sha256 != known:
             raise CellError(f"{path}: has changed since its round was read; a session is one series of photographs")
         return frame.counts
-
-    def _channel(self, colour: int) -> int:
-        """The channel of a colour camera that sees a wavelength."""
-        if len(self.manifest.wavelengths) == 3:
-            return colour
-        wavelength = self.manifest.wavelengths[colour]
-        return 0 if wavelength > RED else 2 if wavelength < BLUE else 1
 
     def check_round(self, number: int) -> tuple[list[str], Mapping[str, str]]:
         """Read every photograph of a round. Faults, a line each, and the sha256 of the files by capture name."""
@@ -118,7 +116,7 @@ class FolderPhotographer:
         for pattern in patterns:
             path = found[pattern.capture]
             assert path is not None
-            known[pattern.capture] = facts(read_frame(path, self._channel(pattern.colour)))
+            known[pattern.capture] = facts(read_frame(path, plane_of(self.manifest.wavelengths[pattern.colour])))
         before = self.manifest.photographed or {}
         changed = [name for name, one in known.items() if before.get(name, one.sha256) != one.sha256]
         if changed:
@@ -127,6 +125,12 @@ class FolderPhotographer:
                 "session: one is one series of photographs"
             )
         series, faults = check_series(patterns, known)
+        owners = {sha256: name for name, sha256 in before.items()}
+        faults += [
+            f"duplicated: {name} is {owners[one.sha256]} of an earlier round"
+            for name, one in known.items()
+            if owners.get(one.sha256, name) != name
+        ]
         if not faults:
             self._series[number] = series
         return faults, {name: one.sha256 for name, one in known.items()}
@@ -145,16 +149,21 @@ class FolderPhotographer:
         """Write the patterns of everything that is wanted, and ``order.csv``; those of the new round."""
         assert self.repeated is not None
         number = self.manifest.rounds + 1
-        showings = ordered(list(self.wanted.values()), self.repeated, f"{self.manifest.session} {number}")
+        wanted = list(self.wanted.values())
+        exposures = [1.0, *(self._exposure(request) for request in wanted)]
+        showings = ordered(wanted, self.repeated, f"{self.manifest.session} {number}", exposures)
         patterns: list[Pattern] = []
         for showing in showings:
             patterns += self._written(showing, number, len(patterns))
+        place = self.folder / Path(patterns[0].file).parent
+        _write_order(place / "order.csv", patterns, self.manifest.wavelengths)
+        write_atomically(place / "README.txt", _readme(number, len(patterns)).encode())
+        (inside(self.folder, patterns[0].capture).parent).mkdir(parents=True, exist_ok=True)
+        # last, so that a round that the manifest has is whole
         self.manifest = replace(self.manifest, patterns=(*self.manifest.patterns, *patterns))
         write_manifest(self.folder, self.manifest)
         self._known |= {(one.key, one.colour): one for one in patterns}
         self.wanted.clear()
-        (inside(self.folder, patterns[0].capture).parent).mkdir(parents=True, exist_ok=True)
-        _write_order(self.folder / Path(patterns[0].file).parent / "order.csv", patterns, self.manifest.wavelengths)
         return patterns
 
     def _written(self, showing: Showing, round_: int, before: int) -> list[Pattern]:
@@ -164,8 +173,9 @@ class FolderPhotographer:
             levels: Levels = np.zeros((len(colours), *manifest.panel), dtype=np.uint8)
         else:
             levels = manifest.phase.levels(request.phase)
-        exposure = 1.0 if request is None or manifest.fixed_exposure else request.relative_exposure
-        key = self._key(request) if request and showing.role != REPEAT else digest([showing.role, round_, showing.copy])
+        exposure = showing.exposure if request is None else self._exposure(request)
+        counted = digest([showing.role, round_, showing.copy, showing.exposure])
+        key = self._key(request) if request and showing.role != REPEAT else counted
         patterns = []
         for colour in colours:
             number = before + colour + 1
@@ -186,12 +196,21 @@ class FolderPhotographer:
             )
         return patterns
 
+    def _exposure(self, request: Request) -> float:
+        return 1.0 if self.manifest.fixed_exposure else request.relative_exposure
+
     def _key(self, request: Request) -> str:
-        """What a photograph is kept by: what is shown, how long it is exposed, and what for."""
+        """What a photograph is kept by: what is shown, how long it is exposed, and what for.
+
+        The fiducial grid's holograms by their number alone: made again on another machine they may differ in a level.
+        """
+        if request.role == FIDUCIAL:
+            return digest([request.role, [str(name) for name in request.names]])
         levels = self.manifest.phase.levels(request.phase)
         shown = hashlib.sha256(levels.tobytes()).hexdigest()
-        exposure = 1.0 if self.manifest.fixed_exposure else request.relative_exposure
-        return digest([shown, list(levels.shape), exposure, request.role, [str(name) for name in request.names]])
+        return digest(
+            [shown, list(levels.shape), self._exposure(request), request.role, [str(name) for name in request.names]]
+        )
 
 
 def _write_order(path: Path, patterns: Sequence[Pattern], wavelengths: Sequence[float]) -> None:
@@ -205,3 +224,17 @@ def _write_order(path: Path, patterns: Sequence[Pattern], wavelengths: Sequence[
         row = [one.number, one.file, f"{one.capture}.png", one.role, wavelength, f"{one.exposure:g}", laser]
         writer.writerow(row)
     write_atomically(path, text.getvalue().encode())
+
+
+def _readme(number: int, patterns: int) -> str:
+    """What to do with a round, in words."""
+    return f"""Round {number}: {patterns} patterns.
+
+1. Show the pictures of {PATTERNS}/round-{number} in the order of order.csv, gray level for gray level, one panel pixel
+   a picture pixel. Light each with the laser of its wavelength; block the laser for role 'dark'.
+2. Photograph each after the panel has settled, with gamma, gain control, white balance and denoising off, and the
+   session's own exposure time times relative_exposure. Choose that time once, so that no hologram saturates.
+3. Save each under the name in 'save_photograph_as' ({CAPTURES}/round-{number}/NNNN.png; 8- or 16-bit PNG or TIFF, or
+   the camera's RAW; the same kind for all).
+4. holoeval session import with the folder of manifest.json
+"""

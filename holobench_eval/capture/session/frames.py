@@ -19,6 +19,8 @@ from .manifest import SUFFIXES, inside
 
 PIXELS = 200_000_000
 """Most pixels of a photograph; more would be the bomb of a hostile file."""
+LARGEST = 1 << 30
+"""Bytes of a file."""
 LOSSY = (".jpg", ".jpeg")
 PLAIN = (".png", ".tif", ".tiff")
 
@@ -30,8 +32,8 @@ class Frame:
     """A photograph of one colour.
 
     counts: ``(Hs, Ws)`` float32; top: the largest count that the file's format can hold, or the sensor's white level
-    where a RAW file tells it; step: all counts are multiples of it (16 for 12 bits at the upper end of 16); sha256: of
-    the file; linear: whether the counts are proportional to light (a JPEG's were decoded from sRGB).
+    where a RAW file tells it; step: all counts are multiples of it (16 for 12 bits at the upper end of 16; 0: dark);
+    sha256: of the file; linear: whether the counts are proportional to light (a JPEG's were decoded from sRGB).
     """
 
     counts: Plane
@@ -50,7 +52,8 @@ class Frame:
 class Facts:
     """What is kept of a photograph while a series is checked: see ``Frame``.
 
-    mean, highest: of its counts; at_highest: the fraction of samples with that count, or with ``top`` and above.
+    mean, highest: of its counts; at_highest: the fraction of samples with that count, or with ``top`` and above;
+    content: sha256 of the counts, which a time stamp in the file does not change.
     """
 
     shape: tuple[int, int]
@@ -60,6 +63,7 @@ class Facts:
     top: float
     step: int
     sha256: str
+    content: str
     linear: bool
 
 
@@ -68,7 +72,8 @@ def facts(frame: Frame) -> Facts:
     highest = min(float(frame.counts.max()), frame.top)
     share = float((frame.counts >= highest).mean())
     mean = float(frame.counts.mean(dtype=np.float64))
-    return Facts(frame.shape, mean, highest, share, frame.top, frame.step, frame.sha256, frame.linear)
+    content = hashlib.sha256(np.ascontiguousarray(frame.counts)).hexdigest()
+    return Facts(frame.shape, mean, highest, share, frame.top, frame.step, frame.sha256, content, frame.linear)
 
 
 def find(folder: Path, capture: str) -> Path | None:
@@ -87,6 +92,8 @@ def _endings(path: Path) -> list[Path]:
 
 def read_frame(path: Path, colour: int) -> Frame:
     """A photograph; of a colour camera's three channels the one of index ``colour``. UserError for a bad file."""
+    if path.stat().st_size > LARGEST:
+        raise UserError(f"{path}: larger than {LARGEST >> 20} MiB, no photograph")
     content = path.read_bytes()
     sha256 = hashlib.sha256(content).hexdigest()
     if path.suffix.lower() not in (*PLAIN, *LOSSY):
@@ -120,6 +127,6 @@ def _raw(path: Path, colour: int, sha256: str) -> Frame:
 
 
 def _step(levels: NDArray[Any]) -> int:
-    """The largest power of two, up to 256, that divides every level."""
+    """The largest power of two, up to 256, that divides every level; 0 where there is no light at all."""
     joined = int(np.bitwise_or.reduce(levels, axis=None))
-    return min(joined & -joined, 256) if joined else 1
+    return min(joined & -joined, 256)

@@ -15,22 +15,24 @@ BETWEEN_REPEATS = 24
 
 @dataclass(frozen=True)
 class Showing:
-    """A request at its place in a round. request: None for a dark frame."""
+    """A request at its place in a round. request: None for a dark frame; exposure: of that, relative."""
 
     role: str
     request: Request | None
     copy: int = 0
+    exposure: float = 1.0
 
 
-def ordered(requests: Sequence[Request], repeated: Request, seed: str) -> Iterator[Showing]:
+def ordered(requests: Sequence[Request], repeated: Request, seed: str, exposures: Sequence[float]) -> Iterator[Showing]:
     """The showings of a round.
 
-    A dark frame first and last; then the fiducial holograms; then everything else in a random order that ``seed``
-    names, since a slow drift must not favour the methods that are shown first; and one hologram of the fiducial grid,
-    ``repeated``, at the beginning, every so often, and at the end.
+    Dark frames first and last, at the shortest and at the longest of the round's relative ``exposures``, since stray
+    light and dark current grow with the time and an offset does not; then the fiducial holograms; then everything else
+    in a random order that ``seed`` names, since a slow drift must not favour the methods that are shown first; and one
+    hologram of the fiducial grid, ``repeated``, at the beginning, every so often, and at the end.
     """
-    copies = iter(range(1_000_000))
-    yield Showing(DARK, None, 0)
+    copies, spread = iter(range(1_000_000)), sorted({min(exposures), max(exposures)})
+    yield from (Showing(DARK, None, 0, exposure) for exposure in spread)
     yield Showing(REPEAT, repeated, next(copies))
     yield from (Showing(FIDUCIAL, request) for request in requests if request.role == FIDUCIAL)
     mixed = [request for request in requests if request.role == HOLOGRAM]
@@ -40,4 +42,4 @@ def ordered(requests: Sequence[Request], repeated: Request, seed: str) -> Iterat
             yield Showing(REPEAT, repeated, next(copies))
         yield Showing(HOLOGRAM, request)
     yield Showing(REPEAT, repeated, next(copies))
-    yield Showing(DARK, None, 1)
+    yield from (Showing(DARK, None, 1, exposure) for exposure in spread)

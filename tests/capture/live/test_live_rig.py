@@ -5,9 +5,9 @@ from simulated import GREEN, Scene, SimulatedCamera, SimulatedSlm, bench, letter
 
 from holobench_eval.capture.convention import Convention
 from holobench_eval.capture.live.laser import SteadyLaser
-from holobench_eval.capture.live.rig import Rig, plane_of
+from holobench_eval.capture.live.rig import Rig
 from holobench_eval.capture.live.settings import Procedure
-from holobench_eval.capture.photograph import Request
+from holobench_eval.capture.photograph import Request, plane_of
 from holobench_eval.errors import CellError, LostDeviceError, UserError
 
 FAST = Procedure(average=1, dark=2)
