@@ -68,7 +68,7 @@ REFUSED = [
         'learned: {method: "trained.py:Gain", profile: ideal, params: {round: 1}}',
         "3:73: method 'trained.py:Gain' has no",
     ),
-    ('learned: {method: "trained.py:Gain", profile: ideal}, profiles: [ideal]', "3:20: display.profiles, display.learned or"),
+    ('learned: {method: "trained.py:Gain", profile: ideal}, profiles: [ideal]', "3:20: display.profiles, "),
 ]
 
 

@@ -1,6 +1,7 @@
 """A study through a session folder: files out, photographs in, the scores of the direct run."""
 
 import csv
+import io
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from photographing import Lab
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 from typer.testing import CliRunner
 
 from holobench_eval.capture.session import read_manifest
@@ -242,3 +245,76 @@ def test_methods_that_learn_and_methods_with_a_camera_go_round_by_round_to_the_d
         assert ours.loc[row, "psnr_linear"] == pytest.approx(direct.loc[row, "psnr_linear"], abs=0.3)
         assert ours.loc[row, "captures"] == direct.loc[row, "captures"]
         assert ours.loc[row, "training_captures"] == direct.loc[row, "training_captures"]
+
+
+def test_photographs_in_the_wrong_order_can_be_put_right(photographed):
+    first, second = captures(photographed, "fiducial")[0], captures(photographed, "hologram")[0]
+    contents = first.read_bytes(), second.read_bytes()
+    for path, content in zip((first, second), reversed(contents), strict=True):
+        path.write_bytes(content)
+    assert "wrong order" in wrong(photographed)
+    for path, content in zip((first, second), contents, strict=True):
+        path.write_bytes(content)
+    assert "table.csv" in run("session", "import", photographed)
+
+
+def test_photographs_of_several_kinds_are_refused(photographed):
+    odd = captures(photographed, "hologram")[0]
+    save(odd, (cv2.imread(str(odd), -1) >> 8).astype(np.uint8))
+    assert f"another kind of file: captures/round-1/{odd.stem}" in wrong(photographed)
+
+
+def test_dark_frames_without_any_count_are_dark(photographed):
+    for path in (photographed / "captures" / "round-1").glob("*.png"):
+        counts = cv2.imread(str(path), -1).astype(np.int64) - 1000
+        save(path, np.maximum(counts, 0).astype(np.uint16))
+    for path in captures(photographed, "dark"):
+        save(path, np.zeros_like(cv2.imread(str(path), -1)))
+    assert "table.csv" in run("session", "import", photographed)
+
+
+def test_a_copy_of_a_frame_with_another_time_stamp_is_still_a_copy(photographed):
+    first, second, *_ = captures(photographed, "hologram")
+    content = first.read_bytes()
+    note = PngInfo()
+    note.add_text("time", "later")
+    Image.open(io.BytesIO(content)).save(second, pnginfo=note)
+    assert "stale frame" in wrong(photographed)
+
+
+def test_an_export_that_was_interrupted_goes_on_with_import(tmp_path):
+    config, folder = tmp_path / "study.yaml", tmp_path / "bench"
+    config.write_bytes(STUDY.replace("count: 2", "count: 1").replace("\n", "\r\n").encode())
+    run("session", "export", config, folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    (folder / "manifest.json").write_text(json.dumps({**manifest, "patterns": []}))
+    assert "round 1:" in run("session", "import", folder)
+
+
+def test_a_bench_beside_the_study_travels_with_the_session(tmp_path):
+    (tmp_path / "ours.yaml").write_text(
+        "name: ours\nversion: 1\npanel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [5.2e-7], distance: 0.012, "
+        "bits: 8}\nlaser: {callable: 'evil.py:run'}\nslm: {driver: monitor, name: x, resolution: [128, 128]}\n"
+    )
+    (tmp_path / "study.yaml").write_text(
+        STUDY.replace("{profiles: [leto-mild], panel: [144, 144]}", "{bench: ours.yaml}").replace(
+            "count: 2", "count: 1"
+        )
+    )
+    run("session", "export", tmp_path / "study.yaml", tmp_path / "bench")
+    assert "none of the" in wrong(tmp_path / "bench")
+
+
+def test_a_method_cannot_go_on_without_its_photograph(tmp_path):
+    (tmp_path / "stubborn.py").write_text(
+        "from dataclasses import dataclass\nimport torch\n\n\n@dataclass(frozen=True)\nclass Stubborn:\n"
+        "    camera = True\n\n    def solve(self, target, bench):\n"
+        "        phase = torch.zeros(1, 3, *bench.spec.shape)\n"
+        "        try:\n            bench.capture(phase[0])\n        except Exception:\n            pass\n"
+        "        return phase\n"
+    )
+    config = tmp_path / "study.yaml"
+    config.write_text(STUDY.replace("  - double_phase\n", "  - stubborn.py:Stubborn\n").replace("count: 2", "count: 1"))
+    said = run("session", "export", config, tmp_path / "bench")
+    assert "round 1:" in said
+    assert len(list((tmp_path / "bench" / "report" / "solutions").glob("*.pt"))) == 1  # wirtinger's
