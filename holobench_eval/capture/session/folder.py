@@ -90,9 +90,9 @@ class FolderPhotographer:
                 if one.role == DARK and one.colour == colour:
                     frames.setdefault(one.exposure, []).append(self._frame(one))
             short, long = min(frames), max(frames)
-            low, high = (np.mean(frames[exposure], axis=0, dtype=np.float32) for exposure in (short, long))
-            rate = (high - low) / np.float32(long - short) if long > short else np.zeros_like(low)
-            self._dark[round_, colour] = low - rate * np.float32(short), rate
+            low, high = (np.asarray(np.mean(frames[exposure], axis=0), dtype=np.float32) for exposure in (short, long))
+            rate = np.asarray((high - low) / np.float32(max(long - short, 1e-9)), dtype=np.float32)
+            self._dark[round_, colour] = np.asarray(low - rate * np.float32(short), dtype=np.float32), rate
         return self._dark[round_, colour]
 
     def _frame(self, pattern: Pattern) -> Plane:

@@ -72,7 +72,7 @@ def facts(frame: Frame) -> Facts:
     highest = min(float(frame.counts.max()), frame.top)
     share = float((frame.counts >= highest).mean())
     mean = float(frame.counts.mean(dtype=np.float64))
-    content = hashlib.sha256(np.ascontiguousarray(frame.counts)).hexdigest()
+    content = hashlib.sha256(frame.counts.tobytes()).hexdigest()
     return Facts(frame.shape, mean, highest, share, frame.top, frame.step, frame.sha256, content, frame.linear)
 
 
