@@ -8,6 +8,8 @@ from typing import Protocol
 
 from torch import Tensor
 
+MOST_SATURATED = 0.001
+"""Largest fraction of saturated samples with which a capture is used (protocol v1, step 1)."""
 BLUE_BELOW, RED_ABOVE = 490e-9, 580e-9
 """Metres."""
 

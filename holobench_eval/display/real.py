@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from ..capture.grid import fiducial
-from ..capture.photograph import Photograph, Photographer, Request
+from ..capture.photograph import MOST_SATURATED, Photograph, Photographer, Request
 from ..capture.registration import Registration, register
 from ..capture.second_opinion import disagreement, second_warp
 from ..errors import CellError
@@ -19,8 +19,6 @@ from ..optics.phase import blaze
 from .contract import Capture, DisplaySpec
 from .workbench import DARKEST_MEAN, Exposure, Shot, Shows, Simulation, check_phase, concentration, fiducial_phases
 
-MOST_SATURATED = 0.001
-"""Largest fraction of saturated samples with which a capture is used (protocol v1, step 1)."""
 BRIGHTER = 100.0
 """Most that matched brightness may change an exposure time."""
 

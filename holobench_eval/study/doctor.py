@@ -16,13 +16,15 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import requires, version
 from pathlib import Path
 from typing import Any, Literal
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+
+from .installed import installed
 
 State = Literal["ok", "missing", "warning"]
 
@@ -158,7 +160,7 @@ def _required() -> list[str]:
 def _opencv() -> Iterator[Finding]:
     """The wheels of OpenCV write into one folder, so that the one installed last is the one that is used."""
     wheels = ("opencv-python-headless", "opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
-    there = {name: found for name in wheels if (found := _version(name))}
+    there = {name: found for name in wheels if (found := installed(name))}
     text = ", ".join(f"{name} {found}" for name, found in there.items())
     if list(there) == ["opencv-python-headless"]:
         yield Finding("OpenCV", "ok", text)
@@ -211,13 +213,13 @@ def _weights() -> Iterator[Finding]:
 
 def _peers() -> Iterator[Finding]:
     for name in ("odak", "torchoptics"):
-        found = _version(name)
+        found = installed(name)
         remedy = "" if found else _install("holobench_eval[peers]")
         yield Finding(f"peer {name}", "ok" if found else "missing", found or "not installed", remedy)
 
 
 def _drivers() -> Iterator[Finding]:
-    raw = _version("rawpy")
+    raw = installed("rawpy")
     remedy = "" if raw else _install("holobench_eval[raw]")
     yield Finding(
         "camera RAW files", "ok" if raw else "missing", f"rawpy {raw}" if raw else "rawpy: not installed", remedy
@@ -258,13 +260,6 @@ def _asked(code: str, seconds: float, *arguments: str) -> Any:
     except (IndexError, ValueError):
         said = (done.stderr.strip() or "without a word").splitlines()[-1][:200]
         return f"ends with {done.returncode}: {said}"
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def _install(package: str) -> str:

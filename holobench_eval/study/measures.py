@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from torch import Tensor
 
 from .. import registry
+from ..capture.photograph import MOST_SATURATED
 from ..display.real import RealBench
 from ..errors import BudgetError, CellError
 from ..metrics import floor_captures, match, score
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
     from ..display import Workbench
     from ..display.learned import LearnedBench
     from ..display.workbench import MeteredBench, Shot
-
-MOST_SATURATED = 0.001
-"""Largest fraction of saturated samples with which a capture is scored (protocol v1, step 1)."""
 
 Measure = Callable[[Cell, Condition], Record]
 Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]

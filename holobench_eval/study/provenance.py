@@ -10,12 +10,12 @@ import shlex
 import subprocess
 import sys
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import UserError
+from .installed import installed
 from .plan import Plan
 from .store import write_atomically
 from .timings import cpu_model
@@ -48,7 +48,7 @@ def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int)
         "config_sha256": text_digest(study.text),
         "profiles": {name: {"version": place.version, "sha256": place.digest} for name, place in shown.items()},
         "python": platform.python_version(),
-        "packages": {name: _version(name) for name in PACKAGES},
+        "packages": {name: installed(name) for name in PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
         "cpu": cpu_model(),
         "threads": threads,
@@ -56,14 +56,6 @@ def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int)
         "started": now(),
         "ended": None,
     }
-
-
-def _version(package: str) -> str | None:
-    """A package's version; None where it is not installed, as when another build of OpenCV takes its place."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def _revision() -> dict[str, Any]:

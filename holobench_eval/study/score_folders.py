@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from ..report.tables import records_frame
 from ..report.wording import FILES
 from . import provenance
 from .identity import harness_digest
+from .installed import installed
 from .picture_folders import Folders, read_folders
 from .progress import SECONDS_BETWEEN_LINES
 from .scored_pictures import CONDITION, Said, Scoring, geometry_digest
@@ -97,7 +97,7 @@ def _provenance(folders: Folders, values: str) -> dict[str, Any]:
         "files": files,
         "values": values,
         "python": platform.python_version(),
-        "packages": {name: _version(name) for name in provenance.PACKAGES},
+        "packages": {name: installed(name) for name in provenance.PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
         "started": provenance.now(),
         "ended": None,
@@ -110,13 +110,6 @@ def _refuse_nested(output: Path, *sources: Path) -> None:
             raise UserError(
                 f"--output {output}: lies in {source}, whose files it would mix with; expected another folder"
             )
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 @contextmanager

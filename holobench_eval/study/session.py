@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from ..capture.convention import Convention
 from ..capture.session import Manifest, Pattern, read_manifest, write_manifest
 from ..capture.session.manifest import refuse_links_out
+from ..display.bench_file import load_bench_file
 from ..errors import Pending, UserError, suggest
 from ..yaml_source import load
 from .bench import condition, forget_sessions, real_condition, workbench
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from ..config import Study
     from ..display.real import RealBench
 
-STUDY, BENCH, REPORT, ARTIFACTS, SOLUTIONS = "study.yaml", "bench.yaml", "report", "artifacts", "solutions"
+STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
 OWN = ("photographs", "dead_leaves", "charts")
 """Datasets that come with the package and read no folder."""
@@ -52,13 +53,12 @@ def export(
     threads: int,
     bench: Path | None = None,
     display: str | None = None,
-    convention: Convention | None = None,
     fixed_exposure: bool = False,
 ) -> Advance:
     """Make a session folder for a study and write its first round of patterns.
 
     bench: file of the real bench; without it ``display``, one of the study's profiles, says the nominal optics (not
-    needed where the study has one). convention: what the panel's levels mean (None: as the bench file says).
+    needed where the study has one) and the panel's levels have the default convention.
     UserError: the folder is not empty, or the study cannot be shown on one real display.
     """
     if folder.exists() and any(folder.iterdir()):
@@ -80,10 +80,7 @@ def export(
     spec, described = place.spec, place.digest
     if spec.bits != 8:
         raise UserError(f"'{place.name}' has {spec.bits} bits; patterns are written with 8")
-    if convention is None and place.real is not None and place.real.bench is not None:
-        from ..display.bench_file import load_bench_file
-
-        convention = load_bench_file(place.real.bench).phase
+    described_bench = place.real.bench if place.real else None
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
@@ -93,7 +90,7 @@ def export(
         display=place.name,
         panel=spec.shape,
         wavelengths=spec.wavelengths,
-        phase=convention or Convention(),
+        phase=load_bench_file(described_bench).phase if described_bench else Convention(),
         fixed_exposure=fixed_exposure,
     )
     write_manifest(folder, manifest)

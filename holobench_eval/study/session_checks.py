@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -116,7 +117,7 @@ def misplaced(bench: RealBench, photographer: FolderPhotographer) -> list[str]:
 
 def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:
     path = inside(folder, pattern.file)
-    levels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if levels is None or levels.ndim != 2 or levels.dtype != np.uint8:
-        raise UserError(f"{path}: damaged; export a new session")
-    return np.asarray(levels, dtype=np.uint8)
+    content = path.read_bytes() if path.is_file() else b""
+    if hashlib.sha256(content).hexdigest() != pattern.sha256:
+        raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
+    return np.asarray(cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE), dtype=np.uint8)

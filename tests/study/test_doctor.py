@@ -80,7 +80,7 @@ def test_a_package_that_cannot_be_imported_is_broken_and_exits_1(quick, capsys):
 
 def test_the_wheel_with_windows_is_a_warning_since_it_overwrites_the_headless_one(quick):
     versions = {"opencv-python": "5.0", "opencv-python-headless": "5.0"}
-    quick.setattr(module, "_version", versions.get)
+    quick.setattr(module, "installed", versions.get)
     found = named(doctor(), "OpenCV")
     assert found.state == "warning"
     assert found.remedy.startswith("pip uninstall -y opencv-python-headless opencv-python && pip install")

@@ -18,6 +18,7 @@ import numpy as np
 from torch import Tensor
 
 from ..convention import Convention
+from ..photograph import MOST_SATURATED
 from ..warp import Array, Frame
 from .exposure import Averaged, Dark
 from .letter import Found, find_letter
@@ -27,7 +28,6 @@ Show = Callable[[Tensor, Convention], Tensor]
 
 EXPOSURES = tuple(8 ** (step / 4 - 1) for step in range(5))  # an eighth to one
 STRAIGHTEST, FURTHEST_OFFSET = 0.999, 0.02
-MOST_SATURATED = 0.001
 BRIGHTEST = 0.02  # of the samples are followed
 READABLE = 0.6  # correlation with the letter: about 0.9 on a good bench, 0.3 to 0.7 on the wrong side of the panel
 CLEARLY = 1.5  # times the light in the letter's strokes

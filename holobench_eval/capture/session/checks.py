@@ -10,12 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..photograph import MOST_SATURATED
 from .frames import Facts
 from .manifest import DARK, HOLOGRAM, Pattern
 
 DEPTHS = (8, 10, 12, 14, 16)
-MOST_SATURATED = 0.001
-"""Fraction of saturated samples with which a photograph is scored (protocol v1, step 1)."""
 DIM = 0.4
 """Of the camera's range: a series whose brightest sample stays below is told to be exposed too short."""
 EIGHT_BITS = 255.0
@@ -83,19 +82,19 @@ def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:
     """Counts of a saturated sample: of the fewest bits that hold every photograph, wherever in 16 they lie.
 
     Or less, where several photographs share a brightest count that many of their samples have: a camera, or what came
-    after it, that clips before the last level.
+    after it, that clips before the last level (not where the light reaches a few counts of 8 bits only).
     """
     highest = max(frame.highest for frame in frames)
     top, step = frames[0].top, min((frame.step for frame in frames if frame.step), default=1)
     if top not in (255.0, 65535.0):
         return top, []
-    clipped = [frame for frame in frames if frame.highest == highest]
+    bits = next(depth for depth in DEPTHS if highest <= 2**depth - 1)
+    clipped = [frame for frame in frames if frame.highest == highest > 2 ** (bits - 1)]
     if len(clipped) > 1 and max(frame.at_highest for frame in clipped) > MOST_SATURATED:
         return highest, []
     if top == 65535.0 and step >= 4:
-        bits = 16 - int(np.log2(step))
-        return top - step + 1, [f"photographs have {bits} bits at the upper end of 16: steps of {step} counts"]
-    bits = next(depth for depth in DEPTHS if highest <= 2**depth - 1)
+        depth = 16 - int(np.log2(step))
+        return top - step + 1, [f"photographs have {depth} bits at the upper end of 16: steps of {step} counts"]
     notes = [f"photographs have {bits} bits at the lower end of 16"] if top == 65535.0 and bits < 16 else []
     return float(2**bits - 1), notes
 

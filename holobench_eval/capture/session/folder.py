@@ -51,6 +51,7 @@ class FolderPhotographer:
         self.wanted: dict[str, Request] = {}
         self.repeated: Request | None = None
         self._series: dict[int, Series] = {}
+        self._contents: dict[str, str] = {}
         self._dark: dict[tuple[int, int], tuple[Plane, Plane]] = {}
         self._known = {(one.key, one.colour): one for one in self.manifest.patterns}
 
@@ -106,7 +107,8 @@ class FolderPhotographer:
         return frame.counts
 
     def check_round(self, number: int) -> tuple[list[str], Mapping[str, str]]:
-        """Read every photograph of a round. Faults, a line each, and the sha256 of the files by capture name."""
+        """Read every photograph of a round, after those before it. Faults, a line each, and the sha256 of the files by
+        capture name."""
         patterns = self.manifest.of_round(number)
         found = {pattern.capture: find(self.folder, pattern.capture) for pattern in patterns}
         faults = check_present(self.folder, patterns, found)
@@ -125,14 +127,14 @@ class FolderPhotographer:
                 "session: one is one series of photographs"
             )
         series, faults = check_series(patterns, known)
-        owners = {sha256: name for name, sha256 in before.items()}
         faults += [
-            f"duplicated: {name} is {owners[one.sha256]} of an earlier round"
+            f"duplicated: {name} is {self._contents[one.content]} of an earlier round"
             for name, one in known.items()
-            if owners.get(one.sha256, name) != name
+            if self._contents.get(one.content, name) != name
         ]
         if not faults:
             self._series[number] = series
+            self._contents |= {one.content: name for name, one in known.items() if one.highest}
         return faults, {name: one.sha256 for name, one in known.items()}
 
     def accept(self, captures: Mapping[str, str]) -> None:
