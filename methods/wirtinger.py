@@ -121,9 +121,11 @@ class Objective:
         and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)). dL/dI alone is left to autograd.
         """
         at_panel = unit_field(phase)
-        at_image = self.region.crop(self.model.forward(at_panel))
+        image = self.model.forward(at_panel)
+        at_image = self.region.crop(image)
         intensity = (at_image.real.square() + at_image.imag.square()).requires_grad_()
         loss = self.loss(intensity, self.target)
         (slope,) = torch.autograd.grad(loss.sum(), intensity)
-        returned = self.model.adjoint(self.region.embed(slope * at_image.detach(), self.model.shape))
-        return loss.detach(), 2 * (at_panel.conj() * returned).imag
+        at_image.mul_(2 * slope)  # in the place of the field: a new array costs as much as the product
+        returned = self.model.adjoint(self.region.clear_around(image))
+        return loss.detach(), (at_panel.real * returned.imag).addcmul_(at_panel.imag, returned.real, value=-1)

@@ -33,6 +33,13 @@ class Region:
         """The window of an image of panel size, ``(..., H, W) -> (..., h, w)``; a view."""
         return image[..., self.top : self.top + self.height, self.left : self.left + self.width]
 
+    def clear_around(self, image: Tensor) -> Tensor:
+        """An image of panel size ``(..., H, W)``, set to zero outside the window, in place."""
+        bottom, right = self.top + self.height, self.left + self.width
+        for outside in (image[..., : self.top, :], image[..., bottom:, :], image[..., : self.left], image[..., right:]):
+            outside.zero_()
+        return image
+
     def embed(self, image: Tensor, shape: tuple[int, int]) -> Tensor:
         """A panel-sized image with ``image`` in the window and zeros elsewhere, ``(..., h, w) -> (..., H, W)``."""
         panel = image.new_zeros((*image.shape[:-2], *shape))

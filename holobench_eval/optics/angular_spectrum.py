@@ -6,10 +6,14 @@ import math
 from functools import lru_cache
 
 import torch
+from scipy.fft import next_fast_len
 from torch import Tensor
 
-from .convolution import Convolution, frequencies, iris
-from .padding import Padding, padded_shape
+from .convolution import Convolution, as_used, frequencies, iris
+from .padding import DEFAULT_ERROR, Padding, padded_shape
+
+LINES = 256
+"""Rows or columns of a large grid that a transfer function is made of at a time."""
 
 
 def angular_spectrum_phase(f_squared: Tensor, wavelength: float, distance: float) -> Tensor:
@@ -41,7 +45,9 @@ class AngularSpectrum(Convolution):
     dtype: complex64 unless given; the reference setting is complex128.
 
     Frequencies whose light would wrap around into the picture are removed, evanescent ones as well. Errors at
-    the default: at most 1e-2 rms on a white complex field, 1e-4 on a smooth one. The transfer function is cached.
+    the default: at most 1e-2 rms on a white complex field, 1e-4 on a smooth one. Where light spreads so far that twice
+    the panel would not be enough for that, its kernel is cut off where it no longer reaches from one pixel to another:
+    then twice the panel is enough, at any distance. The transfer function is cached.
     """
 
     def __init__(
@@ -59,7 +65,14 @@ class AngularSpectrum(Convolution):
         if dtype is None:
             dtype = torch.complex128 if padding == "reference" else torch.complex64
         padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
-        transfer = _transfer(tuple(shape), padded, pitch, wavelength, distance, pupil, dtype, torch.device(device))
+        twice = (int(next_fast_len(2 * shape[0] - 1)), int(next_fast_len(2 * shape[1] - 1)))
+        optics = (pitch, wavelength, distance, pupil, dtype, torch.device(device))
+        if padding is None and (padded[0] > twice[0] or padded[1] > twice[1]):
+            padded = (min(padded[0], twice[0]), min(padded[1], twice[1]))
+            grid = padded_shape(shape, pitch, wavelength, distance, pupil, None, DEFAULT_ERROR / 3)
+            transfer = _cut_transfer((shape[0], shape[1]), padded, grid, *optics)
+        else:
+            transfer = _transfer((shape[0], shape[1]), padded, *optics)
         super().__init__((shape[0], shape[1]), transfer)
         self.pitch, self.wavelength, self.distance, self.pupil = pitch, wavelength, distance, pupil
 
@@ -86,10 +99,63 @@ def _transfer(
     device: torch.device,
 ) -> Tensor:
     fy, fx = frequencies(padded, pitch, device)
+    return as_used(_sampled(fy, fx, shape, padded, pitch, wavelength, distance, pupil).to(dtype))
+
+
+@lru_cache(maxsize=24)
+def _cut_transfer(
+    shape: tuple[int, int],
+    padded: tuple[int, int],
+    grid: tuple[int, int],
+    pitch: float,
+    wavelength: float,
+    distance: float,
+    pupil: float | None,
+    dtype: torch.dtype,
+    device: torch.device,
+) -> Tensor:
+    """Transfer function of the kernel of a larger ``grid``, cut off beyond the panel's own size.
+
+    The convolution is then linear in the picture: what would wrap around is zero. An axis that is padded by less is
+    sampled as it is.
+    """
+    cut = (padded[0] >= 2 * shape[0] - 1, padded[1] >= 2 * shape[1] - 1)
+    grid = (max(grid[0], padded[0]) if cut[0] else padded[0], max(grid[1], padded[1]) if cut[1] else padded[1])
+    fy, fx = frequencies(grid, pitch, device)
+    columns = []
+    for part in fx.split(LINES, dim=1):
+        spectrum = _sampled(fy, part, shape, grid, pitch, wavelength, distance, pupil)
+        columns.append((_cut(spectrum, shape[0], padded[0], dim=0) if cut[0] else spectrum).to(dtype))
+    transfer = torch.cat(columns, dim=1)
+    if cut[1]:
+        transfer = torch.cat([_cut(rows, shape[1], padded[1], dim=1) for rows in transfer.split(LINES)])
+    return as_used(transfer)
+
+
+def _cut(spectrum: Tensor, size: int, padded: int, dim: int) -> Tensor:
+    """Spectrum, on ``padded`` samples of one axis, of the kernel's values less than ``size`` pixels from its middle."""
+    kernel = torch.fft.ifft(spectrum, dim=dim)
+    ahead, behind = kernel.narrow(dim, 0, size), kernel.narrow(dim, kernel.shape[dim] - size + 1, size - 1)
+    gap = list(kernel.shape)
+    gap[dim] = padded - 2 * size + 1
+    return torch.fft.fft(torch.cat([ahead, kernel.new_zeros(gap), behind], dim), dim=dim)
+
+
+def _sampled(
+    fy: Tensor,
+    fx: Tensor,
+    shape: tuple[int, int],
+    padded: tuple[int, int],
+    pitch: float,
+    wavelength: float,
+    distance: float,
+    pupil: float | None,
+) -> Tensor:
+    """Transfer function, complex128, at frequencies [1/m] of the grid of ``padded`` samples."""
     f_squared = fy**2 + fx**2
     phase = angular_spectrum_phase(f_squared, wavelength, distance)
     passed = f_squared < 1 / wavelength**2
     if distance != 0:
         passed &= fy.abs() <= band_limit(shape[0], padded[0], pitch, wavelength, distance)
         passed &= fx.abs() <= band_limit(shape[1], padded[1], pitch, wavelength, distance)
-    return torch.polar(iris(fy, fx, pitch, pupil) * passed, phase).to(dtype)
+    return torch.polar(iris(fy, fx, pitch, pupil) * passed, phase)

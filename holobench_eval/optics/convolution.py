@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor
 
+from .blocks import in_blocks
 from .padding import IRIS_EDGE
+
+LARGEST_KEPT = 32 * 2**20
+"""Bytes up to which glibc's allocator keeps freed arrays (M_MMAP_THRESHOLD, mallopt(3)). Larger ones come from the
+system, page by page, which takes longer than their transforms: they are avoided where it can be done."""
 
 
 class Propagator(Protocol):
@@ -42,24 +47,84 @@ class Convolution:
 
     def forward(self, field: Tensor) -> Tensor:
         """Propagate ``(..., H, W)`` complex to ``(..., H, W)``; differentiable."""
-        return self._convolve(field, self.transfer)
+        return self._convolve(field, conjugated=False)
 
     def adjoint(self, field: Tensor) -> Tensor:
         """The adjoint of ``forward``; for a pure phase transfer function this propagates back."""
-        return self._convolve(field, self._conjugate)
+        return self._convolve(field, conjugated=True)
 
     @cached_property
     def _conjugate(self) -> Tensor:
         """The transfer function of the adjoint, formed once: a lazy conjugate is formed in every product."""
         return self.transfer.conj().resolve_conj()
 
-    def _convolve(self, field: Tensor, transfer: Tensor) -> Tensor:
-        height, width = self.shape
-        if tuple(field.shape[-2:]) != (height, width):
+    def _convolve(self, field: Tensor, conjugated: bool) -> Tensor:
+        if tuple(field.shape[-2:]) != self.shape:
             raise ValueError(f"field is {tuple(field.shape[-2:])}, the propagator was made for {self.shape}")
-        spectrum = torch.fft.fft2(field, s=self.padded_shape)
-        spectrum = spectrum.to(torch.promote_types(spectrum.dtype, transfer.dtype))
-        return torch.fft.ifft2(multiply(spectrum, transfer))[..., :height, :width]
+        field = field.to(torch.promote_types(field.dtype, self.transfer.dtype))
+        convolved: Tensor = _Convolved.apply(field, self, conjugated)  # type: ignore[no-untyped-call]
+        return convolved
+
+
+class _Convolved(torch.autograd.Function):
+    """The gradient of a convolution is its adjoint; recorded operations would keep every padded array."""
+
+    @staticmethod
+    def forward(ctx: Any, field: Tensor, model: Convolution, conjugated: bool) -> Tensor:
+        ctx.model, ctx.conjugated = model, conjugated
+        return convolve(field, model._conjugate if conjugated else model.transfer)
+
+    @staticmethod
+    def backward(ctx: Any, *grad: Tensor) -> tuple[Tensor, None, None]:
+        returned: Tensor = _Convolved.apply(grad[0], ctx.model, not ctx.conjugated)  # type: ignore[no-untyped-call]
+        return returned, None, None
+
+
+def convolve(field: Tensor, transfer: Tensor) -> Tensor:
+    """The first (H, W) samples of the circular convolution of a field ``(..., H, W)``, padded with zeros."""
+    height, width = field.shape[-2:]
+    padded = transfer.shape
+    if not is_large(transfer):
+        return torch.fft.ifft2(torch.fft.fft2(field, s=padded).mul_(transfer))[..., :height, :width]
+    return _convolve_pruned(field, transfer)
+
+
+def _convolve_pruned(field: Tensor, transfer: Tensor) -> Tensor:
+    """``convolve`` without the padded array.
+
+    Rows are transformed before there are padded ones, and cropped ones are not transformed back. All is done a block
+    of rows or columns at a time, and columns are made contiguous for it.
+    """
+    height, width = field.shape[-2:]
+    padded = transfer.shape
+    spectrum = field.new_empty((*field.shape[:-1], padded[1]))
+    image = torch.empty_like(field, memory_format=torch.contiguous_format)
+
+    def transform(rows: slice) -> None:
+        spectrum[..., rows, :] = torch.fft.fft(field[..., rows, :], n=padded[1])
+
+    def filtered(columns: slice) -> None:
+        column = torch.fft.fft(spectrum[..., columns].transpose(-1, -2), n=padded[0])
+        column = torch.fft.ifft(column.mul_(transfer[:, columns].T))
+        spectrum[..., columns] = column[..., :height].transpose(-1, -2)
+
+    def transform_back(rows: slice) -> None:
+        image[..., rows, :] = torch.fft.ifft(spectrum[..., rows, :])[..., :width]
+
+    in_blocks(transform, spectrum, height, spectrum.numel())
+    in_blocks(filtered, spectrum, padded[1], spectrum.numel() // height * padded[0])
+    in_blocks(transform_back, spectrum, height, spectrum.numel())
+    return image
+
+
+def is_large(transfer: Tensor) -> bool:
+    """Whether arrays of this size come from the system each time, and not from the memory allocator's store."""
+    return transfer.is_cpu and transfer.numel() * transfer.element_size() > LARGEST_KEPT
+
+
+def as_used(transfer: Tensor) -> Tensor:
+    """The same transfer function ``(rows, columns)``, each column contiguous in memory if it is a large one."""
+    return transfer.T.contiguous().T if is_large(transfer) else transfer
 
 
 def multiply(scratch: Tensor, factor: Tensor) -> Tensor:

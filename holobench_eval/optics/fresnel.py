@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from .angular_spectrum import check_geometry
-from .convolution import Convolution, frequencies, iris
+from .convolution import Convolution, as_used, frequencies, iris
 from .padding import Padding, padded_shape
 
 
@@ -52,4 +52,4 @@ def _transfer(
 ) -> Tensor:
     fy, fx = frequencies(padded, pitch, device)
     phase = -math.pi * wavelength * distance * (fy**2 + fx**2)
-    return torch.polar(iris(fy, fx, pitch, pupil), phase).to(dtype)
+    return as_used(torch.polar(iris(fy, fx, pitch, pupil), phase).to(dtype))

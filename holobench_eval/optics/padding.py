@@ -44,10 +44,12 @@ def tail_error(size: int, spread_pixels: float, padded: int) -> float:
 
 
 @lru_cache(maxsize=256)
-def padded_size(size: int, spread_pixels: float, soft_edge: int | None, padding: Padding) -> int:
+def padded_size(
+    size: int, spread_pixels: float, soft_edge: int | None, padding: Padding, error: float = DEFAULT_ERROR
+) -> int:
     """Samples per axis of the transform that propagates ``size`` pixels, rounded up to a fast FFT size.
 
-    None: the smallest size whose tail error is below the stated one (both axes together). With an iris inside the
+    None: the smallest size whose tail error is below ``error`` (both axes together). With an iris inside the
     band its soft edge leaves short tails, and ``N + K + soft_edge`` is enough (``soft_edge`` None: no such iris).
     ``"reference"``: four times the size, more when the light spreads further. An integer: samples added.
     """
@@ -61,17 +63,23 @@ def padded_size(size: int, spread_pixels: float, soft_edge: int | None, padding:
             raise ValueError(f"padding must be None, 'reference' or a whole number of samples >= 0, got {padding!r}")
         return int(next_fast_len(size + padding))
     padded = int(next_fast_len(size + math.ceil(spread_pixels) + (soft_edge or 16)))
-    while soft_edge is None and tail_error(size, spread_pixels, padded) > DEFAULT_ERROR / math.sqrt(2):
+    while soft_edge is None and tail_error(size, spread_pixels, padded) > error / math.sqrt(2):
         padded = int(next_fast_len(padded + 1))
     return padded
 
 
 def padded_shape(
-    shape: tuple[int, int], pitch: float, wavelength: float, distance: float, pupil: float | None, padding: Padding
+    shape: tuple[int, int],
+    pitch: float,
+    wavelength: float,
+    distance: float,
+    pupil: float | None,
+    padding: Padding,
+    error: float = DEFAULT_ERROR,
 ) -> tuple[int, int]:
-    """(rows, columns) of the transform that propagates a field of ``shape``; lengths in metres."""
+    """(rows, columns) of the transform that propagates a field of ``shape``; lengths in metres, see ``padded_size``."""
     reach = spread(pitch, wavelength, distance, pupil)
     inside = pupil is not None and pupil * (1 + IRIS_EDGE) <= 1
     # the edge's width in frequency shrinks with the iris, and its tails in the image grow with the inverse
     edge = math.ceil(25.6 / pupil) if inside and pupil is not None else None
-    return padded_size(shape[0], reach, edge, padding), padded_size(shape[1], reach, edge, padding)
+    return padded_size(shape[0], reach, edge, padding, error), padded_size(shape[1], reach, edge, padding, error)

@@ -10,7 +10,7 @@ from scipy.fft import next_fast_len
 from torch import Tensor
 
 from .angular_spectrum import check_geometry
-from .convolution import Convolution
+from .convolution import Convolution, as_used
 
 TAPER = 0.1
 """Half width of the soft edge at the sampling limit, relative to it."""
@@ -72,7 +72,7 @@ def _transfer(
     y, x = offsets[0][:, None], offsets[1][None, :]
     kernel = impulse_response(y, x, wavelength, distance) * pitch**2
     kernel = kernel * _sampled(y, pitch, wavelength, distance) * _sampled(x, pitch, wavelength, distance)
-    return torch.fft.fft2(kernel).to(dtype)
+    return as_used(torch.fft.fft2(kernel).to(dtype))
 
 
 def _sampled(offset: Tensor, pitch: float, wavelength: float, distance: float) -> Tensor:

@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holobench_eval.optics import AngularSpectrum
+from holobench_eval.optics import AngularSpectrum, blocks, convolution
 from holobench_eval.optics.angular_spectrum import angular_spectrum_phase
 from holobench_eval.optics.conformance import direct_sum, gaussian_beam
 from holobench_eval.optics.convolution import frequencies
@@ -81,6 +81,14 @@ def test_small_iris_keeps_the_stated_accuracy(pupil):
     assert relative(model.forward(white((size, size)).to(torch.complex64)), larger.forward(white((size, size)))) < 1e-2
 
 
+@pytest.mark.parametrize(("shape", "distance"), [((96, 96), 0.012), ((64, 160), 0.02), ((64, 64), 0.05)])
+def test_twice_the_panel_is_enough_at_any_distance(shape, distance):
+    model = AngularSpectrum(shape, PITCH, WAVELENGTH, distance)
+    assert all(padded <= 1.1 * 2 * side for padded, side in zip(model.padded_shape, shape, strict=True))
+    larger = AngularSpectrum(shape, PITCH, WAVELENGTH, distance, padding=3000, dtype=torch.complex128)
+    assert relative(model.forward(white(shape).to(torch.complex64)), larger.forward(white(shape))) < 5e-3
+
+
 def test_soft_iris_needs_little_padding():
     size, distance = 256, 0.0237
     model = AngularSpectrum((size, size), PITCH, WAVELENGTH, distance, pupil=0.8)
@@ -137,6 +145,22 @@ def test_phase_keeps_its_precision_at_long_distances():
     fy, fx = frequencies((64, 64), PITCH)
     exact = 2 * math.pi * 0.2 * (torch.sqrt(1 / WAVELENGTH**2 - fy**2 - fx**2) - 1 / WAVELENGTH)
     assert torch.allclose(angular_spectrum_phase(fy**2 + fx**2, WAVELENGTH, 0.2), exact, atol=1e-6)
+
+
+def test_gradients_of_gradients_pass():
+    model = AngularSpectrum((12, 10), PITCH, WAVELENGTH, 2e-3, dtype=torch.complex128)
+    assert torch.autograd.gradgradcheck(model.forward, white((12, 10), 5).requires_grad_())
+
+
+def test_blocks_of_rows_and_columns_change_nothing(monkeypatch):
+    field = torch.stack([white((70, 50), seed) for seed in range(6)]).view(2, 3, 70, 50)
+    model = AngularSpectrum((70, 50), PITCH, WAVELENGTH, 6e-3, dtype=torch.complex128)
+    padded = torch.fft.ifft2(torch.fft.fft2(field, s=model.padded_shape) * model.transfer)[..., :70, :50]
+    assert relative(model.forward(field), padded) < 1e-14
+    monkeypatch.setattr(convolution, "LARGEST_KEPT", 0)
+    for size in (1, 10_000, 2**30):
+        monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+        assert relative(model.forward(field), padded) < 1e-14
 
 
 def test_transfer_functions_are_cached():
