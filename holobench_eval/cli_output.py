@@ -24,10 +24,10 @@ def write_report(
     console: Console, study: Study, records: list[dict[str, object]], output: Path, known: dict[str, object]
 ) -> None:
     """Write a study's report and print its headline tables."""
-    from .report import build_report, results_of
+    from .report import build_report
 
-    written = build_report(study, records, output, known)
-    print_headline(console, results_of(study, records))
+    written, results = build_report(study, records, output, known)
+    print_headline(console, results)
     console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
 
 

@@ -7,6 +7,7 @@ import importlib.util
 import json
 import sys
 from dataclasses import fields, is_dataclass
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
@@ -18,7 +19,9 @@ from .errors import UserError, suggest
 Kind = Literal["methods", "datasets"]
 
 
+@lru_cache
 def _entries(kind: Kind) -> dict[str, EntryPoint]:
+    """Looked up once: that reads a file of every installed package."""
     return {entry.name: entry for entry in entry_points(group=f"holobench_eval.{kind}")}
 
 

@@ -1,4 +1,4 @@
-"""Filters of a few taps along one axis, as sums of shifted images.
+"""Filters of a few taps along one axis, as sums of shifted images, and the mirrored edges that filters need.
 
 On a CPU and one channel this takes a quarter of the time of ``conv2d``, and the adjoint, written out here, a tenth of
 what autograd takes for the same sum of slices.
@@ -12,6 +12,21 @@ from typing import Any
 import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
+from torch.nn import functional
+
+
+def mirrored(image: Tensor, margin: int) -> Tensor:
+    """An image ``(B, C, H, W)`` with its edges mirrored, the edge pixel not doubled, on ``margin`` pixels all around.
+
+    On a GPU it is put together from slices, since torch's own has no deterministic gradient there.
+    """
+    if image.is_cpu:
+        return functional.pad(image, (margin,) * 4, mode="reflect")
+    for dim in (-1, -2):
+        before = image.narrow(dim, 1, margin).flip(dim)
+        after = image.narrow(dim, image.shape[dim] - 1 - margin, margin).flip(dim)
+        image = torch.cat([before, image, after], dim)
+    return image
 
 
 def correlate(image: Tensor, taps: Sequence[float], dim: int) -> Tensor:

@@ -16,7 +16,7 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 from torch import Tensor
 
 from ..errors import CellError
@@ -149,7 +149,7 @@ def _bent(frame: Frame, warp: Warp, grid: FiducialGrid) -> Warp:
     without, remaining = float(np.sum(moved**2)), float(np.sum((moved - terms @ coefficients) ** 2))
     extra, free = 4, moved.size - 12  # a quadratic has 12 coefficients, 8 of which the homography already fitted
     ratio = (without - remaining) / extra / max(remaining / free, 1e-12)
-    significant = ratio >= float(f_distribution.ppf(SIGNIFICANCE, extra, free))
+    significant = ratio >= float(fdtri(extra, free, SIGNIFICANCE))
     if not significant or remaining > WORTHWHILE**2 * without:
         return warp
     bent = replace(warp, quadratic=warp.quadratic + coefficients)

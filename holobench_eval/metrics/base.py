@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from typing import Literal
 
 import cv2
@@ -14,7 +16,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ..shifts import correlate
+from ..shifts import correlate, mirrored
 
 Domain = Literal["linear", "amplitude", "srgb", "stored"]
 """Encodings of the images; ``stored``: values as pictures store them, whose relation to light is not known."""
@@ -75,6 +77,30 @@ def paired(image: Tensor, target: Tensor, smallest: int = 1) -> tuple[Tensor, Te
     return image.reshape(-1, channels, height, width), target.reshape(-1, channels, height, width)
 
 
+def remembered(function: Callable[[Tensor], Tensor], most: int = 16) -> Callable[[Tensor], Tensor]:
+    """A function of one image whose last ``most`` results are kept, by what the image shows.
+
+    For the features of targets, since many pictures are compared with one target. With a gradient, and on other
+    devices than the CPU, where to look at the image would take longer, nothing is kept.
+    """
+    kept: OrderedDict[object, Tensor] = OrderedDict()
+
+    @wraps(function)
+    def known(image: Tensor) -> Tensor:
+        if not image.is_cpu or (image.requires_grad and torch.is_grad_enabled()):
+            return function(image)
+        content = hashlib.sha256(image.detach().contiguous().numpy().data).digest()
+        key = (image.shape, image.dtype, content)
+        found = kept.get(key)
+        kept[key] = found = function(image) if found is None else found
+        kept.move_to_end(key)
+        if len(kept) > most:
+            kept.popitem(last=False)
+        return found
+
+    return known
+
+
 def safe_sqrt(x: Tensor) -> Tensor:
     """The square root of x >= 0, exact, with gradient zero (not infinity) where x is zero. Any shape."""
     positive = x > 0
@@ -106,14 +132,15 @@ def gradient_magnitude(image: Tensor, kernel: Literal["prewitt", "scharr"]) -> T
 
 
 @lru_cache(maxsize=32)
-def _gaussian_taps(sigma: float, radius: int) -> tuple[float, ...]:
+def gaussian_taps(sigma: float, radius: int) -> tuple[float, ...]:
+    """Weights of a Gaussian of width sigma [px] at -radius ... radius, of sum 1."""
     weights = [math.exp(-0.5 * (k / sigma) ** 2) for k in range(-radius, radius + 1)]
     return tuple(weight / sum(weights) for weight in weights)
 
 
 def gaussian_valid(image: Tensor, sigma: float, radius: int) -> Tensor:
     """Gaussian filter of 2 radius + 1 taps where it fits wholly: (..., H, W) to (..., H - 2 radius, W - 2 radius)."""
-    taps = _gaussian_taps(sigma, radius)
+    taps = gaussian_taps(sigma, radius)
     if image.is_cpu and not (image.requires_grad and torch.is_grad_enabled()):
         return _filtered(image, taps)
     return correlate(correlate(image, taps, dim=-1), taps, dim=-2)
@@ -134,4 +161,4 @@ def _filtered(image: Tensor, taps: Sequence[float]) -> Tensor:
 def gaussian_blur(image: Tensor, sigma: float) -> Tensor:
     """Gaussian filter of width sigma [px], cut off at 4 sigma, mirrored at the edges: (B, C, H, W) to the same."""
     radius = math.ceil(4 * sigma)
-    return gaussian_valid(functional.pad(image, (radius,) * 4, mode="reflect"), sigma, radius)
+    return gaussian_valid(mirrored(image, radius), sigma, radius)

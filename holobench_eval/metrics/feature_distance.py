@@ -18,6 +18,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
+from ..shifts import mirrored
 from .base import Metric, gaussian_blur, mix, paired
 
 SCALES = 4
@@ -60,7 +61,7 @@ def _opponent(image: Tensor, scale: int) -> Tensor:
 def _responses(opponent: Tensor) -> Tensor:
     """Responses of (B, K, H, W) to the bank, (B, 8 K, H, W)."""
     batch, _, height, width = opponent.shape
-    padded = functional.pad(opponent.reshape(-1, 1, height, width), (RADIUS,) * 4, mode="reflect")
+    padded = mirrored(opponent.reshape(-1, 1, height, width), RADIUS)
     response: Tensor = _Filtered.apply(padded, _bank(opponent.dtype, opponent.device))  # type: ignore[no-untyped-call]
     return response.reshape(batch, -1, height, width)
 

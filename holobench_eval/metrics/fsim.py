@@ -10,12 +10,14 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from .base import Metric, gradient_magnitude, mix, paired, similarity
+from .base import Metric, gradient_magnitude, mix, paired, remembered, similarity
 from .haarpsi import YIQ
 from .phase_congruency import phase_congruency
 
 T1, T2, T3, T4 = 0.85, 160.0, 200.0, 200.0
 CHROMA_EXPONENT = 0.03
+
+_congruency_of_target = remembered(phase_congruency)
 
 
 def fsim(image: Tensor, target: Tensor) -> Tensor:
@@ -32,7 +34,7 @@ def fsim(image: Tensor, target: Tensor) -> Tensor:
     x, y = (functional.avg_pool2d(255 * side, k) for side in (x, y))
     if x.shape[1] == 3:
         x, y = mix(x, YIQ), mix(y, YIQ)
-    congruency_x, congruency_y = phase_congruency(x[:, :1]), phase_congruency(y[:, :1])
+    congruency_x, congruency_y = phase_congruency(x[:, :1]), _congruency_of_target(y[:, :1])
     alike = similarity(congruency_x, congruency_y, T1) * similarity(
         gradient_magnitude(x[:, :1], "scharr"), gradient_magnitude(y[:, :1], "scharr"), T2
     )

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from ..shifts import mirrored
 from .base import Metric, paired
 from .ssim import RADIUS, LocalStatistics
 
@@ -34,8 +35,8 @@ class FixedMsSsim:
         x, _ = paired(image, self.target, smallest=SMALLEST)
         value = x.new_ones(x.shape[0])
         for last, scale, exponent in zip(_IS_LAST, self.scales, EXPONENTS, strict=True):
-            luminance, structure = scale.maps(_mirrored(x) if last else x)
-            mean = (luminance * structure if last else structure).mean(dim=(1, 2, 3))
+            whole, structure = scale.means(_mirrored(x) if last else x)
+            mean = whole if last else structure
             # The power of zero has an infinite gradient, so zero is a branch of its own.
             value = value * torch.where(mean > 0, torch.where(mean > 0, mean, 1.0).pow(exponent), 0.0)
             x = functional.avg_pool2d(x, 2)
@@ -43,7 +44,7 @@ class FixedMsSsim:
 
 
 def _mirrored(image: Tensor) -> Tensor:
-    return functional.pad(image, (RADIUS,) * 4, mode="reflect")
+    return mirrored(image, RADIUS)
 
 
 def ms_ssim(image: Tensor, target: Tensor) -> Tensor:

@@ -6,19 +6,26 @@ similarity", IEEE Trans. Image Process. 13 (2004).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+from itertools import product
 
+import cv2
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-from .base import Metric, gaussian_valid, paired
+from .base import Metric, gaussian_taps, gaussian_valid, paired
 
 SIGMA = 1.5
 RADIUS = 5
 C1 = 0.01**2
 C2 = 0.03**2
-STRIP = 32
-"""Rows."""
+STRIP = 2**17
+"""Pixels that are compared together: few enough to stay in the cache."""
+
+Plane = NDArray[np.floating]
 
 
 class LocalStatistics:
@@ -29,18 +36,31 @@ class LocalStatistics:
 
     def __init__(self, image: Tensor) -> None:
         self.image = image
-        self.mean, squares = gaussian_valid(torch.stack([image, image.square()]), SIGMA, RADIUS).unbind()
-        self.mean_squared = self.mean.square()
-        self.variance = squares - self.mean_squared
+
+    @cached_property
+    def _moments(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Mean, its square, variance."""
+        mean, squares = gaussian_valid(torch.stack([self.image, self.image.square()]), SIGMA, RADIUS).unbind()
+        mean_squared = mean.square()
+        return mean, mean_squared, squares - mean_squared
 
     def maps(self, other: Tensor) -> tuple[Tensor, Tensor]:
         """Luminance and contrast-structure factor of the SSIM (Eq. 6, and 9 with 10, of the paper) of another image."""
+        own_mean, own_mean_squared, own_variance = self._moments
         moments = gaussian_valid(torch.stack([other, other.square(), other * self.image]), SIGMA, RADIUS)
-        mean, squares, product = moments.unbind()
-        mean_squared, mean_product = mean.square(), mean * self.mean
-        structure = (2 * (product - mean_product) + C2) / (squares - mean_squared + self.variance + C2)
-        luminance = (2 * mean_product + C1) / (mean_squared + self.mean_squared + C1)
+        mean, squares, products = moments.unbind()
+        mean_squared, mean_product = mean.square(), mean * own_mean
+        structure = (2 * (products - mean_product) + C2) / (squares - mean_squared + own_variance + C2)
+        luminance = (2 * mean_product + C1) / (mean_squared + own_mean_squared + C1)
         return luminance, structure
+
+    def means(self, other: Tensor) -> tuple[Tensor, Tensor]:
+        """Means of the SSIM and of its contrast-structure factor over channels and windows, (B, C, H, W) to (B,)."""
+        differentiated = torch.is_grad_enabled() and (other.requires_grad or self.image.requires_grad)
+        if other.is_cpu and not differentiated:
+            return _means(other, self.image)
+        luminance, structure = self.maps(other)
+        return (luminance * structure).mean(dim=(1, 2, 3)), structure.mean(dim=(1, 2, 3))
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
@@ -52,19 +72,50 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
     Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
     """
     x, y = paired(image, target, smallest=2 * RADIUS + 1)
-    total = torch.zeros(len(x), dtype=x.dtype, device=x.device)
-    count = x.shape[1] * (x.shape[2] - 2 * RADIUS) * (x.shape[3] - 2 * RADIUS)
-    for rows in _strips(x.shape[2], x.requires_grad or y.requires_grad):
-        luminance, structure = LocalStatistics(y[:, :, rows]).maps(x[:, :, rows])
-        total = total + (luminance * structure).sum(dim=(1, 2, 3))
-    return (total / count).reshape(image.shape[:-3])
+    return LocalStatistics(y).means(x)[0].reshape(image.shape[:-3])
 
 
-def _strips(height: int, whole: bool) -> Iterator[slice]:
-    """Rows that are compared together, with the windows' reach at either end: few enough to stay in the cache."""
+def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+    """``LocalStatistics.means`` without a gradient, on a CPU: strip by strip, in ``torch.get_num_threads`` threads."""
+    batch, channels, height, width = image.shape
+    planes = [side.detach().reshape(-1, height, width).numpy() for side in (image, target)]
     inner = height - 2 * RADIUS
-    step = inner if whole else STRIP
-    return (slice(first, min(first + step, inner) + 2 * RADIUS) for first in range(0, inner, step))
+    step = max(2 * RADIUS, STRIP // width)
+    places = list(product(range(batch * channels), range(0, inner, step)))
+
+    def sums(place: tuple[int, int]) -> tuple[float, float]:
+        plane, first = place
+        rows = slice(first, min(first + step, inner) + 2 * RADIUS)
+        return _sums(planes[0][plane, rows], planes[1][plane, rows])
+
+    # Strips do not depend on the number of threads, and are added in their order: nor does the value.
+    threads = min(torch.get_num_threads(), len(places))
+    if threads > 1:
+        with ThreadPoolExecutor(threads) as pool:
+            found = list(pool.map(sums, places))
+    else:
+        found = [sums(place) for place in places]
+    added = np.array(found).reshape(batch, -1, 2).sum(1) / (channels * inner * (width - 2 * RADIUS))
+    whole, structure = torch.from_numpy(added).to(image.dtype).unbind(1)
+    return whole, structure
+
+
+def _sums(x: Plane, y: Plane) -> tuple[float, float]:
+    """Sums over the windows in a strip (h, W) of two images of the SSIM and of its contrast-structure factor.
+
+    The SSIM has only the sum of the two variances, so that four filters do.
+    """
+    mean_x, mean_y, squares, products = (_filtered(side) for side in (x, y, x * x + y * y, x * y))
+    mean_squares, mean_products = mean_x * mean_x + mean_y * mean_y, mean_x * mean_y
+    structure = (2 * (products - mean_products) + C2) / (squares - mean_squares + C2)
+    luminance = (2 * mean_products + C1) / (mean_squares + C1)
+    return float((luminance * structure).sum(dtype=np.float64)), float(structure.sum(dtype=np.float64))
+
+
+def _filtered(plane: Plane) -> Plane:
+    """``gaussian_valid`` of one plane."""
+    taps = np.array(gaussian_taps(SIGMA, RADIUS))
+    return np.asarray(cv2.sepFilter2D(plane, -1, taps, taps)[RADIUS:-RADIUS, RADIUS:-RADIUS], dtype=plane.dtype)
 
 
 SSIM = Metric("ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ssim, smallest=2 * RADIUS + 1)

@@ -40,13 +40,14 @@ TEMPLATE = "report.md.j2"
 
 def build_report(
     study: Study, records: Sequence[Mapping[str, Any]], output: Path, provenance: Mapping[str, Any]
-) -> Path:
-    """Write everything a reader of the study gets into ``output`` and return the path of report.md.
+) -> tuple[Path, Results]:
+    """Write everything a reader of the study gets into ``output``; return the path of report.md and its numbers.
 
     records: one for every planned cell, as ``Store.load`` gives them; thumbnails are taken from ``output/records``.
     provenance: see ``study.provenance``. UserError when no record has the headline metric.
     """
-    return write_report(layout_of(study), records, output, provenance, describe(study))
+    results = results_of(study, records)
+    return write_results(results, records, output, provenance, describe(study)), results
 
 
 def write_report(
@@ -56,8 +57,19 @@ def write_report(
     provenance: Mapping[str, Any],
     description: Description,
 ) -> Path:
-    """``build_report`` for a study that is given by its layout and description."""
-    results = Results(records_frame(records, layout), layout)
+    """``build_report`` for a study that is given by its layout and description; the path of report.md."""
+    return write_results(Results(records_frame(records, layout), layout), records, output, provenance, description)
+
+
+def write_results(
+    results: Results,
+    records: Sequence[Mapping[str, Any]],
+    output: Path,
+    provenance: Mapping[str, Any],
+    description: Description,
+) -> Path:
+    """``write_report`` where the numbers of the records are there already."""
+    layout = results.layout
     write_atomically(output / "records.csv", csv_text(results.frame).encode())
     write_atomically(output / "table.csv", csv_text(results.table).encode())
     trained = section_training.trainings(layout, records, output)

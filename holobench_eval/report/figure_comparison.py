@@ -13,12 +13,13 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .figure_style import new_figure, save, style
+from .figure_style import new_figure, save_picture, style
 from .gallery import Column, Picture, Tile, error_map, halved, most_detailed
 
 SMALLEST_TILE = 192
@@ -79,9 +80,12 @@ class Page:
         self.figure.text(x / width, 1 - y / height, words, parse_math=False, **kwargs)
 
     def save(self, path: Path) -> None:
-        """Write the page."""
-        self.figure.figimage(self.pixels, 0, 0, origin="upper", zorder=-1)
-        save(self.figure, path)
+        """Write the page: where there are words on the figure, or lines, they darken the picture."""
+        canvas = FigureCanvasAgg(self.figure)
+        canvas.draw()  # type: ignore[no-untyped-call]
+        words = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
+        pixels = self.pixels[: words.shape[0], : words.shape[1]]  # the figure's size is rounded down
+        save_picture((pixels * words).round().astype(np.uint8), path)
 
 
 def draw_comparison(

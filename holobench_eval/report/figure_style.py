@@ -8,10 +8,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
 
 DPI = 100
+QUALITY = 82
+"""Of a JPEG."""
 
 # Okabe & Ito's palette without its yellow, which is too faint for marks on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6A3D9A", "#7F5539")
@@ -50,9 +55,15 @@ def save(figure: Figure, path: Path) -> None:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".jpg":
-        figure.savefig(path, dpi=DPI, pil_kwargs={"quality": 82})
+        figure.savefig(path, dpi=DPI, pil_kwargs={"quality": QUALITY})
     else:
         figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def save_picture(pixels: NDArray[np.uint8], path: Path) -> None:
+    """Write pixels ``(h, w, 3)`` as ``save`` writes a figure, without drawing them first."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(pixels).save(path, quality=QUALITY, dpi=(DPI, DPI))
 
 
 def slugs(names: Sequence[str]) -> dict[str, str]:

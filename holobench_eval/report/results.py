@@ -60,7 +60,7 @@ class Results:
 
     def methods(self, condition: str) -> list[str]:
         """Labels with a row under ``condition``, in the order of the table."""
-        return list(self.table.loc[self.table["condition"] == condition, "method"])
+        return [label for label, place in self._rows if place == condition]
 
     def lost(self, label: str, before: str, condition: str) -> Estimate | None:
         """Headline score before a change minus that after it, target by target, so that a loss is positive where higher
@@ -73,8 +73,12 @@ class Results:
 
     def row(self, label: str, condition: str) -> pd.Series:
         """A row of the table."""
-        found = self.table[(self.table["method"] == label) & (self.table["condition"] == condition)]
-        return found.iloc[0]
+        return self._rows[label, condition]
+
+    @cached_property
+    def _rows(self) -> dict[tuple[str, str], pd.Series]:
+        """The rows of the table, in its order."""
+        return {(row["method"], row["condition"]): row for _, row in self.table.iterrows()}
 
     def cells(self, label: str, condition: str) -> pd.DataFrame:
         """The records of a method under a condition."""
@@ -86,10 +90,15 @@ class Results:
 
     def values(self, label: str, condition: str, key: str | None = None) -> Array:
         """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
-        rows = self.cells(label, condition)
-        if (key or self.headline.key) not in rows:
+        means, column = self._means.get((label, condition)), key or self.headline.key
+        if means is None or column not in means:
             return np.full(len(self.targets), np.nan)
-        return per_target(rows, key or self.headline.key).reindex(self.targets).to_numpy(dtype=np.float64)
+        return means[column].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def _means(self) -> dict[tuple[str, str], pd.DataFrame]:
+        """Every number of a method under a condition, a row for each of ``targets``."""
+        return {pair: per_target(rows).reindex(self.targets) for pair, rows in self._groups.items()}
 
     def whole(self, label: str, condition: str, key: str | None = None) -> bool:
         """Whether a method has a value for every target: only then may its mean be compared."""

@@ -26,6 +26,9 @@ from ..optics.convolution import iris
 
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1
+MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.035, "top": 0.925, "wspace": 0.46, "hspace": 0.27}
+STEPS = 60
+"""Of the hologram of the chart: it shows what the bench does, not what the method can."""
 
 
 def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | None = None) -> Path:
@@ -53,7 +56,8 @@ def save_sheet(workbench: Workbench, note: str, path: Path, source: str = "") ->
     """
     bench = workbench.bench
     with plt.rc_context({"font.size": 9, "axes.titlesize": 10}):
-        figure, axes = plt.subplots(4, 4, figsize=(17, 15.5), layout="constrained")
+        figure, axes = plt.subplots(4, 4, figsize=(17, 15.5))
+        figure.subplots_adjust(**MARGINS)  # a layout engine draws everything once more
         _panel_stages(axes.flat[:6], bench)
         _field_stages(axes.flat[6:12], bench)
         _chart(axes.flat[12:], workbench)
@@ -130,8 +134,7 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     _picture(axes[0], light.abs(), "illumination amplitude, green", "relative amplitude")
     _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
     _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
-    clean = torch.ones(bench.spec.shape)
-    plane = clean if maps.path.plane is None else maps.path.plane.real[: clean.shape[0], : clean.shape[1]]
+    plane = torch.ones(bench.spec.shape) if maps.path.plane is None else maps.path.plane.real
     _picture(axes[3], plane, "dust on the plane before the image", "amplitude")
     f = torch.linspace(-0.5, 0.5, 201, dtype=torch.float64) / bench.spec.pitch
     fy, fx = f[:, None], f[None, :]
@@ -165,12 +168,17 @@ def _chart(axes: list[Axes], workbench: Workbench) -> None:
     axes[1].set(title="sensor noise", xlabel="signal [electrons]", ylabel="standard deviation [DN]")
     chart = Charts(names=("tv_lines",))
     target = chart.load("tv_lines", spec.region.shape)
-    phase = Wirtinger().solve(target[None], workbench.for_method(Wirtinger(), "wirtinger", target, "chart", 0))[0]
+    method = Wirtinger(iterations=STEPS)
+    phase = method.solve(target[None], workbench.for_method(method, "wirtinger", target, "chart", 0))[0]
     shot = workbench.photograph(phase, target, "chart", 0)
     psnr = score(shot.image, target, metrics=("psnr",))["psnr_linear"]
     for axis, image, title in (
         (axes[2], target, "chart: target"),
-        (axes[3], match(shot.image, target)[0], f"chart: capture of Wirtinger holography, {psnr:.1f} dB"),
+        (
+            axes[3],
+            match(shot.image, target)[0],
+            f"chart: capture, {STEPS} steps of Wirtinger holography, {psnr:.1f} dB",
+        ),
     ):
         axis.imshow(srgb_encode(torch.as_tensor(image)).permute(1, 2, 0).float().numpy(), interpolation="nearest")
         axis.set(title=title, xlabel="column [px]", ylabel="row [px]")

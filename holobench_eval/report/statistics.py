@@ -36,6 +36,13 @@ def _resamples(n: int) -> NDArray[np.int64]:
     return np.random.default_rng(seed("bootstrap over targets", n)).integers(0, n, size=(RESAMPLES, n))
 
 
+@lru_cache(maxsize=64)
+def _tail(n: int) -> float:
+    """Fraction of the resampled means to leave out at either end; see ``bootstrap_mean``."""
+    quantile = stats.t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt(n / (n - 1))
+    return float(stats.norm.cdf(-quantile))
+
+
 def bootstrap_mean(values: Sequence[float] | Array) -> Estimate:
     """Mean of one value per target and its bootstrap interval.
 
@@ -52,8 +59,7 @@ def bootstrap_mean(values: Sequence[float] | Array) -> Estimate:
     mean = float(sample.mean())
     if n < FEWEST or not np.isfinite(sample).all():
         return Estimate(mean, np.nan, np.nan, n)
-    quantile = stats.t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt(n / (n - 1))
-    tail = float(stats.norm.cdf(-quantile))
+    tail = _tail(n)
     low, high = np.quantile(sample[_resamples(n)].mean(axis=1), [tail, 1 - tail])
     return Estimate(mean, float(low), float(high), n)
 
@@ -65,8 +71,7 @@ def bootstrap_ratio(part: Array, whole: Array) -> Estimate:
     ratio = float(part.mean() / whole.mean())
     if n < FEWEST:
         return Estimate(ratio, np.nan, np.nan, n)
-    quantile = stats.t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt(n / (n - 1))
-    tail = float(stats.norm.cdf(-quantile))
+    tail = _tail(n)
     chosen = _resamples(n)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = part[chosen].mean(axis=1) / whole[chosen].mean(axis=1)

@@ -134,10 +134,10 @@ def score_columns(frame: pd.DataFrame) -> list[str]:
     return [str(column) for column in frame.columns if column not in _NOT_SCORES]
 
 
-def per_target(rows: pd.DataFrame, score: str) -> pd.Series:
-    """One value per target of the done cells in ``rows``, repeats averaged; targets in the order of the rows."""
+def per_target(rows: pd.DataFrame) -> pd.DataFrame:
+    """Every number of the done cells in ``rows``, a row a target in the order of the rows, repeats averaged."""
     done = rows[rows["state"] == DONE]
-    return done.groupby("target", sort=False)[score].mean()
+    return done.groupby("target", sort=False).mean(numeric_only=True)
 
 
 def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
@@ -160,8 +160,9 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
     done = rows[rows["state"] == DONE]
     n = done["target"].nunique()
     row: dict[str, Any] = {"method": label, "condition": condition, "n": n, "failed": len(rows) - len(done)}
+    means = per_target(rows)
     for score in scores:
-        values = per_target(done, score).dropna().to_numpy()
+        values = means[score].dropna().to_numpy()
         estimate = bootstrap_mean(values if values.size == n or not parse(score).domain else [])
         row |= {score: estimate.mean, f"{score}_lo": estimate.low, f"{score}_hi": estimate.high}
     row |= {"captures": done["captures"].mean(), "seconds": done["seconds"].mean()}

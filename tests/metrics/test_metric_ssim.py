@@ -15,6 +15,7 @@ from holobench_eval.metrics.psnr import psnr
 from holobench_eval.metrics.ssim import C1, ssim
 
 Photograph = Callable[..., Tensor]
+Metric = Callable[[Tensor, Tensor], Tensor]
 
 
 def noisy(image: Tensor, sigma: float) -> Tensor:
@@ -37,6 +38,30 @@ def test_ssim_equals_scikit_image(photograph: Photograph, height: int, width: in
         channel_axis=0,
     )
     assert float(ssim(image, target)) == pytest.approx(given, abs=1e-12)
+
+
+def test_ssim_of_a_large_image_equals_scikit_image_whatever_the_number_of_threads() -> None:
+    draw = torch.Generator().manual_seed(6)
+    target = torch.rand(2, 3, 240, 1100, generator=draw, dtype=torch.float64)  # more than one strip
+    image = noisy(target, 0.1)
+    before, found = torch.get_num_threads(), []
+    for threads in (1, 2, 3):
+        torch.set_num_threads(threads)
+        found.append(ssim(image, target))
+    torch.set_num_threads(before)
+    assert torch.equal(found[0], found[1])
+    assert torch.equal(found[0], found[2])
+    for value, *pair in zip(found[0], image, target, strict=True):
+        known = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False, "data_range": 1}
+        given = structural_similarity(*(side.numpy() for side in pair), channel_axis=0, **known)
+        assert float(value) == pytest.approx(given, abs=1e-12)
+
+
+@pytest.mark.parametrize("metric", [ssim, ms_ssim])
+def test_the_value_is_the_same_where_a_gradient_is_wanted(photograph: Photograph, metric: Metric) -> None:
+    target = photograph("coffee", 192)
+    image = noisy(target, 0.1).requires_grad_()
+    assert float(metric(image, target).detach()) == pytest.approx(float(metric(image.detach(), target)), abs=1e-12)
 
 
 @pytest.mark.parametrize(("height", "width"), [(176, 176), (183, 190)])

@@ -1,0 +1,36 @@
+"""What the metrics share: features of a target that are kept."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from holobench_eval.metrics.base import remembered
+
+
+def test_a_result_is_kept_by_what_the_image_shows_and_the_oldest_goes_first() -> None:
+    asked: list[float] = []
+
+    def doubled(image: Tensor) -> Tensor:
+        asked.append(float(image.detach().max()))
+        return 2 * image
+
+    known = remembered(doubled, most=2)
+    images = [torch.full((1, 1, 4, 4), value, dtype=torch.float64) for value in (0.1, 0.2, 0.3)]
+    for image in (*images[:2], images[0].clone(), images[2], images[0], images[1]):
+        assert torch.equal(known(image), 2 * image)
+    assert asked == [0.1, 0.2, 0.3, 0.2]
+    images[1][0, 0, 0, 0] = 1.0  # the same tensor, another picture
+    assert torch.equal(known(images[1]), 2 * images[1])
+    assert known(images[0].float()).dtype == torch.float32
+    assert known(images[0].reshape(1, 1, 2, 8)).shape == (1, 1, 2, 8)
+
+
+def test_with_a_gradient_nothing_is_kept() -> None:
+    known = remembered(torch.square)
+    known(torch.ones(1, 1, 4, 4))
+    image = torch.ones(1, 1, 4, 4, requires_grad=True)
+    known(image).sum().backward()
+    assert image.grad is not None
+    assert torch.equal(image.grad, torch.full((1, 1, 4, 4), 2.0))
+    assert not known(torch.ones(1, 1, 4, 4)).requires_grad
