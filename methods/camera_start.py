@@ -65,7 +65,7 @@ class Camera:
 
         Without a capture for each it is the best so far.
         """
-        errors = torch.zeros(len(phases), len(self._target))
+        errors = self._target.new_zeros(len(phases), len(self._target))
         rounds = min(frames, self.left // len(phases))
         self.announce([*phases] * rounds)
         for _ in range(rounds):

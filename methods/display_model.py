@@ -75,7 +75,7 @@ class DisplayModel(nn.Module):
         return squared_modulus(self.forward(phase))
 
     def _propagator(self, channel: int) -> AngularSpectrum:
-        return self.spec.propagator(channel)
+        return self.spec.propagator(channel, device=self.table.device)
 
     def _driven(self, phase: Tensor) -> Tensor:
         """Phase that each level stands for: the look-up table, then the gain over the panel."""
@@ -100,8 +100,9 @@ class DisplayModel(nn.Module):
 
     def _taps(self) -> Tensor:
         """Share of each neighbouring pixel in each sub-sample, ``(C, samples, 2 reach + 1)``, along one axis."""
-        position = (torch.arange(SAMPLES) - (SAMPLES - 1) / 2) / SAMPLES
-        offset = torch.arange(-REACH, REACH + 1)[None] - position[:, None]
+        device = self.crosstalk.device
+        position = (torch.arange(SAMPLES, device=device) - (SAMPLES - 1) / 2) / SAMPLES
+        offset = torch.arange(-REACH, REACH + 1, device=device)[None] - position[:, None]
         scale = torch.exp(self.crosstalk)[:, None, None] * math.sqrt(2)
         share = torch.erf((offset + 0.5) / scale) - torch.erf((offset - 0.5) / scale)
         return share / share.sum(-1, keepdim=True)
@@ -117,7 +118,18 @@ class DisplayModel(nn.Module):
 
 def enlarged(grid: Tensor, shape: tuple[int, int]) -> Tensor:
     """A coarse map ``(C, n, n)`` as a smooth one ``(C, H, W)``."""
-    return functional.interpolate(grid[None], size=shape, mode="bicubic", align_corners=True)[0]
+    return _bicubic(grid[None], shape)[0] if grid.is_cpu else weighted(grid, shape)
+
+
+def weighted(grid: Tensor, shape: tuple[int, int]) -> Tensor:
+    """``enlarged`` as two products with matrices: bicubic interpolation has no deterministic gradient on a GPU."""
+    points = torch.eye(grid.shape[-1])[:, None, :, None]  # (n, 1, n, 1): what each point alone becomes along an axis
+    rows, columns = (_bicubic(points, (side, 1))[:, 0, :, 0].to(grid) for side in shape)
+    return rows.T @ grid @ columns
+
+
+def _bicubic(images: Tensor, shape: tuple[int, int]) -> Tensor:
+    return functional.interpolate(images, size=shape, mode="bicubic", align_corners=True)
 
 
 def pupil_modes(shape: tuple[int, int], pupil: float | None) -> Tensor:

@@ -98,10 +98,10 @@ def encode(field: Tensor, quantile: float = 1.0) -> Tensor:
     if quantile == 1:
         white = amplitude.amax(dim=(-2, -1), keepdim=True)
     else:
-        # kthvalue, since torch.quantile refuses more than 2^24 values
-        flat = amplitude.flatten(-2)
+        # kthvalue, since torch.quantile refuses more than 2^24 values; it has no deterministic form on a GPU
+        flat = amplitude.flatten(-2).cpu()
         rank = max(1, round(quantile * flat.shape[-1]))
-        white = flat.kthvalue(rank, dim=-1).values[..., None, None]
+        white = flat.kthvalue(rank, dim=-1).values[..., None, None].to(field.device)
     spread = torch.acos((amplitude / white.clamp_min(torch.finfo(white.dtype).tiny)).clamp(max=1))
     rows, columns = field.shape[-2:]
     parity = (

@@ -82,7 +82,7 @@ class OnlineCamera:
         slope = error * image.clamp_min(0).sqrt()
         gradients = []
         for colour, one in enumerate(phase):
-            model, at_panel = spec.propagator(colour), unit_field(one)
+            model, at_panel = spec.propagator(colour, device=one.device), unit_field(one)
             direction = torch.sgn(spec.region.crop(model.forward(at_panel)))
             returned = model.adjoint(spec.region.embed(slope[colour] * direction, model.shape))
             gradients.append((at_panel.conj() * returned).imag)

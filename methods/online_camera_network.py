@@ -111,10 +111,10 @@ class OnlineCameraNetwork:
         approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_judge=False, seed=seed)
         if self.network.name != "identity":
             approximator.trainer.generator = FromIdentity(approximator.trainer.generator)
-        return approximator
+        return approximator.to(bench.device)
 
     def _noise(self, phase: Tensor, draw: torch.Generator) -> Tensor:
-        return torch.randn((self.neighbours, *phase.shape), generator=draw)
+        return torch.randn((self.neighbours, *phase.shape), generator=draw).to(phase.device)
 
 
 def corrected(display: Image, samples: Sequence[Sample]) -> Image:

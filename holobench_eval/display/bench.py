@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from ..optics.convolution import frequencies
+from ..device import CPU
+from ..optics.convolution import by_columns, frequencies
 from ..optics.padding import padded_shape
 from ..optics.phase import blaze
 from ..optics.phasor import phasor, squared_modulus
@@ -39,16 +40,29 @@ class ChannelMaps:
     path: OpticalPath
     laser_power: float
 
+    def to(self, device: torch.device) -> ChannelMaps:
+        """The same on a device."""
+        return replace(
+            self,
+            added=self.added.to(device),
+            lut_gain=self.lut_gain.to(device),
+            amplitude=self.amplitude.to(device),
+            angle=self.angle.to(device),
+            path=self.path.to(device),
+        )
+
 
 class SimulatedBench:
     """A display that behaves like hardware. Methods see it through ``session``; only the oracle sees inside.
 
     profile: already scaled to its panel. Its name and seed draw every fixed pattern, so that another seed is another
-    bench of the same kind.
+    bench of the same kind. device: where light is computed, from the phase to what falls on the sensor; what is fixed
+    is drawn and built on the CPU and moved there. The sensor counts on the CPU, and so a ``Capture`` is there.
     """
 
-    def __init__(self, profile: Profile) -> None:
+    def __init__(self, profile: Profile, device: torch.device = CPU) -> None:
         self.profile = profile
+        self.device = device
         self.spec: DisplaySpec = profile.spec()
         panel = profile.panel
         self.samples = profile.sampling
@@ -61,10 +75,12 @@ class SimulatedBench:
         active = aperture.active_share(self.samples) if aperture else torch.ones(self.samples**2, 1, 1)
         dead = aperture.dead_share(self.samples) if aperture else torch.zeros(self.samples**2, 1, 1)
         grid = (self.samples, self.samples, 1, 1)
-        self.modulated = (order.modulated * active).view(grid)
+        self.modulated = (order.modulated * active).view(grid).to(device)
         self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid)
         self.channels = tuple(
-            self._channel(Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names))
+            self._channel(
+                Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names)
+            ).to(device)
             for index, wavelength in enumerate(panel.wavelengths)
         )
         geometry = self.channels[0].geometry
@@ -72,7 +88,7 @@ class SimulatedBench:
         self.points = self._pose(geometry).panel_points(
             panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape
         )
-        self.grid = sampling_grid(self.points, panel.shape)
+        self.grid = sampling_grid(self.points, panel.shape).to(device)
         self.response = profile.sensor.response((self.points.shape[0], self.points.shape[1]), geometry)
 
     def _channel(self, geometry: Geometry) -> ChannelMaps:
@@ -85,11 +101,7 @@ class SimulatedBench:
         incident = light.field(geometry) * profile.coherent_noise.panel(geometry) * demodulation
         if profile.drift.days:
             incident = incident * profile.drift.dust(geometry, profile.coherent_noise).to(incident.dtype)
-        dust = profile.coherent_noise.plane(geometry)
-        plane = None
-        if dust is not None:
-            plane = torch.ones(self._padded(), dtype=torch.complex64)
-            plane[: geometry.shape[0], : geometry.shape[1]] = dust
+        plane = profile.coherent_noise.plane(geometry)
         turning = 1 - profile.coherent_noise.plane_distance if plane is not None else 1.0
         padded, pupil, way = self._padded(), profile.panel.pupil, profile.propagation
         transfer = way.transfer(geometry, padded, pupil, (0.0, turning))
@@ -109,10 +121,10 @@ class SimulatedBench:
                 shape=geometry.shape,
                 rows=self.weights[0],
                 columns=self.weights[1],
-                still=panel_spectrum(self.unmodulated * incident, *self.weights),
-                transfer=transfer,
-                plane=plane,
-                last=last,
+                still=by_columns(panel_spectrum(self.unmodulated * incident, *self.weights)),
+                transfer=by_columns(transfer),
+                plane=None if plane is None else plane.to(transfer.dtype),
+                last=None if last is None else by_columns(last),
                 finer=self.image_samples,
             ),
             laser_power=profile.drift.laser_power(geometry) * light.power,
@@ -165,9 +177,10 @@ class SimulatedBench:
     def photograph(self, phase: Tensor, exposure: Sequence[float], draw: torch.Generator) -> Capture:
         """One colour-sequential capture of ``phase`` ``(C, H, W)`` [rad]."""
         sensor, frames = self.profile.sensor, []
+        phase = phase.to(self.device)
         for channel in range(phase.shape[0]):
             light = self.integrated(phase[channel], channel, self.profile.flicker.gain(draw))
-            light = sample(light, self.grid, self.image_samples)
+            light = sample(light, self.grid, self.image_samples).cpu()
             frames.append(sensor.expose(light, exposure[channel], self.response, draw))
         gain = tuple(electrons * sensor.counts_per_electron for electrons in exposure)
         return Capture(torch.stack(frames), sensor.dark, sensor.white, gain[: len(frames)])

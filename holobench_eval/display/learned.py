@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
+from ..device import CPU
 from ..errors import CellError
 from .bench import BenchSession
 from .contract import Capture, DisplaySpec
@@ -25,12 +26,13 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True)
 class LearnedBench(Shows):
-    """A display without noise, camera or registration; ``method`` predicts with what it ``learned``."""
+    """A display without noise, camera or registration; ``method`` predicts on ``device`` with what it ``learned``."""
 
     spec: DisplaySpec
     method: Predictor
     learned: Mapping[str, Any]
     seed: int
+    device: torch.device = CPU
 
     @property
     def simulation(self) -> Simulation:
@@ -43,8 +45,8 @@ class LearnedBench(Shows):
     ) -> Shot:
         """The predicted capture of ``phase`` ``(C, H, W)`` [rad]; the exposure does not matter without noise."""
         check_phase(phase, self.spec, label)
-        handle = MeteredBench(self, label, target, (self.seed, item, repeat), learned=self.learned)
-        image = self.method.predict(phase[None], handle)[0].detach()
+        handle = MeteredBench(self, label, target.to(self.device), (self.seed, item, repeat), learned=self.learned)
+        image = self.method.predict(phase[None].to(self.device), handle)[0].detach().cpu()
         share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
         light = tuple(concentration(target, self.spec).tolist())
         capture = Capture(image, dark=0.0, white=float("inf"), gain=(1.0,) * len(image))

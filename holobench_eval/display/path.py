@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -10,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from ..optics.convolution import multiply
+from ..optics.blocks import in_blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +20,9 @@ class OpticalPath:
 
     shape: of the panel; rows, columns: weights ``(samples, padded)`` that add the spectra of the sub-samples, see
     ``stages.propagation.sample_weights``; still: spectrum of the light that no phase changes; transfer: to the dust
-    plane, or all the way where there is none; plane: its transmission; last: transfer function from there to the image;
-    finer: samples a pixel and axis of the image.
+    plane, or all the way where there is none; plane: its transmission ``(H, W)``, one around it; last: transfer
+    function from there to the image; finer: samples a pixel and axis of the image. Work is done a block of rows or
+    columns at a time, see ``optics.convolution``: transfer functions are best stored column by column.
 
     The adjoint is written out: autograd would keep every factor's input and clear a new array for every crop.
     """
@@ -34,6 +36,18 @@ class OpticalPath:
     last: Tensor | None
     finer: int
 
+    def to(self, device: torch.device) -> OpticalPath:
+        """The same on a device."""
+        return replace(
+            self,
+            rows=self.rows.to(device),
+            columns=self.columns.to(device),
+            still=self.still.to(device),
+            transfer=self.transfer.to(device),
+            plane=None if self.plane is None else self.plane.to(device),
+            last=None if self.last is None else self.last.to(device),
+        )
+
     def image(self, field: Tensor) -> Tensor:
         """Field ``(samples, samples, H, W)`` of the sub-samples to ``(finer H, finer W)``; differentiable once."""
         seen: Tensor = _Seen.apply(field, self)  # type: ignore[no-untyped-call]
@@ -41,19 +55,75 @@ class OpticalPath:
 
     def forward(self, field: Tensor) -> Tensor:
         """``image`` for the light that follows the phase and the light that does not."""
-        spectrum = multiply(panel_spectrum(field, self.rows, self.columns).add_(self.still), self.transfer)
-        if self.plane is not None and self.last is not None:
-            spectrum = multiply(torch.fft.fft2(multiply(torch.fft.ifft2(spectrum), self.plane)), self.last)
-        return finer_field(spectrum, self.finer, self.shape)
+        lines = row_spectra(field, self.columns)
+        height, width = (self.finer * side for side in self.shape)
+
+        def arriving(part: slice) -> Tensor:
+            light = column_spectra(lines, self.rows, part).add_(self.still[:, part].T)
+            return light.mul_(self.transfer[:, part].T)
+
+        dusty = arriving if self.plane is None else self._through(self.plane, arriving)
+        seen = lines.new_empty((height, lines.shape[-1]))
+
+        def leaving(part: slice) -> None:
+            spectrum = dusty(part) if self.last is None else dusty(part).mul_(self.last[:, part].T)
+            seen[:, part] = finer_line(spectrum, self.finer)[:, :height].T
+
+        image = lines.new_empty((height, width))
+
+        def back(rows: slice) -> None:
+            image[rows] = finer_line(seen[rows], self.finer)[:, :width]
+
+        self._each_column(leaving)
+        in_blocks(back, seen, height, self.finer * seen.numel())
+        return image
 
     def adjoint(self, image: Tensor) -> Tensor:
         """The adjoint of the linear part of ``forward``, ``(finer H, finer W)`` to ``(samples, samples, H, W)``."""
+        padded, height = self.transfer.shape, self.shape[0]
         rows, columns, transfer, plane, last = self._conjugates
-        spectrum = finer_adjoint(image, self.finer, self.transfer.shape[-2:])
-        if plane is not None and last is not None:
-            field = torch.fft.ifft2(multiply(spectrum, last), norm="forward")
-            spectrum = torch.fft.fft2(multiply(field, plane), norm="forward")
-        return panel_adjoint(multiply(spectrum, transfer), rows, columns, self.shape)
+        seen = image.new_empty((len(image), padded[1]))
+
+        def begin(part: slice) -> None:
+            seen[part] = finer_adjoint(image[part], self.finer, padded[1])
+
+        def returning(part: slice) -> Tensor:
+            spectrum = finer_adjoint(seen[:, part].T, self.finer, padded[0])
+            return spectrum if last is None else spectrum.mul_(last[:, part].T)
+
+        in_blocks(begin, image, len(image), self.finer * seen.numel())
+        dusty = returning if plane is None else self._through(plane, returning)
+        lines = image.new_empty((len(rows), height, padded[1]))
+
+        def leaving(part: slice) -> None:
+            spectrum = dusty(part).mul_(transfer[:, part].T)
+            for line, weights in zip(lines, rows, strict=True):
+                line[:, part] = torch.fft.ifft(spectrum * weights, norm="forward")[:, :height].T
+
+        self._each_column(leaving)
+        return row_adjoint(lines, columns, self.shape[1])
+
+    def _through(self, plane: Tensor, light: Callable[[slice], Tensor]) -> Callable[[slice], Tensor]:
+        """The spectrum of a light behind the dust, or before it on the way back: a block of columns ``(block, rows)``.
+
+        What the dust changes is added to the light, so that only the dust's own window is transformed back and forth.
+        """
+        (height, width), (padded, columns) = self.shape, self.transfer.shape
+        spectrum, window, dust = plane.new_empty((columns, padded)), plane.new_empty((height, columns)), plane - 1
+
+        def back(part: slice) -> None:
+            spectrum[part] = light(part)
+            window[:, part] = torch.fft.ifft(spectrum[part])[:, :height].T
+
+        def scatter(rows: slice) -> None:
+            window[rows] = torch.fft.fft(torch.fft.ifft(window[rows])[:, :width].mul_(dust[rows]), n=columns)
+
+        self._each_column(back)
+        in_blocks(scatter, window, height, window.numel())
+        return lambda part: spectrum[part].add_(torch.fft.fft(window[:, part].T, n=padded))
+
+    def _each_column(self, work: Callable[[slice], None]) -> None:
+        in_blocks(work, self.transfer, self.transfer.shape[1], self.finer * self.transfer.numel())
 
     @cached_property
     def _conjugates(self) -> tuple[Tensor, Tensor, Tensor, Tensor | None, Tensor | None]:
@@ -85,52 +155,59 @@ def conjugate(factor: Tensor) -> Tensor:
 
 
 def panel_spectrum(field: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
-    """Spectrum of the panel on the padded grid, from the field ``(samples, samples, H, W)`` of its sub-samples.
+    """Spectrum of the panel on the padded grid, from the field ``(samples, samples, H, W)`` of its sub-samples."""
+    lines = row_spectra(field, columns)
+    return column_spectra(lines, rows, slice(None)).T
 
-    Axis by axis, so that the sub-samples of a row are one array before the columns are transformed.
-    """
+
+def row_spectra(field: Tensor, columns: Tensor) -> Tensor:
+    """Spectra of rows ``(samples, H, padded)``, the sub-samples of a row joined, of a field as ``panel_spectrum``."""
+    lines = field.new_empty((field.shape[0], field.shape[2], columns.shape[1]))
+
+    def join(rows: slice) -> None:
+        for line, samples in zip(lines, field, strict=True):
+            joined = torch.zeros(())
+            for sample, weights in zip(samples, columns, strict=True):
+                joined = torch.fft.fft(sample[rows], n=len(weights)).mul_(weights).add_(joined)
+            line[rows] = joined
+
+    in_blocks(join, field, field.shape[2], lines.numel() * field.shape[1])
+    return lines
+
+
+def column_spectra(lines: Tensor, rows: Tensor, part: slice) -> Tensor:
+    """Spectrum ``(block, padded)`` of a block of columns of the panel, from the spectra of its rows."""
     total = torch.zeros(())
-    for line, row in zip(field, rows, strict=True):
-        joined = torch.zeros(())
-        for samples, column in zip(line, columns, strict=True):
-            joined = multiply(torch.fft.fft(samples, n=len(column)), column).add_(joined)
-        total = multiply(torch.fft.fft(joined, n=len(row), dim=-2), row[:, None]).add_(total)
+    for line, weights in zip(lines, rows, strict=True):
+        total = torch.fft.fft(line[:, part].T, n=len(weights)).mul_(weights).add_(total)
     return total
 
 
-def panel_adjoint(spectrum: Tensor, rows: Tensor, columns: Tensor, shape: tuple[int, int]) -> Tensor:
-    """The adjoint of ``panel_spectrum``; rows and columns: its weights, conjugated."""
-    height, width = shape
-    field = spectrum.new_empty((len(rows), len(columns), height, width))
-    for line, row in zip(field, rows, strict=True):
-        joined = torch.fft.ifft(spectrum * row[:, None], dim=-2, norm="forward")[:height]
-        for samples, column in zip(line, columns, strict=True):
-            samples.copy_(torch.fft.ifft(joined * column, norm="forward")[:, :width])
+def row_adjoint(lines: Tensor, columns: Tensor, width: int) -> Tensor:
+    """The adjoint of ``row_spectra``; columns: its weights, conjugated."""
+    field = lines.new_empty((len(lines), len(columns), lines.shape[1], width))
+
+    def part(rows: slice) -> None:
+        for line, samples in zip(lines, field, strict=True):
+            for sample, weights in zip(samples, columns, strict=True):
+                sample[rows] = torch.fft.ifft(line[rows] * weights, norm="forward")[:, :width]
+
+    in_blocks(part, field, lines.shape[1], lines.numel() * len(columns))
     return field
 
 
-def finer_field(spectrum: Tensor, factor: int, shape: tuple[int, int]) -> Tensor:
-    """The first ``shape`` pixels of the field of a spectrum, with ``factor`` samples a pixel and axis.
-
-    Each axis is transformed with zeros between its positive and negative frequencies, and cropped before the next.
-    """
-    spectrum = spectrum * factor**2
-    for dim in (-1, -2):
-        size = spectrum.shape[dim]
-        low, high = spectrum.split([(size + 1) // 2, size // 2], dim)
-        gap = list(spectrum.shape)
-        gap[dim] *= factor - 1
-        padded = torch.cat([low, spectrum.new_zeros(gap), high], dim)
-        spectrum = torch.fft.ifft(padded, dim=dim).narrow(dim, 0, shape[dim] * factor)
-    return spectrum
+def finer_line(spectrum: Tensor, factor: int) -> Tensor:
+    """Lines ``(..., N)`` of spectrum to lines ``(..., factor N)`` of field, with ``factor`` samples a pixel."""
+    if factor == 1:
+        return torch.fft.ifft(spectrum)
+    size = spectrum.shape[-1]
+    low, high = spectrum.split([(size + 1) // 2, size // 2], -1)
+    gap = spectrum.new_zeros((*spectrum.shape[:-1], (factor - 1) * size))
+    return torch.fft.ifft(torch.cat([low, gap, high], -1)).mul_(factor)
 
 
-def finer_adjoint(image: Tensor, factor: int, padded: tuple[int, ...]) -> Tensor:
-    """The adjoint of ``finer_field``, to a spectrum of the shape ``padded``."""
-    spectrum = image * factor**2
-    for dim in (-2, -1):
-        size = padded[dim]
-        fine = torch.fft.fft(spectrum, n=size * factor, dim=dim, norm="forward")
-        low, high = (size + 1) // 2, size // 2
-        spectrum = torch.cat([fine.narrow(dim, 0, low), fine.narrow(dim, size * factor - high, high)], dim)
-    return spectrum
+def finer_adjoint(lines: Tensor, factor: int, size: int) -> Tensor:
+    """The adjoint of ``finer_line`` and a crop, ``(..., up to factor size)`` to ``(..., size)``."""
+    fine = torch.fft.fft(lines, n=factor * size, norm="forward").mul_(factor)
+    low, high = (size + 1) // 2, size // 2
+    return fine if factor == 1 else torch.cat([fine[..., :low], fine[..., -high:]], -1)

@@ -110,11 +110,11 @@ class RealBench(Shows):
 
     def shown(self, phase: Tensor) -> Tensor:
         """The phase that the panel gets: with the blaze of the bench."""
-        return phase + blaze(self.spec.shape, self.carrier)
+        return phase.cpu() + blaze(self.spec.shape, self.carrier)
 
     def relative_exposure(self, target: Tensor) -> float:
         """Exposure time for a target ``(C, h, w)``, relative to that for the fiducial grid, from the target alone."""
-        ratio = concentration(self._grid_target, self.spec) / concentration(target, self.spec)
+        ratio = concentration(self._grid_target, self.spec) / concentration(target.cpu(), self.spec)
         return float(f"{float(ratio.min()):.3g}")
 
     def session(self, names: tuple[object, ...], target: Tensor) -> RealSession:
@@ -166,7 +166,7 @@ class RealBench(Shows):
         return None if second is None else self._in_frame(shot.capture, target, second)
 
     def _in_frame(self, capture: Capture, target: Tensor, registration: Registration) -> Tensor:
-        light = registration.rectify(capture.linear())
+        light = registration.rectify(capture.linear()).to(target.device)
         return light / concentration(target, self.spec)[: light.shape[0], None, None]
 
 

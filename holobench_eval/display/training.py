@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
+from ..device import CPU, moved
 from ..errors import BudgetError
 from ..seeds import generator
 from .contract import DisplaySpec
@@ -78,6 +79,11 @@ class TrainingBench:
         return self._workbench.spec
 
     @property
+    def device(self) -> torch.device:
+        """Where the images are, and with them all that is computed."""
+        return next((image.target.device for image in (*self.images, *self.held_out)), CPU)
+
+    @property
     def captures(self) -> int:
         """Captures taken so far, those before an interruption included."""
         return self._captures
@@ -135,11 +141,12 @@ class TrainingBench:
         self._captures = max(self._captures, int(known["captures"]))
         if known["seconds"] > self.seconds:
             self._spent += known["seconds"] - self.seconds
-        return dict(known["value"])
+        value: Value = moved(dict(known["value"]), self.device)
+        return value
 
     def save(self, name: str, value: Value) -> None:
-        """Keep a value under ``name``, in the place of an older one."""
-        self._memory.save(name, {"value": value, "captures": self._captures, "seconds": self.seconds})
+        """Keep a value under ``name``, in the place of an older one; what is kept does not depend on the device."""
+        self._memory.save(name, {"value": moved(value, CPU), "captures": self._captures, "seconds": self.seconds})
 
     def log(self, **row: float | int | str) -> None:
         """A row for those who watch: numbers by name, such as round, step, losses and fidelity."""

@@ -31,7 +31,7 @@ def truth(bench: SimulatedBench) -> list[Estimate]:
 
 def _panel(bench: SimulatedBench, colour: int) -> list[Estimate]:
     profile, maps = bench.profile, bench.channels[colour]
-    gain = maps.lut_gain.double().mean() * bench.drift_gain
+    gain = maps.lut_gain.double().mean().cpu() * bench.drift_gain
     levels = torch.arange(1, LEVELS - 1, dtype=torch.float64) / (LEVELS - 1)
     law = stroke(levels, profile.lut.phase(levels * 2**profile.panel.bits, profile.panel.bits, gain, colour))
     modulated, unmodulated = complex(bench.modulated.mean()), complex(bench.unmodulated.mean())

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from ..capture.grid import fiducial
 from ..capture.registration import Registration, register
+from ..device import CPU
 from ..errors import BudgetError, CellError
 from ..methods.wirtinger import Wirtinger
 from ..optics.phase import TAU
@@ -114,7 +115,7 @@ class Workbench(Shows):
         if self.registered_as is not None:
             return self.registered_as.registration
         grid = fiducial(self.spec.region.shape)
-        target = grid.image.float().expand(len(self.spec.wavelengths), -1, -1)
+        target = grid.image.float().expand(len(self.spec.wavelengths), -1, -1).to(self.bench.device)
         return register(self._fiducial(target), grid, self.bench.profile.residual_bound)
 
     @cached_property
@@ -125,7 +126,7 @@ class Workbench(Shows):
         for warp in self.registration.warps:
             x, y = warp.coordinates()
             seen = cv2.remap(points, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
-            grids.append(sampling_grid(torch.from_numpy(seen), self.spec.shape))
+            grids.append(sampling_grid(torch.from_numpy(seen), self.spec.shape).to(self.bench.device))
         return Simulation(self.bench, tuple(grids))
 
     def _fiducial(self, target: Tensor) -> Tensor:
@@ -180,8 +181,8 @@ class Workbench(Shows):
         )
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        """A capture as ``(C, h, w)`` in the target's frame and in the unit of ``Shot.image``."""
-        light = self.registration.rectify(capture.linear())
+        """A capture as ``(C, h, w)`` in the target's frame, on its device, and in the unit of ``Shot.image``."""
+        light = self.registration.rectify(capture.linear()).to(target.device)
         return light / concentration(target, self.spec)[: light.shape[0], None, None]
 
 
@@ -258,6 +259,11 @@ class MeteredBench:
     def spec(self) -> DisplaySpec:
         """Nominal optics, public."""
         return self._workbench.spec
+
+    @property
+    def device(self) -> torch.device:
+        """Where the target is, and with it all that a method computes."""
+        return self._target.device
 
     @property
     def captures(self) -> int:
@@ -371,10 +377,14 @@ def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
 
 
 def open_bench(
-    profile: Profile, panel: tuple[int, int] | None = None, seed: int = 0, registered_as: Workbench | None = None
+    profile: Profile,
+    panel: tuple[int, int] | None = None,
+    seed: int = 0,
+    registered_as: Workbench | None = None,
+    device: torch.device = CPU,
 ) -> Workbench:
     """The simulated bench of a profile on a panel of (rows, columns) pixels; ``seed`` names its noise.
 
-    registered_as: see ``Workbench``.
+    registered_as: see ``Workbench``; device: see ``SimulatedBench``.
     """
-    return Workbench(SimulatedBench(profile.scaled(panel)), seed, registered_as)
+    return Workbench(SimulatedBench(profile.scaled(panel), device), seed, registered_as)

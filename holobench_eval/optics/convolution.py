@@ -124,12 +124,12 @@ def is_large(transfer: Tensor) -> bool:
 
 def as_used(transfer: Tensor) -> Tensor:
     """The same transfer function ``(rows, columns)``, each column contiguous in memory if it is a large one."""
-    return transfer.T.contiguous().T if is_large(transfer) else transfer
+    return by_columns(transfer) if is_large(transfer) else transfer
 
 
-def multiply(scratch: Tensor, factor: Tensor) -> Tensor:
-    """``scratch * factor``, in place where no gradient needs ``scratch``: a new array costs as much as the product."""
-    return scratch * factor if scratch.requires_grad else scratch.mul_(factor)
+def by_columns(transfer: Tensor) -> Tensor:
+    """The same transfer function ``(rows, columns)``, each column contiguous in memory."""
+    return transfer.T.contiguous().T
 
 
 def frequencies(shape: tuple[int, int], pitch: float, device: torch.device | str = "cpu") -> tuple[Tensor, Tensor]:

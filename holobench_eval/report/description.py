@@ -264,7 +264,7 @@ def rules(results: Results) -> dict[str, str]:
 
 def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What the run used, as far as it is the same for two equal runs: no times, no paths, no revisions."""
-    single = {"package": "holobench_eval", "python": "Python", "platform": "platform", "cpu": "processor"}
+    single = {"package": "holobench_eval", "python": "Python", "platform": "platform", "cpu": "processor", "gpu": "GPU"}
     numbers = {"threads": "threads per worker", "workers": "workers", "config_sha256": "sha256 of the config"}
     named = [(title, str(provenance[key])) for key, title in (single | numbers).items() if key in provenance]
     return [*named, *((name, str(value)) for name, value in provenance.get("packages", {}).items())]

@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import torch
+
+from ..device import CPU
 from ..errors import CellError, UserError
 
 if TYPE_CHECKING:
@@ -94,14 +97,15 @@ def real_condition(source: str, folder: Path) -> Condition:
     return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=Rig(bench=path))
 
 
-def workbench(shown: Condition, seed: int) -> Workbench | RealBench:
-    """The bench of a condition, built and calibrated once in a process.
+def workbench(shown: Condition, seed: int, device: torch.device = CPU) -> Workbench | RealBench:
+    """The bench of a condition, built and calibrated once in a process; a simulated one is computed on ``device``.
 
     CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
     """
-    key = (shown.source, shown.folder, shown.digest, shown.spec.shape, shown.change, shown.real, seed)
+    place = None if shown.real else device  # a real one is opened once, whoever computes
+    key = (shown.source, shown.folder, shown.digest, shown.spec.shape, shown.change, shown.real, seed, place)
     if key not in _open:
-        _open[key] = _opened(shown, seed)
+        _open[key] = _opened(shown, seed, device)
         pixels = shown.spec.shape[0] * shown.spec.shape[1]
         while len(_open) > max(2, min(OPEN_BENCHES, OPEN_PIXELS // pixels)):
             _open.popitem(last=False)
@@ -116,11 +120,11 @@ _open: OrderedDict[object, Workbench | RealBench | CellError] = OrderedDict()
 """Those used least recently come first."""
 
 
-def simulated(shown: Condition, seed: int) -> Workbench:
+def simulated(shown: Condition, seed: int, device: torch.device = CPU) -> Workbench:
     """``workbench`` of a display that does not exist."""
     from ..display import Workbench
 
-    opened = workbench(shown, seed)
+    opened = workbench(shown, seed, device)
     assert isinstance(opened, Workbench)
     return opened
 
@@ -131,7 +135,7 @@ def forget_sessions() -> None:
         del _open[key]
 
 
-def _opened(shown: Condition, seed: int) -> Workbench | RealBench | CellError:
+def _opened(shown: Condition, seed: int, device: torch.device) -> Workbench | RealBench | CellError:
     if shown.real is not None:
         from .real_bench import open_real
 
@@ -146,9 +150,9 @@ def _opened(shown: Condition, seed: int) -> Workbench | RealBench | CellError:
     try:
         if shown.change is not None:
             if not KINDS[shown.change[0]].moves:
-                unmoved = simulated(shown.nominal, seed)
+                unmoved = simulated(shown.nominal, seed, device)
             profile = altered(profile, *shown.change)
-        opened = open_bench(profile, shown.spec.shape, seed, unmoved)
+        opened = open_bench(profile, shown.spec.shape, seed, unmoved, device)
         _ = opened.registration  # calibrated now, so that no method's time includes it
     except CellError as error:
         return error

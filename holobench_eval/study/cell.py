@@ -22,7 +22,7 @@ def work(job: Job) -> list[Record]:
 
     A cell that waits for a photograph (``Pending``) gets no record.
     """
-    with repeatable(job.setting.threads):
+    with repeatable(job.setting.threads, job.device):
         try:
             measure = (FLOORS if job.task.is_floor else MEASURES)[job.task.cells[0].measure](job)
         except LostDeviceError:

@@ -40,9 +40,13 @@ SETTINGS = {
 
 @dataclass(frozen=True)
 class Local:
-    """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try."""
+    """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try.
+
+    gpus: where there are several to compute on, each worker sees one of them.
+    """
 
     workers: int
+    gpus: int = 0
 
     def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results as they come. No more jobs are taken than there are workers."""
@@ -61,6 +65,8 @@ class Local:
             Client(cluster) as client,  # type: ignore[no-untyped-call]
         ):
             client.register_plugin(_bound_to_the_parent())
+            if self.gpus > 1:
+                client.register_plugin(_one_gpu_each(self.gpus))
             yield from _results(client, lambda: self.workers, function, jobs)
 
 
@@ -187,6 +193,18 @@ def _bound_to_the_parent() -> Any:
             threading.Thread(target=_die_with, args=(os.getppid(),), daemon=True).start()
 
     return BoundToParent()
+
+
+def _one_gpu_each(gpus: int) -> Any:
+    """A plugin by which workers, numbered from 0, take the GPUs in turn, before torch has looked for any."""
+    from distributed import WorkerPlugin
+
+    class OneGpu(WorkerPlugin):
+        def setup(self, worker: Any) -> None:
+            seen = os.environ.get("CUDA_VISIBLE_DEVICES") or ",".join(map(str, range(gpus)))
+            os.environ["CUDA_VISIBLE_DEVICES"] = seen.split(",")[int(worker.name) % gpus]
+
+    return OneGpu()
 
 
 def _die_with(parent: int) -> None:

@@ -46,13 +46,16 @@ class Serial:
 
 
 NAMES = ("auto", "serial", "local", "slurm", "address")
+ELSEWHERE = ("slurm", "address")
+"""Those whose workers are on other machines and know their own GPUs."""
 
 
-def executor(name: str, workers: int | None, small: bool = True, address: str | None = None) -> Executor:
-    """The executor of a name; ``workers`` defaults to the number of processors.
+def executor(name: str, workers: int | None, small: bool = True, address: str | None = None, gpus: int = 0) -> Executor:
+    """The executor of a name; ``workers`` defaults to the number of GPUs to compute on, without any of processors.
 
     "auto" is local where the study's panel is small and there is more than one worker to have, else serial: a small
-    panel does not keep several threads busy, a large one fills the memory. address: of a running Dask scheduler.
+    panel does not keep several threads busy, a large one fills the memory. With GPUs it is local where there are
+    several. address: of a running Dask scheduler.
     """
     if name not in NAMES:
         raise UserError(f"unknown executor '{name}'; {suggest(name, NAMES)}")
@@ -68,9 +71,10 @@ def executor(name: str, workers: int | None, small: bool = True, address: str | 
         if workers is None:
             raise UserError("--executor slurm needs --workers, how many SLURM jobs to start")
         return Slurm(workers)
-    if name == "serial" or (name == "auto" and ((workers or _cores()) == 1 or (not small and workers is None))):
+    many = workers or gpus or _cores()
+    if name == "serial" or (name == "auto" and (many == 1 or not (small or workers or gpus))):
         return Serial()
-    return Local(workers or _cores())
+    return Local(many, gpus)
 
 
 def _cores() -> int:

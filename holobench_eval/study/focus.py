@@ -30,7 +30,7 @@ def focus(job: Job) -> Measure:
     offsets = {cell.target: offset(place, cell.change) for cell in cells}
 
     def solve(method: Any, handle: MeteredBench) -> Any:
-        pictures = torch.stack(list(targets.values()))
+        pictures = torch.stack(list(targets.values())).to(job.device)
         if getattr(method, "planes", False):
             return method.solve_planes(pictures, list(offsets.values()), handle)[None]
         return method.solve(pictures, handle)

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import torch
 from torch import Tensor
 
 from .. import registry
 from ..config import Save
+from ..device import CPU, find, gpu_name, moved
 from ..errors import CellError, Pending
 from ..seeds import seed
+from . import timings
 from .artifacts import Artifact, Artifacts
 from .bench import Condition, workbench
+from .identity import canonical
 from .plan import Cell, Task
 from .preparation import Preparation
 from .store import Record
@@ -33,7 +38,7 @@ class Setting:
 
     output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
     what trained methods learned; threads: torch threads of a worker; workers: tasks computed side by side; retime:
-    measure wall times again, see ``timings``.
+    measure wall times again, see ``timings``; device: name of where a worker computes, see ``device.find``.
     """
 
     output: Path
@@ -44,6 +49,7 @@ class Setting:
     threads: int
     workers: int
     retime: bool = False
+    device: str = "cpu"
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,17 @@ class Job:
     task: Task
     wanted: frozenset[str]
     setting: Setting
+
+    @property
+    def device(self) -> torch.device:
+        """Where this worker computes. UserError for a GPU that is not there."""
+        return find(self.setting.device)
+
+    @property
+    def timing(self) -> str:
+        """The name of its timing."""
+        setting = self.setting
+        return timings.key(self.task, setting.threads, setting.workers, gpu_name(self.device))
 
     @property
     def cells(self) -> list[tuple[Cell, Condition]]:
@@ -81,12 +98,12 @@ class Job:
         """The display of a cell: a simulated bench, or a trained network."""
         learned = self.learned(place.learned)
         if place.learned is None or learned is None:
-            return workbench(place, cell.seed)
+            return workbench(place, cell.seed, self.device)
         from ..display.learned import LearnedBench
 
         needed = place.learned
         method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
-        return LearnedBench(place.spec, method, learned.state, cell.seed)
+        return LearnedBench(place.spec, method, moved(learned.state, self.device), cell.seed, self.device)
 
 
 def target_of(cell: Cell, place: Condition, folder: Path) -> Tensor:
@@ -94,13 +111,40 @@ def target_of(cell: Cell, place: Condition, folder: Path) -> Tensor:
     dataset = registry.build("datasets", cell.dataset, dict(cell.dataset_params), folder)
     if dataset.digest(cell.target) != cell.target_sha256:
         raise CellError(f"target '{cell.target}' has changed since the study was planned; start the run again")
-    target: Tensor = dataset.load(cell.target, place.spec.region.shape, channels=len(place.spec.wavelengths))
+    made = canonical([cell.dataset, dict(cell.dataset_params), str(folder), cell.target, cell.target_sha256])
+    shape = place.spec.region.shape
+    return _loaded(made, _Source(dataset), cell.target, shape, len(place.spec.wavelengths)).clone()
+
+
+class _Source:
+    """A dataset that ``_loaded`` does not tell from another: its other arguments do."""
+
+    def __init__(self, dataset: Any) -> None:
+        self.dataset = dataset
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Source)
+
+
+@lru_cache(maxsize=2)
+def _loaded(made: str, source: _Source, item: str, shape: tuple[int, int], channels: int) -> Tensor:
+    """A target, kept for its repeats. made: all that it depends on, besides shape and channels."""
+    target: Tensor = source.dataset.load(item, shape, channels=channels)
     return target
 
 
 @contextmanager
-def repeatable(threads: int) -> Iterator[None]:
-    """The same numbers for the same input: threads as asked for, operations without a deterministic form refused."""
+def repeatable(threads: int, device: torch.device = CPU) -> Iterator[None]:
+    """The same numbers for the same input: threads as asked for, operations without a deterministic form refused.
+
+    On a GPU single precision is meant as such, too: its convolutions would round to ten bits (TF32).
+    """
+    if device.type == "cuda":
+        os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # read at the first product of matrices
+        torch.backends.cudnn.allow_tf32 = torch.backends.cuda.matmul.allow_tf32 = False
     before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_default_dtype(torch.float32)  # a method's file may have changed these two for everybody
     torch.set_grad_enabled(True)

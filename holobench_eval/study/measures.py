@@ -11,10 +11,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import torch
 from torch import Tensor
 
 from .. import registry
 from ..capture.photograph import MOST_SATURATED
+from ..device import moved
 from ..display.real import RealBench
 from ..errors import BudgetError, CellError
 from ..metrics import floor_captures, match, score
@@ -48,7 +50,8 @@ def picture(job: Job) -> Measure:
     target = target_of(job.task.cells[0], place, job.setting.folder)
 
     def make() -> Solution:
-        return solution(job, place, target, lambda method, handle: method.solve(target[None].clone(), handle))
+        shown = target[None].to(job.device, copy=True)
+        return solution(job, place, target, lambda method, handle: method.solve(shown, handle))
 
     in_session = place.real is not None and place.real.folder is not None
     made = solutions.kept(job, make) if in_session else make()
@@ -59,6 +62,7 @@ def solution(job: Job, place: Condition, target: Tensor, solve: Callable[[Any, M
     """Let the task's method ``solve`` on a display, in the name of the task's first cell.
 
     target: ``(C, h, w)``, which the display is exposed for. What a method does to its own must not reach the score.
+    What the method is given is on the job's device, and what it made comes back to the CPU.
     """
     task, setting = job.task, job.setting
     first, learned = task.cells[0], job.learned(task.preparation)
@@ -66,19 +70,19 @@ def solution(job: Job, place: Condition, target: Tensor, solve: Callable[[Any, M
     handle = job.bench(first, place).for_method(
         method,
         task.label,
-        target,
+        target.to(job.device),
         item=first.target,
         repeat=first.repeat,
         budget=first.captures,
-        learned=learned.state if learned else None,
+        learned=moved(learned.state, job.device) if learned else None,
     )
-    watch = effort.start()
+    watch = effort.start(job.device)
     solved, stopped = _within_budget(method, solve, handle)
     taken = watch.stop()
     if not isinstance(solved, Tensor) or tuple(solved.shape[:2]) != (1, len(target)):
         found = tuple(solved.shape) if isinstance(solved, Tensor) else type(solved).__name__
         raise CellError(f"{task.label}: solve returned {found}, not a phase (1, {len(target)}, H, W)")
-    taken = timings.keep(timings.key(task, setting.threads, setting.workers), taken, setting.retime)
+    taken = timings.keep(job.timing, taken, setting.retime)
     return Solution(solved.detach().cpu()[0], handle.captures, taken, stopped, learned)
 
 
@@ -140,26 +144,27 @@ def prediction(job: Job) -> Measure:
     cell, place = task.cells[0], task.conditions[0]
     method = registry.build("methods", cell.method, dict(cell.params), setting.folder)
     learned, target = job.learned(task.preparation), target_of(cell, place, setting.folder)
-    phase, shot = _shown(_Shown(cell), place, setting.folder)
+    phase, shot = _shown(_Shown(cell), place, setting.folder, job.device)
     _refuse_saturated(shot)
     wanted, factors = match(shot.image, target)
-    handle = workbench(place, cell.seed).for_method(
+    handle = workbench(place, cell.seed, job.device).for_method(
         method,
         task.label,
-        target,
+        target.to(job.device),
         item=cell.target,
         repeat=cell.repeat,
         budget=0,  # the capture is what is to be predicted
-        learned=learned.state if learned else None,
+        learned=moved(learned.state, job.device) if learned else None,
     )
-    watch = effort.start()
-    predicted = method.predict(phase[None].clone(), handle)
+    given = phase[None].to(job.device, copy=True)
+    watch = effort.start(job.device)
+    predicted = method.predict(given, handle)
     taken = watch.stop()
     if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *wanted.shape):
         found = tuple(predicted.shape) if isinstance(predicted, Tensor) else type(predicted).__name__
         raise CellError(f"{task.label}: predict returned {found}, not an image {(1, *wanted.shape)}")
     image = factors.view(-1, 1, 1) * predicted.detach().cpu()[0]
-    taken = timings.keep(timings.key(task, setting.threads, setting.workers), taken, setting.retime)
+    taken = timings.keep(job.timing, taken, setting.retime)
 
     def compare(cell: Cell, _: Condition) -> Record:
         _save(job, cell, image, phase)
@@ -182,8 +187,8 @@ def prediction(job: Job) -> Measure:
 def floor(job: Job, scored: Scored = plain) -> Measure:
     """What images that no display made score on the task's target, or on the capture that is to be predicted."""
     setting, cells, place = job.setting, job.task.cells, job.task.conditions[0]
-    images = [_wanted(cells[0], place, setting.folder)]
-    images += [_wanted(replace(cell, **cell.params), place, setting.folder) for cell in cells if cell.params]
+    shown = [cells[0], *(replace(cell, **cell.params) for cell in cells if cell.params)]
+    images = [_wanted(cell, place, setting.folder, job.device) for cell in shown]
     captures = floor_captures(images[0], images[1:], cells[0].seed, cells[0].target)
     write_thumbnail(Store(setting.output).target_thumbnail(cells[0].target), images[0])
 
@@ -194,10 +199,12 @@ def floor(job: Job, scored: Scored = plain) -> Measure:
     return reference
 
 
-def _wanted(cell: Cell, place: Condition, folder: Path) -> Tensor:
+def _wanted(cell: Cell, place: Condition, folder: Path, device: torch.device) -> Tensor:
     """What a cell's image is compared with, ``(C, h, w)`` linear light in [0, 1]: its target, or a capture."""
     target = target_of(cell, place, folder)
-    return target if cell.measure != "prediction" else match(_shown(_Shown(cell), place, folder)[1].image, target)[0]
+    if cell.measure != "prediction":
+        return target
+    return match(_shown(_Shown(cell), place, folder, device)[1].image, target)[0]
 
 
 class _Shown:
@@ -215,13 +222,14 @@ class _Shown:
 
 
 @lru_cache(maxsize=64)
-def _shown(shown: _Shown, place: Condition, folder: Path) -> tuple[Tensor, Shot]:
+def _shown(shown: _Shown, place: Condition, folder: Path, device: torch.device) -> tuple[Tensor, Shot]:
     """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture; once in a process."""
     cell = shown.cell
-    bench, target = workbench(place, cell.seed), target_of(cell, place, folder)
+    bench, target = workbench(place, cell.seed, device), target_of(cell, place, folder)
+    given = target.to(device, copy=True)
     method = registry.build("methods", cell.holograms["name"], dict(cell.holograms["params"]), folder)
-    handle = bench.for_method(method, cell.holograms["name"], target, item=cell.target, repeat=cell.repeat)
-    phase = method.solve(target[None].clone(), handle).detach()[0]
+    handle = bench.for_method(method, cell.holograms["name"], given, item=cell.target, repeat=cell.repeat)
+    phase = method.solve(given[None], handle).detach().cpu()[0]
     return phase, bench.photograph(phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure)
 
 

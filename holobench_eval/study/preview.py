@@ -97,21 +97,22 @@ def training_table(rows: list[TrainingRow]) -> Table:
     return result
 
 
-def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int) -> list[Row]:
-    """A row per method, the floor first."""
+def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, gpu: str = "") -> list[Row]:
+    """A row per method, the floor first. gpu: as in ``timings.key``, as are threads and workers."""
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     labels = dict.fromkeys(task.label for task in plan.tasks)
+    machine = (threads, workers, gpu)
     return [
-        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, threads, workers)
+        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, machine)
         for label in labels
     ]
 
 
-def _row(label: str, tasks: list[Task], limit: int | None, store: Store, threads: int, workers: int) -> Row:
+def _row(label: str, tasks: list[Task], limit: int | None, store: Store, machine: tuple[int, int, str]) -> Row:
     cells = [cell for task in tasks for cell in task.cells]
     states = [record.state if (record := store.read(cell.id)) else "missing" for cell in cells]
     unsolved = [task for task in tasks if store.missing(task.cells)]
-    known = [timings.known(timings.key(task, threads, workers)) for task in tasks if not task.is_floor]
+    known = [timings.known(timings.key(task, *machine)) for task in tasks if not task.is_floor]
     timed = [effort.seconds for effort in known if effort is not None]
     return Row(
         label=label,

@@ -37,12 +37,17 @@ def text_digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int) -> dict[str, Any]:
-    """Everything about the present run that is not in its config: versions, revision, machine, displays, command."""
+def describe(
+    study: Study, plan: Plan, output: Path, threads: int, workers: int, device: str = "cpu", gpu: str = ""
+) -> dict[str, Any]:
+    """Everything about the present run that is not in its config: versions, revision, machine, displays, command.
+
+    device: as it was asked for; gpu: its name, if it is one and known.
+    """
     shown = {place.name: place for task in plan.tasks for place in task.conditions}
     return {
         "package": __version__,
-        **_revision(),
+        **revision(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
@@ -51,6 +56,8 @@ def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int)
         "packages": {name: installed(name) for name in PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
         "cpu": cpu_model(),
+        "device": device,
+        **({"gpu": gpu} if gpu else {}),
         "threads": threads,
         "workers": workers,
         "started": now(),
@@ -58,7 +65,7 @@ def describe(study: Study, plan: Plan, output: Path, threads: int, workers: int)
     }
 
 
-def _revision() -> dict[str, Any]:
+def revision() -> dict[str, Any]:
     """The git revision of the package and whether its files were changed since; nothing outside a checkout."""
     folder = Path(__file__).parent
     try:

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from ..device import find, gpu_name
 from . import provenance
 from .artifacts import Artifacts
 from .available import refuse_unavailable
-from .executors import Executor
+from .clusters import Local
+from .executors import Executor, Serial
 from .job import Job, Setting
 from .plan import Plan, Task
 from .preparation import Preparation
@@ -71,11 +73,13 @@ def run(
     retry_failed: bool = False,
     retime: bool = False,
     retrain: bool = False,
+    device: str = "cpu",
 ) -> Outcome:
     """Train what is not trained, compute the missing cells of a plan and write their records.
 
     artifacts: folder of what methods learned; retry_failed: compute failed cells again; retime: measure wall times
-    again (see ``timings``); retrain: train again, and compute again what depends on it.
+    again (see ``timings``); retrain: train again, and compute again what depends on it; device: name of where every
+    worker computes (see ``device.find``).
     UserError: the folder is in use by another run, or holds a damaged record. An interrupt passes through;
     every record written before it stays, and the next run goes on from there.
     """
@@ -89,7 +93,8 @@ def run(
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)
         if missing or described.get("config_sha256") != provenance.text_digest(study.text):
-            described = provenance.describe(study, plan, output, threads, executor.workers)
+            gpu = gpu_name(find(device)) if isinstance(executor, Serial | Local) else ""  # else it is another machine's
+            described = provenance.describe(study, plan, output, threads, executor.workers, device, gpu)
             described = provenance.begin(output, described, resumed=len(missing) < len(plan.cells))
         setting = Setting(
             output=output,
@@ -100,13 +105,14 @@ def run(
             threads=threads,
             workers=executor.workers,
             retime=retime,
+            device=device,
         )
         if missing:  # else no worker need be started
             untrained = _untrained(plan, missing, setting)
             if untrained:
                 watch.training([(needed.name, Artifacts(artifacts).place(needed)) for needed in untrained])
             unlearned = {needed.id for needed in untrained}
-            trainings = [TrainingJob(needed, artifacts, threads) for needed in untrained]
+            trainings = [TrainingJob(needed, artifacts, threads, device) for needed in untrained]
             steps = queue(trainings, _jobs(plan, missing, setting), unlearned)
             results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, watch))
             for one, made in results:

@@ -49,8 +49,8 @@ def _torch() -> str:
     return version("torch")
 
 
-def key(task: Task, threads: int, workers: int) -> str:
-    """Name of a task's timing: the hash of everything its wall time should depend on."""
+def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
+    """Name of a task's timing: the hash of everything its wall time should depend on. gpu: its name, empty for none."""
     cell, place = task.cells[0], task.conditions[0]
     return digest(
         {
@@ -60,7 +60,7 @@ def key(task: Task, threads: int, workers: int) -> str:
             "noise": [cell.seed, cell.repeat],
             "learned": [cell.measure, *cell.prepared],
             "measure": cell.measure,
-            "machine": [cpu_model(), platform.machine(), threads, workers],
+            "machine": [cpu_model(), platform.machine(), threads, workers, *([gpu] if gpu else [])],
             "versions": [_torch(), __version__],
         }
     )

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from .. import __version__, registry
+from ..device import CPU, find, gpu_name, moved
 from ..display.effects import effects
 from ..display.estimates import joined
 from ..display.real import RealBench
@@ -28,21 +31,22 @@ WAITS = "waits for photographs"
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """A preparation and what a worker needs to carry it out."""
+    """A preparation and what a worker needs to carry it out. device: name of where it computes, see ``device.find``."""
 
     needed: Preparation
     folder: Path
     threads: int
+    device: str = "cpu"
 
 
 def train(job: TrainingJob) -> str:
     """Make an artifact, going on where an earlier attempt stopped. Returns why it failed, empty if it did not."""
-    artifacts = Artifacts(job.folder)
-    with artifacts.locked(job.needed), repeatable(job.threads):
+    artifacts, device = Artifacts(job.folder), find(job.device)
+    with artifacts.locked(job.needed), repeatable(job.threads, device):
         if artifacts.has(job.needed):
             return ""
         try:
-            _train(job.needed, artifacts, job.threads)
+            _train(job.needed, artifacts, job.threads, device)
         except LostDeviceError:
             raise
         except Pending:
@@ -53,11 +57,11 @@ def train(job: TrainingJob) -> str:
         return ""
 
 
-def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
+def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torch.device) -> None:
     method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
-    images = _images(needed)
+    images = _images(needed, device)
     split = len(images) - needed.held_out
-    place = workbench(needed.place, needed.seed)
+    place = workbench(needed.place, needed.seed, device)
     bench = TrainingBench(
         place,
         needed.method,
@@ -70,10 +74,12 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int) -> None:
     state = method.prepare(bench)
     if not isinstance(state, Mapping):
         raise CellError(f"{needed.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
+    state = moved(state, CPU)
     facts: dict[str, Any] = {
         "captures": bench.captures,
         "seconds": round(bench.seconds, 1),
         "threads": threads,
+        **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),
         "package": __version__,
         "method_sha256": code_digest(type(method)),
@@ -103,12 +109,13 @@ def diagnosis(method: object, state: Mapping[str, Any], place: Workbench | RealB
     return found
 
 
-def _images(needed: Preparation) -> list[TrainingImage]:
-    """The training images at the size of the scored region."""
+def _images(needed: Preparation, device: torch.device) -> list[TrainingImage]:
+    """The training images at the size of the scored region, on a device."""
     dataset = registry.build("datasets", needed.dataset, dict(needed.dataset_params), needed.folder)
     spec, images = needed.place.spec, []
     for item, sha256 in needed.images:
         if dataset.digest(item) != sha256:
             raise CellError(f"training image '{item}' has changed since the study was planned; start the run again")
-        images.append(TrainingImage(item, dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))))
+        target = dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))
+        images.append(TrainingImage(item, target.to(device)))
     return images

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor, nn
@@ -39,11 +39,21 @@ class ModelApproximator:
 
     def __init__(self, model: nn.Module, network: nn.Module | None, rates: Rates) -> None:
         self.model, self.network = model, network
-        groups: list[dict[str, Any]] = [{"params": list(model.parameters()), "lr": rates.model}]
-        if network is not None:
-            groups.append({"params": list(network.parameters()), "lr": rates.network})
-        self._optimiser = torch.optim.Adam(groups, betas=BETAS)
-        self._rates = [group["lr"] for group in groups]
+        self._rates = [rates.model, rates.network][: 1 if network is None else 2]
+        self._optimiser = self._fresh_optimiser()
+
+    def to(self, device: torch.device) -> Self:
+        """Itself, before the first step, on a device."""
+        self.model.to(device)
+        if self.network is not None:
+            self.network.to(device)
+        self._optimiser = self._fresh_optimiser()
+        return self
+
+    def _fresh_optimiser(self) -> torch.optim.Adam:
+        modules = [self.model] if self.network is None else [self.model, self.network]
+        pairs = zip(modules, self._rates, strict=True)
+        return torch.optim.Adam([{"params": list(one.parameters()), "lr": rate} for one, rate in pairs], betas=BETAS)
 
     def expose(self, samples: Sequence[Sample]) -> None:
         """Nothing to choose: a model has a brightness of its own."""

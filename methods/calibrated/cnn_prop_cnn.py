@@ -45,7 +45,8 @@ class TwoNetworks(nn.Module):
         lit = parts(unit_field(phase))
         real, imaginary = (lit + self.panel(lit)).unbind(1)
         panel = torch.complex(real, imaginary)
-        propagated = [self.spec.propagator(channel).forward(one) for channel, one in enumerate(panel)]
+        models = [self.spec.propagator(channel, device=panel.device) for channel in range(len(panel))]
+        propagated = [model.forward(one) for model, one in zip(models, panel, strict=True)]
         field = self.spec.region.crop(torch.stack(propagated))
         amplitude = safe_amplitude(squared_modulus(field)) + self.target(parts(field))[:, 0]
         return amplitude.square() * torch.exp(self.brightness)[:, None, None]

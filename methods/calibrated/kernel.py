@@ -32,7 +32,9 @@ class Kernels(nn.Module):
         super().__init__()
         self.spec = spec
         ideal = [spec.propagator(channel).transfer for channel in range(len(spec.wavelengths))]
-        self.transfer = nn.ParameterList(torch.view_as_real(one).clone() for one in ideal)
+        self.transfer = nn.ParameterList(
+            torch.view_as_real(one).clone(memory_format=torch.contiguous_format) for one in ideal
+        )
         self.brightness = nn.Parameter(torch.zeros(len(ideal)))
 
     def forward(self, phase: Tensor) -> Tensor:

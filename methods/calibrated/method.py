@@ -82,7 +82,7 @@ class ThroughModel(ABC):
     def _learned(self, bench: TrainingBench) -> ModelApproximator:
         """The trained model."""
         check_region(bench.spec.region.shape, self.retrieval)
-        approximator = self.approximator(bench.spec)
+        approximator = self.approximator(bench.spec).to(bench.device)
 
         def begin(image: TrainingImage) -> Tensor:
             return self.start.solve(image.target[None], bench)[0]
@@ -133,7 +133,7 @@ class ThroughModel(ABC):
         return torch.stack([display(one) for one in phase])
 
     def _display(self, bench: MeteredBench) -> Image:
-        approximator = self.approximator(bench.spec)
+        approximator = self.approximator(bench.spec).to(bench.device)
         approximator.load_learned(bench.learned)
         return approximator.image(bench.light)
 

@@ -30,8 +30,8 @@ class ColourByColour(nn.Module):
     def forward(self, seen: Tensor) -> Tensor:
         """See the class."""
         colours, _, height, width = seen.shape
-        rows = torch.linspace(-1, 1, height).view(1, 1, -1, 1).expand(colours, 1, height, width)
-        columns = torch.linspace(-1, 1, width).view(1, 1, 1, -1).expand(colours, 1, height, width)
+        rows = torch.linspace(-1, 1, height, device=seen.device).view(1, 1, -1, 1).expand(colours, 1, height, width)
+        columns = torch.linspace(-1, 1, width, device=seen.device).view(1, 1, 1, -1).expand(colours, 1, height, width)
         placed = torch.cat([seen, rows, columns], 1).flatten(0, 1)[None]
         answer: Tensor = self.layers(placed.contiguous(memory_format=torch.channels_last))
         return answer.view(colours, -1, height, width)

@@ -28,7 +28,7 @@ GRAY = 0.25
 
 def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
     """``count`` patterns, captured, one capture each."""
-    gray = torch.full((len(bench.spec.wavelengths), *bench.spec.region.shape), GRAY)
+    gray = torch.full((len(bench.spec.wavelengths), *bench.spec.region.shape), GRAY, device=bench.device)
     images = [TrainingImage(f"pattern-{number:02d}", gray) for number in range(count)]
     phases = [_pattern(bench, number) for number in range(count)]
     bench.announce((phase, image, ("pattern",)) for phase, image in zip(phases, images, strict=True))
@@ -41,7 +41,7 @@ def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
 
 def _pattern(bench: TrainingBench, number: int) -> Tensor:
     length, draw = LENGTHS[number % len(LENGTHS)], bench.generator("pattern", number)
-    return random_phase(len(bench.spec.wavelengths), bench.spec.shape, length, draw)
+    return random_phase(len(bench.spec.wavelengths), bench.spec.shape, length, draw).to(bench.device)
 
 
 def random_phase(colours: int, shape: tuple[int, int], length: float, draw: torch.Generator) -> Tensor:

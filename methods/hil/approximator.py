@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import torch
 from torch import Tensor
@@ -44,6 +44,14 @@ class NetworkApproximator:
         self.of_amplitude = of_amplitude
         self.judge = Judge(channels, network, seed) if with_judge else None
 
+    def to(self, device: torch.device) -> Self:
+        """Itself, before the first step, on a device; its weights were drawn on the CPU, the same for all devices."""
+        self.trainer.to(device)
+        self.gain = self.gain.to(device)
+        if self.judge is not None:
+            self.judge.to(device)
+        return self
+
     def expose(self, samples: Sequence[Sample]) -> None:
         """Set the gain from the first captures."""
         overlap = torch.stack([(one.capture * one.target).sum((-2, -1)) for one in samples]).sum(0)
@@ -54,7 +62,8 @@ class NetworkApproximator:
         """|P(exp(i phase))|^2 in the region, ``(1, C, h, w)``, in the unit of the target."""
         channels = []
         for channel, one in enumerate(phase):
-            field = self.spec.region.crop(self.spec.propagator(channel).forward(unit_field(one)))
+            model = self.spec.propagator(channel, device=one.device)
+            field = self.spec.region.crop(model.forward(unit_field(one)))
             channels.append((field.real.square() + field.imag.square()) / light[channel])
         return torch.stack(channels)[None]
 
@@ -90,7 +99,7 @@ class NetworkApproximator:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on from a state."""
         self.trainer.load_state_dict(state["trainer"])
-        self.gain = state["gain"]
+        self.gain = state["gain"].to(self.gain.device)
         if self.judge is not None:
             self.judge.load_state_dict(state["judge"])
 
@@ -106,7 +115,7 @@ class NetworkApproximator:
         """UserError for the weights of another network."""
         try:
             self.trainer.generator.load_state_dict(weights["generator"])
-            self.gain = weights["gain"]
+            self.gain = weights["gain"].to(self.gain.device)
             if self.judge is not None:
                 self.judge.network.load_state_dict(weights["judge"])
         except (KeyError, TypeError, AttributeError, RuntimeError) as error:

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from ...shifts import mirrored
 from .generator import Generator, crop_to, instance_norm, pad_to_multiple
 
 # Networks that end in a tanh work on [-1, 1]; intensities of [0, 2] are moved there, which leaves room for captures
@@ -106,7 +107,7 @@ class Pix2PixHD(nn.Module):
     def __init__(self, inputs: int, outputs: int, levels: int = 4, width: int = 64, blocks: int = 9) -> None:
         super().__init__()
         self.levels = levels
-        layers = [nn.ReflectionPad2d(3), nn.Conv2d(inputs, width, 7, bias=False), *_normed(width)]
+        layers: list[nn.Module] = [Mirrored(3), nn.Conv2d(inputs, width, 7, bias=False), *_normed(width)]
         widths = [width * 2**level for level in range(levels + 1)]
         for before, after in pairwise(widths):
             layers += [nn.Conv2d(before, after, 3, stride=2, padding=1, bias=False), *_normed(after)]
@@ -114,7 +115,7 @@ class Pix2PixHD(nn.Module):
         for before, after in pairwise(reversed(widths)):
             up = nn.ConvTranspose2d(before, after, 3, stride=2, padding=1, output_padding=1, bias=False)
             layers += [up, *_normed(after)]
-        self.layers = nn.Sequential(*layers, nn.ReflectionPad2d(3), nn.Conv2d(width, outputs, 7), nn.Tanh())
+        self.layers = nn.Sequential(*layers, Mirrored(3), nn.Conv2d(width, outputs, 7), nn.Tanh())
 
     def forward(self, ideal: Tensor) -> Tensor:
         """Predicted capture ``(B, outputs, h, w)`` in [0, 2] of an ideal intensity ``(B, inputs, h, w)``."""
@@ -124,14 +125,26 @@ class Pix2PixHD(nn.Module):
         return crop_to(MIDDLE + x, *ideal.shape[-2:])
 
 
+class Mirrored(nn.Module):
+    """``nn.ReflectionPad2d`` with a deterministic gradient on a GPU too."""
+
+    def __init__(self, margin: int) -> None:
+        super().__init__()
+        self.margin = margin
+
+    def forward(self, x: Tensor) -> Tensor:
+        """The image with so many mirrored pixels around it."""
+        return mirrored(x, self.margin)
+
+
 class _Residual(nn.Module):
     """Two 3 x 3 convolutions whose result is added to their input; no activation after the sum."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
         self.change = nn.Sequential(
-            *(nn.ReflectionPad2d(1), nn.Conv2d(width, width, 3, bias=False), *_normed(width)),
-            *(nn.ReflectionPad2d(1), nn.Conv2d(width, width, 3, bias=False), *_normed(width)[:1]),
+            *(Mirrored(1), nn.Conv2d(width, width, 3, bias=False), *_normed(width)),
+            *(Mirrored(1), nn.Conv2d(width, width, 3, bias=False), *_normed(width)[:1]),
         )
 
     def forward(self, x: Tensor) -> Tensor:

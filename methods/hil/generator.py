@@ -36,6 +36,17 @@ def instance_norm(channels: int) -> nn.Module:
     return nn.InstanceNorm2d(channels, affine=True)
 
 
+class Dropout(nn.Dropout):
+    """Torch's own, with the random numbers of the CPU on every device."""
+
+    def forward(self, input: Tensor) -> Tensor:
+        """While training, features are set to zero with the probability ``p``, and the others enlarged to match."""
+        if not self.training:
+            return input
+        kept = torch.empty_like(input, device="cpu").bernoulli_(1 - self.p)
+        return input * kept.div_(1 - self.p).to(input.device)
+
+
 class Generator(nn.Module):
     """Ideal intensity to predicted capture, linear light ``(B, inputs, h, w)`` to ``(B, outputs, h, w)``, any h and w.
 
@@ -87,7 +98,7 @@ class Generator(nn.Module):
             after = widths[level - 1] if level else last
             up = nn.ConvTranspose2d(before, after, 4, stride=2, padding=1, bias=not normed)
             dropped = dropout and level >= max(levels - DROPPED_LAYERS, 1)
-            extras = [*([instance_norm(after)] if normed else []), *([nn.Dropout(0.5)] if dropped else [])]
+            extras = [*([instance_norm(after)] if normed else []), *([Dropout(0.5)] if dropped else [])]
             self.decoder.append(nn.Sequential(up, *extras))
         self.last = nn.Conv2d(last, outputs, 3, padding=1) if full_resolution_stage else None
 

@@ -86,7 +86,8 @@ class HIL:
         return torch.stack([display(one) for one in phase])
 
     def _approximator(self, bench: TrainingBench | MeteredBench) -> NetworkApproximator:
-        return NetworkApproximator(bench.spec, self.network, self.loss, self.retrieval.adversarial > 0, self.seed)
+        judged = self.retrieval.adversarial > 0
+        return NetworkApproximator(bench.spec, self.network, self.loss, judged, self.seed).to(bench.device)
 
     def _frozen(self, bench: MeteredBench) -> NetworkApproximator:
         approximator = self._approximator(bench)

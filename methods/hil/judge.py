@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -25,7 +25,13 @@ class Judge:
         with torch.random.fork_rng(devices=[]):
             torch.set_rng_state(seeds.generator("judge", seed).get_state())
             self.network = draw_weights(PatchDiscriminator(channels, 0, network.filters), PIX2PIX_DEVIATION)
+        self.to(torch.device("cpu"))
+
+    def to(self, device: torch.device) -> Self:
+        """Itself, before the first step, on a device."""
+        self.network.to(device)
         self._optimiser = torch.optim.Adam(self.network.parameters(), lr=LEARNING_RATE, betas=BETAS, fused=True)
+        return self
 
     def step(self, picture: Tensor, target: Tensor) -> float:
         """One step on a predicted picture and a target ``(1, C, h, w)``; the loss before it."""

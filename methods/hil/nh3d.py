@@ -46,7 +46,7 @@ class HILNH3D:
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Train the network on captures of the display; what ``solve`` and ``predict`` need of it."""
         check_region(bench.spec.region.shape, self.retrieval)
-        approximator = self._approximator(bench.spec)
+        approximator = self._approximator(bench.spec).to(bench.device)
 
         def begin(image: TrainingImage) -> Tensor:
             return self.start.solve(image.target[None], bench)[0]
@@ -75,6 +75,6 @@ class HILNH3D:
         return NetworkApproximator(spec, self.network, None, with_judge=False, seed=self.seed, of_amplitude=True)
 
     def _display(self, bench: MeteredBench) -> Image:
-        approximator = self._approximator(bench.spec)
+        approximator = self._approximator(bench.spec).to(bench.device)
         approximator.load_learned(bench.learned)
         return approximator.image(bench.light)

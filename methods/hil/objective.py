@@ -9,7 +9,7 @@ import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import torch
 from annotated_types import Interval
@@ -97,9 +97,20 @@ class Trainer:
         self.generator, self.discriminator, self.loss = generator, discriminator, loss
         self.perceptual = perceptual_loss() if loss.perceptual else None
         self._noise = noise
-        self._optimisers = {
+        self._optimisers = self._fresh_optimisers()
+
+    def to(self, device: torch.device) -> Self:
+        """Itself, before the first step, on a device; the random numbers for dropout stay on the CPU."""
+        for module in (self.generator, self.discriminator, self.perceptual):
+            if module is not None:
+                module.to(device)
+        self._optimisers = self._fresh_optimisers()
+        return self
+
+    def _fresh_optimisers(self) -> dict[str, torch.optim.Adam]:
+        return {
             name: torch.optim.Adam(module.parameters(), lr=LEARNING_RATE, betas=BETAS, fused=True)
-            for name, module in (("generator", generator), ("discriminator", discriminator))
+            for name, module in (("generator", self.generator), ("discriminator", self.discriminator))
             if module is not None and any(True for _ in module.parameters())
         }
 
@@ -195,22 +206,25 @@ class Trainer:
                 self.discriminator.load_state_dict(state["discriminator"])
             for name, optimiser in self._optimisers.items():
                 load_moments(optimiser, state["optimisers"][name])
+            noise = state["noise"].cpu()
             with torch.random.fork_rng(devices=[]):
-                torch.set_rng_state(state["noise"])
-            self._noise = state["noise"].clone()
+                torch.set_rng_state(noise)
+            self._noise = noise.clone()
         except (KeyError, TypeError, AttributeError, RuntimeError, ValueError) as error:
             reason = (str(error).splitlines() or [type(error).__name__])[0]
             raise UserError(f"the saved training does not fit: {reason}; remove it to train anew") from error
 
 
 def load_moments(optimiser: torch.optim.Adam, state: dict[int, dict[str, Tensor]]) -> None:
-    """Copies of Adam's moments in the layout of the parameters, which the fused step takes for granted.
+    """Copies of Adam's moments in the layout of the parameters, which the fused step takes for granted, as it does the
+    number of steps on their device.
 
     Raises ValueError where a shape is not the parameter's.
     """
     optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
     for parameter, values in optimiser.state.items():
-        values["step"] = torch.tensor(float(values["step"]))
+        place = parameter.device if optimiser.defaults["fused"] else "cpu"
+        values["step"] = torch.tensor(float(values["step"]), device=place)
         for moment in ("exp_avg", "exp_avg_sq"):
             if values[moment].shape != parameter.shape:
                 raise ValueError(f"{moment} {tuple(values[moment].shape)} for a parameter {tuple(parameter.shape)}")

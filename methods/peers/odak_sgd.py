@@ -34,7 +34,8 @@ class OdakSGD:
     outside of it is free as it is for every other method. odak is not told of an iris, and gives back the phase of
     its last iteration. Its transfer function is sampled half a sample of frequency off, so that its picture lies
     ``wavelength * distance / (4 * side)`` metres aside on each axis, otherwise for each colour (side: that of the
-    panel); and the light between the pixels of a picture with a random start is speckle.
+    panel); and the light between the pixels of a picture with a random start is speckle. On a GPU torch draws
+    its start there, so that it is another one than on the CPU.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200

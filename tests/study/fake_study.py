@@ -154,7 +154,7 @@ class FakeSession:
         return phase.mean((1, 2))[:, None, None] + noise
 
 
-def fake_workbench(place: Any, seed: int) -> FakeBench:
+def fake_workbench(place: Any, seed: int, device: torch.device | None = None) -> FakeBench:
     return FakeBench(load_profile("ideal").spec(place.spec.shape))
 
 

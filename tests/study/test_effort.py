@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -57,3 +58,19 @@ def test_without_the_linux_files_time_is_measured_and_memory_is_not(
     taken = effort.start().stop()
     assert taken.memory_mib is None
     assert taken.seconds >= 0
+
+
+class Node:
+    """Something that can hold itself."""
+
+    own: Node
+
+
+def test_what_a_solution_left_in_circles_is_let_go_before_the_next() -> None:
+    effort.start().stop()
+    left = Node()
+    left.own = left
+    seen = weakref.ref(left)
+    del left
+    effort.start().stop()
+    assert seen() is None

@@ -81,7 +81,26 @@ def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
     The finer samples start at the first pixel's centre and go on past the last one's; the grid is scaled for that.
     """
     rows, columns = image.shape
-    pixels = torch.tensor([columns / per_pixel - 1, rows / per_pixel - 1])
-    scale = pixels * per_pixel / torch.tensor([columns - 1.0, rows - 1.0])
+    pixels = grid.new_tensor([columns / per_pixel - 1, rows / per_pixel - 1])
+    scale = pixels * per_pixel / grid.new_tensor([columns - 1.0, rows - 1.0])
     fine = grid if per_pixel == 1 else (grid + 1) * scale - 1
+    if image.requires_grad and not image.is_cpu:
+        return gathered(image, fine)
     return F.grid_sample(image[None, None], fine[None], mode="bilinear", padding_mode="zeros", align_corners=True)[0, 0]
+
+
+def gathered(image: Tensor, grid: Tensor) -> Tensor:
+    """What ``grid_sample`` gives for an image ``(H, W)``, from pixels picked by index.
+
+    Its gradient is deterministic on a GPU, where that of ``grid_sample`` is not.
+    """
+    rows, columns = image.shape
+    x, y = (grid[..., 0] + 1) / 2 * (columns - 1), (grid[..., 1] + 1) / 2 * (rows - 1)
+    left, top = x.floor(), y.floor()
+    total = torch.zeros_like(x)
+    for row, column in ((top, left), (top, left + 1), (top + 1, left), (top + 1, left + 1)):
+        inside = (row >= 0) & (row <= rows - 1) & (column >= 0) & (column <= columns - 1)
+        weight = (1 - (y - row).abs()) * (1 - (x - column).abs()) * inside
+        pixels = image[row.clamp(0, rows - 1).long(), column.clamp(0, columns - 1).long()]
+        total = total + weight * pixels
+    return total
