@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from . import cli_capture
+from . import cli_capture, cli_performance
 from .cli_output import console as console_for_people
 from .cli_output import write_report
 from .errors import UserError
@@ -30,6 +30,7 @@ app = typer.Typer(
 )
 
 cli_capture.add_to(app)
+app.command("bench")(cli_performance.bench)
 
 Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as configs/table3.yaml.")]
 Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]
@@ -39,6 +40,7 @@ Where = Annotated[
     str, typer.Option(help="Where to compute: serial, local (worker processes), slurm, address, or auto.")
 ]
 Address = Annotated[str | None, typer.Option(help="Of a running Dask scheduler, for --executor address.")]
+Device = Annotated[str, typer.Option(help="Where torch computes: cpu, cuda, cuda:N, or auto, a GPU if it finds one.")]
 Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
 
 
@@ -79,6 +81,7 @@ def run(
     workers: Workers = None,
     threads: Threads = None,
     address: Address = None,
+    device: Device = "auto",
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
     retime: Annotated[bool, typer.Option("--retime", help="Measure solving times again.")] = False,
     retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
@@ -87,7 +90,7 @@ def run(
     """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
     again = {"retry_failed": retry_failed, "retime": retime, "retrain": retrain}
     try:
-        failed = _run(config, output, (executor, workers, address), threads, artifacts, again)
+        failed = _run(config, output, (executor, workers, address), threads, artifacts, again, device)
     except KeyboardInterrupt:
         print("holoeval: stopped; what was computed is kept, resume with the same command", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
@@ -101,9 +104,11 @@ def _run(
     threads: int | None,
     artifacts: Path,
     again: dict[str, bool],
+    device: str,
 ) -> int:
     """Run, report, and give the number of failed cells. where: executor, workers and address."""
     from .config import load_study
+    from .device import find, gpus
     from .study import executors, plan, progress
     from .study.artifacts import Artifacts
     from .study.run import run as compute
@@ -111,13 +116,16 @@ def _run(
 
     console, study = console_for_people(), load_study(config)
     name, workers, address = where
-    wanted = executors.executor(name, workers, _small(study), address)
+    if name not in executors.ELSEWHERE:
+        device = str(find(device))
+    shared = 0 if name in executors.ELSEWHERE else gpus(device)
+    wanted = executors.executor(name, workers, _small(study), address, shared)
     chosen = executors.Serial() if study.display.real else wanted  # there is one bench
     if study.display.real:
         _prepare_bench(study)
     folder, grid, many = _output(study, output), plan.plan(study), _threads(threads, chosen.workers, study)
     with progress.watching(console) as watch:
-        outcome = compute(study, grid, folder, chosen, watch, many, artifacts, **again)
+        outcome = compute(study, grid, folder, chosen, watch, many, artifacts, **again, device=device)
     keep_training_records(grid, Artifacts(artifacts), folder)
     _sheets(study, folder)
     write_report(console, study, outcome.records, folder, outcome.provenance)
@@ -157,10 +165,15 @@ def _sheets(study: Study, output: Path) -> None:
 
 @app.command()
 def plan(
-    config: Config, output: Output = None, threads: Threads = None, artifacts: Learned = Path("artifacts")
+    config: Config,
+    output: Output = None,
+    threads: Threads = None,
+    device: Device = "auto",
+    artifacts: Learned = Path("artifacts"),
 ) -> None:
     """Show what a study would compute, and what of it is done; compute nothing."""
     from .config import load_study
+    from .device import find, gpu_name, gpus
     from .study import executors
     from .study import plan as planning
     from .study.artifacts import Artifacts
@@ -168,9 +181,10 @@ def plan(
     from .study.store import Store
 
     console, study = console_for_people(), load_study(config)
-    folder, workers = _output(study, output), executors.executor("auto", None, _small(study)).workers
+    folder, workers = _output(study, output), executors.executor("auto", None, _small(study), gpus=gpus(device)).workers
     grid = planning.plan(study)
-    rows = preview(study, grid, Store(folder), _threads(threads, workers, study), workers)
+    many = _threads(threads, workers, study)
+    rows = preview(study, grid, Store(folder), many, workers, gpu_name(find(device)))
     console.print(table(study, rows))
     if needed := trainings(grid, Artifacts(artifacts)):
         console.print(training_table(needed))
@@ -229,9 +243,13 @@ def new_method(
 @app.command()
 def check(folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports")) -> None:
     """Check that committed reports still follow from their records, configs and profiles."""
+    from .performance.report import MACHINE
+    from .performance.report import problems as problems_of_timings
     from .study.check import check as problems_in
 
     reports, problems = problems_in(folder)
+    for timed in sorted(path.parent for path in folder.glob(f"*/{MACHINE}")):
+        reports, problems = reports + 1, [*problems, *(f"{timed}: {one}" for one in problems_of_timings(timed))]
     for problem in problems:
         print(problem)
     print(f"{reports} report{'s' * (reports > 1)}, {len(problems)} problem{'s' * (len(problems) != 1)}")

@@ -1,17 +1,28 @@
+"""Two threads where time is measured; a plain test run keeps its one."""
+
+import sys
+from pathlib import Path
+
 import pytest
 import torch
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+
+def pytest_addoption(parser):
+    parser.addoption("--only", help="Benchmarks whose names hold this text.")
+
+
+def pytest_collection_modifyitems(config, items):
+    text = config.getoption("only", None)
+    if text:
+        items[:] = [item for item in items if text in item.name]
+
 
 @pytest.fixture(autouse=True)
-def two_threads(request):
-    """Two threads where time is measured; a plain test run keeps its one."""
+def threads(request, tmp_path, monkeypatch):
     before = torch.get_num_threads()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # timings of a study are measured, not looked up
     torch.set_num_threads(2 if request.config.getoption("benchmark_enable") else before)
     yield
     torch.set_num_threads(before)
-
-
-@pytest.fixture(scope="session")
-def panel(request):
-    """The panel of the paper where time is measured; a small one in a plain test run."""
-    return (1080, 1920) if request.config.getoption("benchmark_enable") else (135, 240)

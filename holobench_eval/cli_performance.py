@@ -1,0 +1,57 @@
+"""The command ``holoeval bench``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_output import console
+
+
+def bench(
+    only: Annotated[str | None, typer.Option(help="Benchmarks whose names hold this text.")] = None,
+    output: Annotated[Path, typer.Option(help="Where to write the report.")] = Path("reports/performance"),
+    against: Annotated[str | None, typer.Option(help="Compare the working tree with this git revision.")] = None,
+) -> None:
+    """Time propagations, gradient steps, captures, metrics and cells beside others' code, or against a revision."""
+    if against is not None:
+        _compare(against, only)
+        return
+    from .performance import machine, report, suite
+
+    timings, before = suite.measure(only), machine.describe()
+    compared = report.beside_others(timings)
+    timings = [replace(one, memory=suite.peak_memory(one)) if one.group in compared else one for one in timings]
+    print(report.write(output, timings, before))
+
+
+def _compare(revision: str, only: str | None) -> None:
+    """Print a verdict for every case; exit code 1 if one is slower."""
+    from rich.progress import Progress, TimeRemainingColumn
+    from rich.table import Table
+
+    from .performance.against import COMPARED, MARGIN, against
+    from .performance.suite import names
+
+    cases = COMPARED if only is None else names(only)
+    screen = console()
+    with Progress(*Progress.get_default_columns()[:-1], TimeRemainingColumn(), console=screen) as progress:
+        task = progress.add_task("timing", total=None)
+
+        def said(case: str, done: int, total: int) -> None:
+            progress.update(task, description=case, completed=done, total=total)
+
+        found = against(revision, cases, said)
+    table = Table(title=f"working tree over {revision}", title_justify="left")
+    for heading in ("", "ratio of times", "interval", "verdict"):
+        table.add_column(heading)
+    for one in found:
+        interval = one.reason or f"{one.lower:.3f} to {one.upper:.3f}"
+        table.add_row(one.case, f"{one.ratio:.3f}", interval, one.verdict)
+    screen.print(table)
+    screen.print(f"intervals: 99 % for all together; changes below {MARGIN - 1:.0%} are not counted", markup=False)
+    if any(one.verdict == "slower" for one in found):
+        raise typer.Exit(1)

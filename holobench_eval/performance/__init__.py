@@ -1,0 +1,1 @@
+"""How fast the package is: timed by pytest-benchmark beside others, and one commit against another."""

@@ -1,0 +1,145 @@
+"""Is this version slower than another? Both take turns in one run, and intervals decide.
+
+A machine's speed changes from minute to minute, and a process's from start to start (where its memory lies, say). So
+each version has a process of its own, started anew several times; within a start the two take turns, and only ratios
+of neighbours count. The interval is Student's, over the starts.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import shutil
+import subprocess
+import tarfile
+import tomllib
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from statistics import mean, median, stdev
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+from scipy import stats
+
+from ..errors import UserError
+from ..seeds import seed
+from .suite import CHECKOUT, suite, worker
+
+STARTS, TURNS = 7, 5
+TURN_SECONDS = 0.1
+"""Least length of a turn."""
+CONFIDENCE = 0.99
+"""That no unchanged case at all is called changed."""
+MARGIN = 1.05
+"""Ratio of times below which a change is not worth a word."""
+COMPARED = (
+    "gradient step, 540x960, 100 mm | holobench_eval",
+    "propagation, 256x256, 20 mm | holobench_eval",
+    "propagation, 540x960, 100 mm | holobench_eval",
+    "approximator, preset small, 256x256, 100 mm | forward and backward",
+    "study | one cell: Wirtinger, 100 iterations, 192x192, three colours",
+)
+"""What is compared unless one asks for something else: a bit of everything, none of it long."""
+
+Verdict = Literal["slower", "faster", "unchanged", "not in both"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Time of the working tree over that of the other version: ratio, and the ends of its interval."""
+
+    case: str
+    verdict: Verdict
+    ratio: float = math.nan
+    lower: float = math.nan
+    upper: float = math.nan
+    reason: str = ""
+
+
+def against(revision: str, cases: Sequence[str], said: Callable[[str, int, int], None]) -> list[Comparison]:
+    """Compare the working tree with a git revision; ``said`` is told of each start: case, and starts done of all."""
+    with TemporaryDirectory() as folder:
+        here, there = Path(folder) / "here", Path(folder) / "there"
+        _lay_out(CHECKOUT, here)
+        _lay_out(_extract(revision, Path(folder) / "archive"), there)
+        draw = random.Random(seed("order of turns"))
+        found: dict[str, list[float]] = {case: [] for case in cases}
+        faults: dict[str, str] = {}
+        steps = [(start, case) for start in range(STARTS) for case in cases]
+        for done, (_, case) in enumerate(steps):
+            said(case, done, len(steps))
+            if case in faults:
+                continue
+            try:
+                found[case].append(_start(case, here, there, draw))
+            except LookupError as error:
+                faults[case] = str(error)
+    return [
+        Comparison(case, "not in both", reason=faults[case]) if case in faults else judge(case, ratios, len(cases))
+        for case, ratios in found.items()
+    ]
+
+
+def judge(case: str, logarithms: Sequence[float], cases: int) -> Comparison:
+    """The verdict on a case from the logarithms of its ratios, one a start; ``cases`` share the error (Bonferroni)."""
+    middle = mean(logarithms)
+    tail = (1 - CONFIDENCE) / 2 / cases
+    reach = float(stats.t.ppf(1 - tail, len(logarithms) - 1)) * stdev(logarithms) / math.sqrt(len(logarithms))
+    lower, ratio, upper = (math.exp(value) for value in (middle - reach, middle, middle + reach))
+    verdict: Verdict = "unchanged"
+    if lower > 1 and ratio > MARGIN:
+        verdict = "slower"
+    elif upper < 1 and ratio < 1 / MARGIN:
+        verdict = "faster"
+    return Comparison(case, verdict, ratio, lower, upper)
+
+
+def _start(case: str, here: Path, there: Path, draw: random.Random) -> float:
+    """Logarithm of the ratio of times, over turns of two fresh processes. LookupError: one cannot do the case."""
+    with ExitStack() as stack:
+        workers = [stack.enter_context(worker([place, suite()])) for place in (here, there)]
+        for one in workers:
+            stack.callback(one.kill)
+        calls = max(1, math.ceil(TURN_SECONDS / max(_timed(one, case, 1) for one in workers)))
+        ratios = []
+        for _ in range(TURNS):
+            order = draw.sample((0, 1), 2)
+            seconds = {number: _timed(workers[number], case, calls) for number in order}
+            ratios.append(math.log(seconds[0] / seconds[1]))
+    return median(ratios)
+
+
+def _timed(one: subprocess.Popen[str], case: str, calls: int) -> float:
+    assert one.stdin is not None
+    assert one.stdout is not None
+    one.stdin.write(f"{case}\t{calls}\n")
+    one.stdin.flush()
+    line = one.stdout.readline()
+    answer = json.loads(line) if line else {"error": "the process ended"}
+    if "seconds" not in answer:
+        raise LookupError(answer["error"])
+    return float(answer["seconds"])
+
+
+def _extract(revision: str, folder: Path) -> Path:
+    """The files of a git revision. UserError: there is none of that name."""
+    done = subprocess.run(
+        ["git", "archive", "--format=tar", revision, "--"], cwd=CHECKOUT, capture_output=True, check=False
+    )
+    if done.returncode:
+        raise UserError(f"--against {revision}: {done.stderr.decode(errors='replace').strip()}")
+    with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
+        archive.extractall(folder, filter="data")
+    return folder
+
+
+def _lay_out(checkout: Path, folder: Path) -> None:
+    """Copy a checkout's packages to where they are imported from, as installing them would."""
+    project = tomllib.loads((checkout / "pyproject.toml").read_text(encoding="utf-8"))
+    for package, source in sorted(project["tool"]["setuptools"]["package-dir"].items()):  # outer ones first
+        place = folder / package.replace(".", "/")
+        shutil.copytree(checkout / source, place, ignore=shutil.ignore_patterns("__pycache__"))

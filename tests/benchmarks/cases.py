@@ -1,0 +1,243 @@
+"""Everything that is timed, by group; versions in a group do the same work and are compared with each other."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+import steps
+import torch
+from scene import Scene
+
+from holobench_eval.config import load_study
+from holobench_eval.display import load_profile
+from holobench_eval.display.bench import SimulatedBench
+from holobench_eval.methods.common import unit_field
+from holobench_eval.methods.hil.networks import Network
+from holobench_eval.metrics.catalogue import catalogue
+from holobench_eval.study import plan
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.progress import watching
+from holobench_eval.study.run import run
+
+PAPER = (1080, 1920)
+COMPARED = [Scene(PAPER, distance) for distance in (0.02, 0.1, 0.2)]
+SIZES = [
+    Scene(panel, distance)
+    for panel in ((256, 256), (540, 960), PAPER, (2160, 3840))
+    for distance in (0.007, 0.02, 0.1, 0.2)
+]
+STEP, PROPAGATION = "gradient step", "propagation"
+TRIVIAL = """
+import torch
+
+class Trivial:
+    camera = privileged = False
+
+    def solve(self, target, bench):
+        return torch.zeros(1, target.shape[1], *bench.spec.shape)
+"""
+
+
+@dataclass
+class Work:
+    """call: what is timed; facts: what is to be known of it beside its time, by name."""
+
+    call: Callable[[], object]
+    facts: Callable[[], dict[str, Any]] = dict
+
+
+@dataclass(frozen=True)
+class Case:
+    """group: the same work; version: who does it. make: prepares it for a scene, or without one."""
+
+    group: str
+    version: str
+    make: Callable[..., Work]
+    scene: Scene | None = None
+
+    @property
+    def name(self):
+        return f"{self.group} | {self.version}"
+
+    def work(self):
+        return self.make() if self.scene is None else self.make(self.scene)
+
+    def shrunk(self):
+        """The same at an eighth of the size: does it run?"""
+        return self if self.scene is None else replace(self, scene=self.scene.shrunk())
+
+
+def of_scene(kind, scene, version, make):
+    return Case(f"{kind}, {scene.name}", version, make, scene)
+
+
+def gradient_step(version):
+    def make(scene):
+        one = steps.STEPS[version](scene)
+
+        def facts():
+            padded = {"padded": list(one.padded)}
+            if scene.panel[0] > PAPER[0] or not hasattr(one, "field"):
+                return padded
+            with torch.no_grad():
+                return padded | {"error": scene.error(one.field())}
+
+        return Work(one.step, facts)
+
+    return make
+
+
+def propagation(scene):
+    model, light = scene.spec.propagator(0), unit_field(scene.phase)
+    return Work(lambda: model.forward(light), lambda: {"padded": list(model.padded_shape)})
+
+
+def two_transforms(scene):
+    padded = scene.spec.propagator(0).padded_shape
+    fields = torch.randn(padded, dtype=torch.complex64)
+    return Work(lambda: torch.fft.ifft2(torch.fft.fft2(fields)), lambda: {"padded": list(padded)})
+
+
+def capture(samples):
+    def make(scene):
+        bench = SimulatedBench(replace(load_profile("leto-aged"), sampling=samples).scaled(scene.panel))
+        session, phase = bench.session("benchmark", exposure=(4000.0,)), scene.phase
+        return Work(torch.no_grad()(lambda: session.capture(phase)))
+
+    return make
+
+
+def its_propagation(scene):
+    model = load_profile("leto-aged").scaled(scene.panel).spec().propagator(0)
+    light = unit_field(scene.phase)
+    return Work(lambda: model.forward(light), lambda: {"padded": list(model.padded_shape)})
+
+
+def pictures(scene, channels=3):
+    draw = torch.Generator().manual_seed(1)
+    target = torch.nn.functional.interpolate(torch.rand(1, channels, 34, 60, generator=draw), scene.panel)[0].double()
+    noise = 0.1 * torch.randn(target.shape, generator=draw, dtype=torch.float64)
+    return (target + noise).clamp(0, 1), target
+
+
+def metric(one):
+    def make(scene):
+        rows, columns = scene.panel
+        pair = pictures(replace(scene, panel=(max(rows, one.smallest), max(columns, one.smallest))))
+        return Work(torch.no_grad()(lambda: one.function(*pair)))
+
+    return make
+
+
+def ssim_here(scene):
+    from holobench_eval.metrics.ssim import ssim
+
+    pair = pictures(scene, 1)
+    return Work(lambda: ssim(*pair))
+
+
+def ssim_of_scikit_image(scene):
+    from skimage.metrics import structural_similarity
+
+    image, target = (picture[0].numpy() for picture in pictures(scene, 1))
+
+    def call():
+        return structural_similarity(
+            image, target, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1.0
+        )
+
+    return Work(call)
+
+
+def network(backward):
+    def make(scene):
+        torch.manual_seed(1)
+        model = Network().generator(3, 3)
+        ideal = torch.rand(1, 3, *scene.panel)
+
+        def call():
+            predicted = model(ideal)
+            if backward:
+                predicted.square().mean().backward()
+
+        return Work(call if backward else torch.no_grad()(call))
+
+    return make
+
+
+def study(text):
+    """A study, from its plan to its last record, in a folder of its own each time."""
+
+    def make():
+        folder = Path(mkdtemp())
+        (folder / "trivial.py").write_text(TRIVIAL)
+        (folder / "study.yaml").write_text(text)
+        loaded = load_study(folder / "study.yaml")
+
+        def call():
+            from rich.console import Console
+
+            output = Path(mkdtemp(dir=folder))
+            with watching(Console(quiet=True)) as watch:
+                run(loaded, plan.plan(loaded), output, Serial(), watch, torch.get_num_threads(), folder / "artifacts")
+
+        return Work(call)
+
+    return make
+
+
+ONE_CELL = """
+title: one cell
+seed: 1
+display: {profiles: [leto-aged], panel: [192, 192]}
+targets: {dataset: photographs, params: {names: [astronaut]}}
+methods: [{name: wirtinger, params: {iterations: 100}}]
+"""
+TRIVIAL_CELLS = """
+title: fifty cells
+seed: 1
+display: {profiles: [ideal], panel: [64, 64]}
+targets: {dataset: photographs, params: {names: [astronaut]}}
+methods: [trivial.py:Trivial]
+repeats: 50
+"""
+
+CASES = [
+    *(of_scene(STEP, scene, version, gradient_step(version)) for scene in COMPARED for version in steps.STEPS),
+    *(
+        of_scene(STEP, scene, version, gradient_step(version))
+        for scene in SIZES
+        if scene not in COMPARED
+        for version in (steps.BARE, steps.OURS)
+    ),
+    *(
+        of_scene(PROPAGATION, scene, version, make)
+        for scene in SIZES
+        for version, make in (("two bare transforms", two_transforms), (steps.OURS, propagation))
+    ),
+    *(
+        of_scene("capture", Scene(PAPER, 0.1), version, make)
+        for version, make in (
+            ("ideal propagation", its_propagation),
+            ("1 sub-sample", capture(1)),
+            ("3 sub-samples", capture(3)),
+        )
+    ),
+    *(
+        of_scene("SSIM, one channel", Scene(PAPER, 0.1), version, make)
+        for version, make in (("scikit-image", ssim_of_scikit_image), (steps.OURS, ssim_here))
+    ),
+    *(
+        of_scene("metric, three channels", Scene(PAPER, 0.1), one.name, metric(one))
+        for one in catalogue()
+        if one.available() is None
+    ),
+    *(
+        of_scene("approximator, preset small", Scene((256, 256), 0.1), version, make)
+        for version, make in (("forward", network(False)), ("forward and backward", network(True)))
+    ),
+    Case("study", "one cell: Wirtinger, 100 iterations, 192x192, three colours", study(ONE_CELL)),
+    Case("study", "50 trivial cells, 64x64", study(TRIVIAL_CELLS)),
+]
