@@ -243,13 +243,9 @@ def new_method(
 @app.command()
 def check(folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports")) -> None:
     """Check that committed reports still follow from their records, configs and profiles."""
-    from .performance.report import MACHINE
-    from .performance.report import problems as problems_of_timings
     from .study.check import check as problems_in
 
     reports, problems = problems_in(folder)
-    for timed in sorted(path.parent for path in folder.glob(f"*/{MACHINE}")):
-        reports, problems = reports + 1, [*problems, *(f"{timed}: {one}" for one in problems_of_timings(timed))]
     for problem in problems:
         print(problem)
     print(f"{reports} report{'s' * (reports > 1)}, {len(problems)} problem{'s' * (len(problems) != 1)}")

@@ -22,10 +22,14 @@ def bench(
         return
     from .performance import machine, report, suite
 
-    timings, before = suite.measure(only), machine.describe()
+    timings, complete = suite.measure(only)
+    before = machine.describe()
     compared = report.beside_others(timings)
     timings = [replace(one, memory=suite.peak_memory(one)) if one.group in compared else one for one in timings]
     print(report.write(output, timings, before))
+    if not complete:
+        print("not all could be timed; what pytest printed says why")
+        raise typer.Exit(1)
 
 
 def _compare(revision: str, only: str | None) -> None:

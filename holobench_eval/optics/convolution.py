@@ -9,12 +9,9 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
+from ..allocator import LARGEST_KEPT
 from .blocks import in_blocks
 from .padding import IRIS_EDGE
-
-LARGEST_KEPT = 32 * 2**20
-"""Bytes up to which glibc's allocator keeps freed arrays (M_MMAP_THRESHOLD, mallopt(3)). Larger ones come from the
-system, page by page, which takes longer than their transforms: they are avoided where it can be done."""
 
 
 class Propagator(Protocol):
@@ -54,9 +51,11 @@ class Convolution:
         return self._convolve(field, conjugated=True)
 
     @cached_property
-    def _conjugate(self) -> Tensor:
-        """The transfer function of the adjoint, formed once: a lazy conjugate is formed in every product."""
-        return self.transfer.conj().resolve_conj()
+    def conjugate(self) -> Tensor:
+        """The transfer function of the adjoint; formed once, but for large ones: there a block of it is formed at a
+        time, since it would take as much memory as all the rest of a propagation."""
+        conjugate = self.transfer.conj()
+        return conjugate if is_large(conjugate) else conjugate.resolve_conj()
 
     def _convolve(self, field: Tensor, conjugated: bool) -> Tensor:
         if tuple(field.shape[-2:]) != self.shape:
@@ -72,7 +71,7 @@ class _Convolved(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, field: Tensor, model: Convolution, conjugated: bool) -> Tensor:
         ctx.model, ctx.conjugated = model, conjugated
-        return convolve(field, model._conjugate if conjugated else model.transfer)
+        return convolve(field, model.conjugate if conjugated else model.transfer)
 
     @staticmethod
     def backward(ctx: Any, *grad: Tensor) -> tuple[Tensor, None, None]:
@@ -98,7 +97,6 @@ def _convolve_pruned(field: Tensor, transfer: Tensor) -> Tensor:
     height, width = field.shape[-2:]
     padded = transfer.shape
     spectrum = field.new_empty((*field.shape[:-1], padded[1]))
-    image = torch.empty_like(field, memory_format=torch.contiguous_format)
 
     def transform(rows: slice) -> None:
         spectrum[..., rows, :] = torch.fft.fft(field[..., rows, :], n=padded[1])
@@ -109,16 +107,17 @@ def _convolve_pruned(field: Tensor, transfer: Tensor) -> Tensor:
         spectrum[..., columns] = column[..., :height].transpose(-1, -2)
 
     def transform_back(rows: slice) -> None:
-        image[..., rows, :] = torch.fft.ifft(spectrum[..., rows, :])[..., :width]
+        spectrum[..., rows, :width] = torch.fft.ifft(spectrum[..., rows, :])[..., :width]
 
     in_blocks(transform, spectrum, height, spectrum.numel())
     in_blocks(filtered, spectrum, padded[1], spectrum.numel() // height * padded[0])
     in_blocks(transform_back, spectrum, height, spectrum.numel())
-    return image
+    return spectrum[..., :width]
 
 
 def is_large(transfer: Tensor) -> bool:
-    """Whether arrays of this size come from the system each time, and not from the memory allocator's store."""
+    """Whether arrays of this size come from the system each time, page by page, which takes longer than a transform of
+    them: they are avoided where it can be done. See ``allocator``."""
     return transfer.is_cpu and transfer.numel() * transfer.element_size() > LARGEST_KEPT
 
 

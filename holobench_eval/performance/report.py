@@ -40,7 +40,14 @@ def problems(folder: Path) -> list[str]:
         timings = from_csv((folder / TIMINGS).read_text(encoding="utf-8"))
         again = text(timings, json.loads((folder / MACHINE).read_text(encoding="utf-8")))
         same = again == (folder / REPORT).read_text(encoding="utf-8")
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (
+        UserError,
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+    ) as error:  # whatever a damaged file brings
         return [f"{type(error).__name__}: {error}"]
     return [] if same else [f"{REPORT} does not follow from {TIMINGS} and {MACHINE}; run 'holoeval bench' again"]
 
@@ -114,7 +121,7 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
             "times padded, complex128). *slower*: its median over that of this package. *memory*: the most that a "
             "process of its own holds beyond what it had before. odak's frequencies lie half a sample off, so its "
             "picture is displaced; every package's documented way is timed, whatever more it computes.",
-            f"![Times over that of holobench_eval, per version and distance]({CHART})",
+            f"![Times over that of holobench_eval, for each version and distance]({CHART})",
         ]
         for name, rows in compared.items():
             parts += [f"### {name}", _compared(rows)]

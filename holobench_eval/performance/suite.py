@@ -44,8 +44,11 @@ def suite() -> Path:
     return folder
 
 
-def measure(only: str | None) -> list[Timing]:
-    """Time all benchmarks, or those whose names hold ``only``; pytest tells how far it is on standard output."""
+def measure(only: str | None) -> tuple[list[Timing], bool]:
+    """Time all benchmarks, or those whose names hold ``only``; pytest tells how far it is on standard output.
+
+    Also whether all could be timed. UserError: none could.
+    """
     with TemporaryDirectory() as folder:
         found = Path(folder) / "found.json"
         command = [sys.executable, "-m", "pytest", str(suite()), "--benchmark-enable", "--benchmark-only", "-vv"]
@@ -55,10 +58,10 @@ def measure(only: str | None) -> list[Timing]:
         done = subprocess.run(command, cwd=CHECKOUT, check=False)
         if done.returncode == 5:
             raise UserError(f"no benchmark's name holds '{only}'")
-        if done.returncode or not found.exists():
-            raise UserError(f"the benchmarks ended with {done.returncode}; what pytest printed says why")
-        timed = [_timing(one) for one in json.loads(found.read_text(encoding="utf-8"))["benchmarks"]]
-    return timed
+        rows = json.loads(found.read_text(encoding="utf-8"))["benchmarks"] if found.exists() else []
+    if not rows:
+        raise UserError(f"the benchmarks ended with {done.returncode}; what pytest printed says why")
+    return [_timing(one) for one in rows], done.returncode == 0
 
 
 def _timing(found: dict[str, object]) -> Timing:

@@ -18,10 +18,15 @@ if TYPE_CHECKING:
 
 def check(folder: Path) -> tuple[int, list[str]]:
     """Number of reports in a folder, and a line for everything that no longer holds."""
+    from ..performance import report as performance
+
     reports = sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
-    if not reports:
+    timed = sorted(path.parent for path in folder.glob(f"*/{performance.MACHINE}"))
+    if not reports and not timed:
         raise UserError(f"{folder}: no reports in this folder (looked for */{provenance.FILE})")
-    return len(reports), [f"{report}: {problem}" for report in reports for problem in _problems(report)]
+    problems = [f"{report}: {problem}" for report in reports for problem in _problems(report)]
+    problems += [f"{report}: {problem}" for report in timed for problem in performance.problems(report)]
+    return len(reports) + len(timed), problems
 
 
 def _problems(report: Path) -> Iterator[str]:

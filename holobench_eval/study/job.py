@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from .. import registry
+from ..allocator import keep_freed_memory
 from ..config import Save
 from ..device import CPU, find, gpu_name, moved
 from ..errors import CellError, Pending
@@ -145,6 +146,7 @@ def repeatable(threads: int, device: torch.device = CPU) -> Iterator[None]:
     if device.type == "cuda":
         os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # read at the first product of matrices
         torch.backends.cudnn.allow_tf32 = torch.backends.cuda.matmul.allow_tf32 = False
+    keep_freed_memory()
     before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_default_dtype(torch.float32)  # a method's file may have changed these two for everybody
     torch.set_grad_enabled(True)

@@ -30,11 +30,13 @@ SIZES = [
 ]
 STEP, PROPAGATION = "gradient step", "propagation"
 TRIVIAL = """
+from dataclasses import dataclass
+
 import torch
 
-class Trivial:
-    camera = privileged = False
 
+@dataclass(frozen=True)
+class Trivial:
     def solve(self, target, bench):
         return torch.zeros(1, target.shape[1], *bench.spec.shape)
 """
@@ -198,7 +200,7 @@ methods: [{name: wirtinger, params: {iterations: 100}}]
 TRIVIAL_CELLS = """
 title: fifty cells
 seed: 1
-display: {profiles: [ideal], panel: [64, 64]}
+display: {profiles: [ideal], panel: [118, 118]}
 targets: {dataset: photographs, params: {names: [astronaut]}}
 methods: [trivial.py:Trivial]
 repeats: 50
@@ -239,5 +241,5 @@ CASES = [
         for version, make in (("forward", network(False)), ("forward and backward", network(True)))
     ),
     Case("study", "one cell: Wirtinger, 100 iterations, 192x192, three colours", study(ONE_CELL)),
-    Case("study", "50 trivial cells, 64x64", study(TRIVIAL_CELLS)),
+    Case("study", "50 trivial cells, 118x118", study(TRIVIAL_CELLS)),
 ]

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 import torch
 
+from holobench_eval.allocator import keep_freed_memory
+
 sys.path.insert(0, str(Path(__file__).parent))
 
 
@@ -21,6 +23,7 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture(autouse=True)
 def threads(request, tmp_path, monkeypatch):
+    keep_freed_memory()  # as a study does
     before = torch.get_num_threads()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # timings of a study are measured, not looked up
     torch.set_num_threads(2 if request.config.getoption("benchmark_enable") else before)

@@ -1,0 +1,110 @@
+"""One revision against another: what the verdict says, and that two processes really take turns with two packages."""
+
+import math
+
+import pytest
+
+from holobench_eval.errors import UserError
+from holobench_eval.performance import against, suite
+
+
+@pytest.mark.parametrize(
+    ("logarithms", "verdict"),
+    [
+        ([0.2, 0.21, 0.19, 0.2, 0.22, 0.18, 0.2], "slower"),
+        ([-0.2, -0.21, -0.19, -0.2, -0.22, -0.18, -0.2], "faster"),
+        ([0.02, 0.021, 0.019, 0.02, 0.022, 0.018, 0.02], "unchanged"),  # certain, and too small to matter
+        ([0.5, -0.4, 0.3, -0.2, 0.6, -0.3, 0.1], "unchanged"),  # large, and not certain
+    ],
+)
+def test_a_verdict_needs_certainty_and_size(logarithms, verdict):
+    found = against.judge("case", logarithms, cases=5)
+    assert found.verdict == verdict
+    assert found.lower < found.ratio < found.upper
+
+
+def test_more_cases_widen_every_interval():
+    logarithms = [0.1, 0.12, 0.08, 0.11, 0.09, 0.1, 0.1]
+    one, many = (against.judge("case", logarithms, cases) for cases in (1, 50))
+    assert one.lower > many.lower
+    assert one.upper < many.upper
+
+
+def test_an_unknown_revision_is_one_line(tmp_path):
+    with pytest.raises(UserError, match="--against no-such-revision"):
+        against._extract("no-such-revision", tmp_path)
+
+
+class Replies:
+    """A worker that answers with given seconds."""
+
+    def __init__(self, replies):
+        self.replies, self.asked = iter(replies), []
+        self.stdin = self.stdout = self
+
+    def write(self, text):
+        self.asked.append(text)
+
+    def flush(self):
+        pass
+
+    def readline(self):
+        return next(self.replies, "")
+
+
+def test_a_worker_that_cannot_do_the_case_gives_its_reason():
+    with pytest.raises(LookupError, match="KeyError: no such case"):
+        against._timed(Replies(['{"error": "KeyError: no such case"}\n']), "case", 1)
+    with pytest.raises(LookupError, match="the process ended"):
+        against._timed(Replies([]), "case", 1)
+    worker = Replies(['{"seconds": 0.5}\n'])
+    assert against._timed(worker, "a case", 3) == 0.5
+    assert worker.asked == ["a case\t3\n"]
+
+
+@pytest.mark.slow
+def test_a_slower_copy_is_seen_and_imported_from_its_own_folder(tmp_path):
+    """The worker times the package of its folder: one with a sleep in the propagation takes longer by the sleep."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    for place in (here, there):
+        against._lay_out(suite.CHECKOUT, place)
+    file = here / "holobench_eval" / "optics" / "convolution.py"
+    text = file.read_text()
+    assert "    height, width = field.shape[-2:]\n" in text
+    sleeping = "    __import__('time').sleep(0.2)\n    height, width = field.shape[-2:]\n"
+    file.write_text(text.replace("    height, width = field.shape[-2:]\n", sleeping, 1))
+    case = "propagation, 256x256, 7 mm | holobench_eval"
+    seconds = []
+    for place in (here, there):
+        worker = suite.worker([place, suite.suite()])
+        try:
+            seconds.append(against._timed(worker, case, 1))
+        finally:
+            worker.kill()
+            worker.communicate()
+    assert seconds[0] - seconds[1] > 0.15
+    assert math.isfinite(seconds[1])
+
+
+def test_cases_that_are_compared_by_default_exist():
+    names = suite.names("|")
+    assert set(against.COMPARED) <= set(names)
+    with pytest.raises(UserError, match="no benchmark's name holds 'nothing of the kind'"):
+        suite.names("nothing of the kind")
+
+
+def test_every_case_has_a_name_of_its_own():
+    names = suite.names("|")
+    assert len(names) == len(set(names))
+
+
+def test_the_benchmarks_of_an_installed_package_are_missed_in_one_line(monkeypatch, tmp_path):
+    monkeypatch.setattr(suite, "CHECKOUT", tmp_path)
+    with pytest.raises(UserError, match="no benchmarks in"):
+        suite.suite()
+
+
+def test_peak_memory_counts_what_is_held():
+    group = "propagation, 256x256, 7 mm"
+    held = suite.peak_memory(suite.Timing(group, "holobench_eval", 1, 1, 1, 1))
+    assert held is None or 0 < held < 2**31
