@@ -29,8 +29,8 @@ from ..errors import UserError
 from ..seeds import seed
 from .suite import CHECKOUT, suite, worker
 
-STARTS, TURNS = 7, 5
-TURN_SECONDS = 0.1
+STARTS, TURNS = 11, 21
+TURN_SECONDS = 0.05
 """Least length of a turn."""
 CONFIDENCE = 0.99
 """That no unchanged case at all is called changed."""
