@@ -134,14 +134,14 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
             _sizes(sizes, machine["bandwidth"]),
         ]
     if others:
-        rows = [
+        lines = [
             (name, one.version, *_times(one), f"{one.median / versions[0].median:.2f}", one.rounds)
             for name, versions in others.items()
             for one in versions
         ]
         parts += [
             "## The rest",
-            table(("", "version", "median [ms]", "quartiles [ms]", "over the first", "calls"), rows),
+            table(("", "version", "median [ms]", "quartiles [ms]", "over the first", "calls"), lines),
         ]
     return "\n\n".join(map(str, parts)) + "\n"
 
