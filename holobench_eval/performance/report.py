@@ -212,6 +212,7 @@ def chart(timings: Sequence[Timing], path: Path) -> None:
     with style():
         figure = new_figure(900, 60 + 34 * sum(len(rows) + 1 for rows in compared))
         axes = figure.subplots(len(compared), 1, sharex=True, squeeze=False)[:, 0]
+        longest = 1.0
         for axis, rows in zip(axes, compared, strict=True):
             ours = _ours(rows)
             assert ours is not None
@@ -224,8 +225,11 @@ def chart(timings: Sequence[Timing], path: Path) -> None:
             axis.axvline(1, color=COLOURS[0], linewidth=0.8)
             axis.set_title(rows[0].group, loc="left")
             for place, (one, ratio) in enumerate(zip(rows, ratios, strict=True)):
-                axis.text(ratio * 1.03, place, f"{ratio:.2g}  ({1e3 * one.median:.0f} ms)", va="center", fontsize=8)
-            axis.set_xlim(right=1.9 * max(ratios.max(), 1))
+                shown = f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.2g}"
+                axis.text(ratio * 1.03, place, f"{shown}  ({1e3 * one.median:.0f} ms)", va="center", fontsize=8)
+                longest = max(longest, ratio)
+            axis.set_xlim(right=3 * longest)
+            axis.xaxis.set_major_formatter("{x:g}")
         axes[-1].set_xlabel("time over that of holobench_eval")
         figure.tight_layout()
         save(figure, path)
