@@ -224,7 +224,7 @@ def test_a_display_without_faults_is_left_to_wirtinger_holography(
 
 def test_a_display_with_faults_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Calibrated, "NOMINAL", Wirtinger())
-    method = ParametricModel(**LEARNS)
+    method = ParametricModel(**LEARNS | {"training": Rounds(1, steps=120)})
     learned = calibrated_on(BentDisplay(ONE), method)
     assert learned["nominal"] == 0
     (target,) = pictures(ONE, first=30)
@@ -234,7 +234,7 @@ def test_a_display_with_faults_is_corrected(monkeypatch: pytest.MonkeyPatch) -> 
         shown = display.rectified(display.capture(way.solve(target[None], bench)[0]), target)
         shown = shown * (shown * target).sum() / shown.square().sum()
         errors.append(float((shown - target).square().mean()))
-    assert errors[0] < errors[1] / 2
+    assert errors[0] < errors[1] / 5
 
 
 def test_the_way_back_is_taken_by_the_mean_over_the_held_out_images(monkeypatch: pytest.MonkeyPatch) -> None:
