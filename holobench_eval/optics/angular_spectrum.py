@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import torch
@@ -66,14 +67,14 @@ class AngularSpectrum(Convolution):
             dtype = torch.complex128 if padding == "reference" else torch.complex64
         padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
         twice = (int(next_fast_len(2 * shape[0] - 1)), int(next_fast_len(2 * shape[1] - 1)))
-        optics = (pitch, wavelength, distance, pupil, dtype, torch.device(device))
+        optics, place = _Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil), torch.device(device)
         if padding is None and (padded[0] > twice[0] or padded[1] > twice[1]):
             padded = (min(padded[0], twice[0]), min(padded[1], twice[1]))
             grid = padded_shape(shape, pitch, wavelength, distance, pupil, None, DEFAULT_ERROR / 3)
-            transfer = _cut_transfer((shape[0], shape[1]), padded, grid, *optics)
+            transfer = _cut_transfer(optics, padded, grid, dtype, place)
         else:
-            transfer = _transfer((shape[0], shape[1]), padded, *optics)
-        super().__init__((shape[0], shape[1]), transfer)
+            transfer = _transfer(optics, padded, dtype, place)
+        super().__init__(optics.shape, transfer)
         self.pitch, self.wavelength, self.distance, self.pupil = pitch, wavelength, distance, pupil
 
 
@@ -87,44 +88,49 @@ def check_geometry(shape: tuple[int, int], pitch: float, wavelength: float, pupi
         raise ValueError(f"pupil is a fraction of the panel's band, 0 to 2, got {pupil}")
 
 
+@dataclass(frozen=True)
+class _Optics:
+    """What a transfer function depends on, besides its grid: see ``AngularSpectrum``."""
+
+    shape: tuple[int, int]
+    pitch: float
+    wavelength: float
+    distance: float
+    pupil: float | None
+
+    def sampled(self, fy: Tensor, fx: Tensor, padded: tuple[int, int]) -> Tensor:
+        """Transfer function, complex128, at frequencies [1/m] of the grid of ``padded`` samples."""
+        f_squared = fy**2 + fx**2
+        phase = angular_spectrum_phase(f_squared, self.wavelength, self.distance)
+        passed = f_squared < 1 / self.wavelength**2
+        if self.distance != 0:
+            for f, size, samples in zip((fy, fx), self.shape, padded, strict=True):
+                passed &= f.abs() <= band_limit(size, samples, self.pitch, self.wavelength, self.distance)
+        return torch.polar(iris(fy, fx, self.pitch, self.pupil) * passed, phase)
+
+
 @lru_cache(maxsize=24)
-def _transfer(
-    shape: tuple[int, int],
-    padded: tuple[int, int],
-    pitch: float,
-    wavelength: float,
-    distance: float,
-    pupil: float | None,
-    dtype: torch.dtype,
-    device: torch.device,
-) -> Tensor:
-    fy, fx = frequencies(padded, pitch, device)
-    return as_used(_sampled(fy, fx, shape, padded, pitch, wavelength, distance, pupil).to(dtype))
+def _transfer(optics: _Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device) -> Tensor:
+    fy, fx = frequencies(padded, optics.pitch, device)
+    return as_used(optics.sampled(fy, fx, padded).to(dtype))
 
 
 @lru_cache(maxsize=24)
 def _cut_transfer(
-    shape: tuple[int, int],
-    padded: tuple[int, int],
-    grid: tuple[int, int],
-    pitch: float,
-    wavelength: float,
-    distance: float,
-    pupil: float | None,
-    dtype: torch.dtype,
-    device: torch.device,
+    optics: _Optics, padded: tuple[int, int], grid: tuple[int, int], dtype: torch.dtype, device: torch.device
 ) -> Tensor:
     """Transfer function of the kernel of a larger ``grid``, cut off beyond the panel's own size.
 
     The convolution is then linear in the picture: what would wrap around is zero. An axis that is padded by less is
     sampled as it is.
     """
+    shape = optics.shape
     cut = (padded[0] >= 2 * shape[0] - 1, padded[1] >= 2 * shape[1] - 1)
     grid = (max(grid[0], padded[0]) if cut[0] else padded[0], max(grid[1], padded[1]) if cut[1] else padded[1])
-    fy, fx = frequencies(grid, pitch, device)
+    fy, fx = frequencies(grid, optics.pitch, device)
     columns = []
     for part in fx.split(LINES, dim=1):
-        spectrum = _sampled(fy, part, shape, grid, pitch, wavelength, distance, pupil)
+        spectrum = optics.sampled(fy, part, grid)
         columns.append((_cut(spectrum, shape[0], padded[0], dim=0) if cut[0] else spectrum).to(dtype))
     transfer = torch.cat(columns, dim=1)
     if cut[1]:
@@ -139,23 +145,3 @@ def _cut(spectrum: Tensor, size: int, padded: int, dim: int) -> Tensor:
     gap = list(kernel.shape)
     gap[dim] = padded - 2 * size + 1
     return torch.fft.fft(torch.cat([ahead, kernel.new_zeros(gap), behind], dim), dim=dim)
-
-
-def _sampled(
-    fy: Tensor,
-    fx: Tensor,
-    shape: tuple[int, int],
-    padded: tuple[int, int],
-    pitch: float,
-    wavelength: float,
-    distance: float,
-    pupil: float | None,
-) -> Tensor:
-    """Transfer function, complex128, at frequencies [1/m] of the grid of ``padded`` samples."""
-    f_squared = fy**2 + fx**2
-    phase = angular_spectrum_phase(f_squared, wavelength, distance)
-    passed = f_squared < 1 / wavelength**2
-    if distance != 0:
-        passed &= fy.abs() <= band_limit(shape[0], padded[0], pitch, wavelength, distance)
-        passed &= fx.abs() <= band_limit(shape[1], padded[1], pitch, wavelength, distance)
-    return torch.polar(iris(fy, fx, pitch, pupil) * passed, phase)

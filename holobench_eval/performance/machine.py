@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import time
-from importlib.metadata import version
 from typing import Any
 
 import torch
@@ -27,7 +26,7 @@ def describe() -> dict[str, Any]:
         "cpu": cpu_model(),
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
-        "packages": {name: version(name) for name in PACKAGES if installed(name)},
+        "packages": {name: found for name in PACKAGES if (found := installed(name))},
         "threads": THREADS,
         "bandwidth": bandwidth(),
     }
