@@ -10,7 +10,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -115,7 +115,7 @@ class Store:
 
     def write(self, record: Record) -> None:
         """Write a record, whole or not at all."""
-        text = json.dumps(asdict(record), indent=1, sort_keys=True, allow_nan=False)
+        text = json.dumps(vars(record), indent=1, sort_keys=True, allow_nan=False)
         write_atomically(self.path(record.id), f"{text}\n".encode())
 
     def read(self, identity: str) -> Record | None:
@@ -139,7 +139,7 @@ class Store:
             record = self.read(cell.id)
             if record is None:
                 record = Record(cell.description(), "missing", label, "no record: not run")
-            found.append({**asdict(record), "label": label})
+            found.append({**vars(record), "label": label})
         return found
 
     def missing(self, cells: tuple[Cell, ...], retry_failed: bool = False) -> list[Cell]:
