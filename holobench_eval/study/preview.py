@@ -110,8 +110,9 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
 
 def _row(label: str, tasks: list[Task], limit: int | None, store: Store, machine: tuple[int, int, str]) -> Row:
     cells = [cell for task in tasks for cell in task.cells]
-    states = [record.state if (record := store.read(cell.id)) else "missing" for cell in cells]
-    unsolved = [task for task in tasks if store.missing(task.cells)]
+    state = {cell.id: record.state if (record := store.read(cell.id)) else "missing" for cell in cells}
+    states = [state[cell.id] for cell in cells]
+    unsolved = [task for task in tasks if any(state[cell.id] == "missing" for cell in task.cells)]
     known = [timings.known(timings.key(task, *machine)) for task in tasks if not task.is_floor]
     timed = [effort.seconds for effort in known if effort is not None]
     return Row(

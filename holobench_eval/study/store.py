@@ -99,7 +99,7 @@ class Store:
 
     def path(self, identity: str) -> Path:
         """The record's file."""
-        return self.folder / f"{identity}.json"
+        return self.output / f"records/{identity}.json"
 
     def log(self, identity: str) -> Path:
         """The file with the traceback of a failed cell."""

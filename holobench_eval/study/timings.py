@@ -28,8 +28,7 @@ from .store import write_atomically
 
 def folder() -> Path:
     """Where timings are kept."""
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "holobench_eval" / "timings"
+    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "holobench_eval/timings")
 
 
 @cache
