@@ -28,7 +28,7 @@ from .store import write_atomically
 
 def folder() -> Path:
     """Where timings are kept."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "holobench_eval/timings")
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "holobench_eval/timings")
 
 
 @cache
