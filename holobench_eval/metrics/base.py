@@ -103,6 +103,8 @@ def remembered(function: Callable[[Tensor], Tensor], most: int = 16) -> Callable
 
 def safe_sqrt(x: Tensor) -> Tensor:
     """The square root of x >= 0, exact, with gradient zero (not infinity) where x is zero. Any shape."""
+    if not x.requires_grad:
+        return x.sqrt()
     positive = x > 0
     return torch.where(positive, torch.where(positive, x, 1.0).sqrt(), 0.0)
 
