@@ -101,6 +101,11 @@ def remembered(function: Callable[[Tensor], Tensor], most: int = 16) -> Callable
     return known
 
 
+def block_means(image: Tensor, k: int) -> Tensor:
+    """Means over k x k pixels side by side, (B, C, H, W) to (B, C, H // k, W // k)."""
+    return functional.avg_pool2d(image, k) if k > 1 else image  # torch takes long to average single pixels
+
+
 def safe_sqrt(x: Tensor) -> Tensor:
     """The square root of x >= 0, exact, with gradient zero (not infinity) where x is zero. Any shape."""
     if not x.requires_grad:

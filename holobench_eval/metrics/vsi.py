@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..optics.colour import srgb_decode
-from .base import Metric, as_rgb, gradient_magnitude, mix, paired, remembered, safe_sqrt, similarity
+from .base import Metric, as_rgb, block_means, gradient_magnitude, mix, paired, remembered, safe_sqrt, similarity
 from .phase_congruency import frequency_grid
 
 LMN = ((0.06, 0.63, 0.27), (0.30, 0.04, -0.35), (0.34, -0.60, 0.17))
@@ -59,7 +59,7 @@ def _reduced(image: Tensor) -> Tensor:
     """
     k = max(1, round(min(image.shape[-2:]) / 256))
     before, after = k // 2, (k - 1) // 2
-    return functional.avg_pool2d(functional.pad(image, (before, after, before, after), mode="replicate"), k)
+    return block_means(functional.pad(image, (before, after, before, after), mode="replicate"), k)
 
 
 def _unit_range(x: Tensor) -> Tensor:
