@@ -80,7 +80,8 @@ def _priors_multiplied(small: Tensor) -> Tensor:
     gabor, centre = _priors(small.dtype, small.device)
     frequency = safe_sqrt(torch.fft.ifft2(torch.fft.fft2(lab) * gabor).real.square().sum(1, keepdim=True))
     warmth = _unit_range(lab[:, 1:]).square().sum(1, keepdim=True)
-    colour = 1 - torch.exp(-warmth / SIGMA_C**2)
+    # From 50 on the result is 1, and exp takes ten times as long where it underflows.
+    colour = 1 - torch.exp(-(warmth / SIGMA_C**2).clamp_max(50))
     return frequency * centre * colour
 
 
