@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, wraps
-from typing import Literal
+from typing import Literal, TypeVar
 
 import cv2
 import numpy as np
@@ -21,8 +19,10 @@ from ..shifts import correlate, mirrored
 Domain = Literal["linear", "amplitude", "srgb", "stored"]
 """Encodings of the images; ``stored``: values as pictures store them, whose relation to light is not known."""
 Function = Callable[[Tensor, Tensor], Tensor]
+T = TypeVar("T")
 
 _TOLERANCE = 1e-6
+_LARGEST_KEPT = 2**18
 
 
 def always() -> str | None:
@@ -77,32 +77,39 @@ def paired(image: Tensor, target: Tensor, smallest: int = 1) -> tuple[Tensor, Te
     return image.reshape(-1, channels, height, width), target.reshape(-1, channels, height, width)
 
 
-def remembered(function: Callable[[Tensor], Tensor], most: int = 16) -> Callable[[Tensor], Tensor]:
+def remembered(function: Callable[[Tensor], T], most: int = 16) -> Callable[[Tensor], T]:
     """A function of one image whose last ``most`` results are kept, by what the image shows.
 
-    For the features of targets, since many pictures are compared with one target. With a gradient, and on other
-    devices than the CPU, where to look at the image would take longer, nothing is kept.
+    For the features of targets, since many pictures are compared with one target. Nothing is kept with a gradient, for
+    images of more than 2^18 values, whose features would fill the memory, and on other devices than the CPU.
     """
-    kept: OrderedDict[object, Tensor] = OrderedDict()
+    kept: list[tuple[Tensor, T]] = []
 
     @wraps(function)
-    def known(image: Tensor) -> Tensor:
-        if not image.is_cpu or (image.requires_grad and torch.is_grad_enabled()):
+    def known(image: Tensor) -> T:
+        if not image.is_cpu or image.numel() > _LARGEST_KEPT or (image.requires_grad and torch.is_grad_enabled()):
             return function(image)
-        content = hashlib.sha256(image.detach().contiguous().numpy().data).digest()
-        key = (image.shape, image.dtype, content)
-        found = kept.get(key)
-        kept[key] = found = function(image) if found is None else found
-        kept.move_to_end(key)
-        if len(kept) > most:
-            kept.popitem(last=False)
-        return found
+        for index, (own, result) in enumerate(kept):
+            if own.dtype == image.dtype and torch.equal(own, image):
+                kept.append(kept.pop(index))
+                return result
+        own = image.detach().clone()
+        kept.append((own, function(own)))
+        del kept[:-most]
+        return kept[-1][1]
 
     return known
 
 
+def block_means(image: Tensor, k: int) -> Tensor:
+    """Means over k x k pixels side by side, (B, C, H, W) to (B, C, H // k, W // k)."""
+    return functional.avg_pool2d(image, k) if k > 1 else image  # torch takes long to average single pixels
+
+
 def safe_sqrt(x: Tensor) -> Tensor:
     """The square root of x >= 0, exact, with gradient zero (not infinity) where x is zero. Any shape."""
+    if not x.requires_grad:
+        return x.sqrt()
     positive = x > 0
     return torch.where(positive, torch.where(positive, x, 1.0).sqrt(), 0.0)
 

@@ -19,7 +19,7 @@ from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
 from ..shifts import mirrored
-from .base import Metric, gaussian_blur, mix, paired
+from .base import Metric, gaussian_blur, mix, paired, remembered
 
 SCALES = 4
 ORIENTATIONS = 4
@@ -138,6 +138,9 @@ class FixedMofd:
         return torch.stack(parts).mean(0).reshape(image.shape[:-3])
 
 
+_fixed = remembered(FixedMofd, most=8)
+
+
 def _halved(image: Tensor) -> Tensor:
     return gaussian_blur(image, 1.0)[:, :, ::2, ::2]
 
@@ -154,7 +157,7 @@ def mofd(image: Tensor, target: Tensor) -> Tensor:
     Returns a scalar or (B,) in [0, 1]; lower is better, identical images give 0. Raises ValueError (see ``paired``).
     """
     paired(image, target, smallest=SMALLEST)
-    return FixedMofd(target)(image)
+    return _fixed(target)(image)
 
 
 MOFD = Metric("mofd", "1", "lower", 0.0, ("srgb",), mofd, smallest=SMALLEST)

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor
-from torch.nn import functional
 
-from .base import Metric, gradient_magnitude, mix, paired, remembered, similarity
+from .base import Metric, block_means, gradient_magnitude, mix, paired, remembered, similarity
 from .haarpsi import YIQ
 from .phase_congruency import phase_congruency
 
@@ -31,7 +30,7 @@ def fsim(image: Tensor, target: Tensor) -> Tensor:
     """
     x, y = paired(image, target, smallest=16)
     k = max(1, round(min(x.shape[-2:]) / 256))
-    x, y = (functional.avg_pool2d(255 * side, k) for side in (x, y))
+    x, y = (block_means(255 * side, k) for side in (x, y))
     if x.shape[1] == 3:
         x, y = mix(x, YIQ), mix(y, YIQ)
     congruency_x, congruency_y = phase_congruency(x[:, :1]), _congruency_of_target(y[:, :1])

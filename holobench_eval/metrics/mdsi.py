@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from .base import Metric, as_rgb, gradient_magnitude, mix, paired, safe_sqrt, similarity
+from .base import Metric, as_rgb, block_means, gradient_magnitude, mix, paired, safe_sqrt, similarity
 
 # Rows: luminance and the two chromaticities H and M of the Gaussian colour model.
 LHM = ((0.2989, 0.587, 0.114), (0.3, 0.04, -0.35), (0.34, -0.6, 0.17))
@@ -25,7 +25,7 @@ def _reduced(image: Tensor) -> Tensor:
     """(B, C, H, W) averaged over k x k pixels, k = shorter side / 256 rounded, after k - 1 zeros at the edges."""
     k = max(1, round(min(image.shape[-2:]) / 256))
     before, after = (k - 1) // 2, k // 2
-    return functional.avg_pool2d(functional.pad(image, (before, after, before, after)), k)
+    return block_means(functional.pad(image, (before, after, before, after)), k)
 
 
 def mdsi(image: Tensor, target: Tensor) -> Tensor:

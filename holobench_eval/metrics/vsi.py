@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..optics.colour import srgb_decode
-from .base import Metric, as_rgb, gradient_magnitude, mix, paired, remembered, safe_sqrt, similarity
+from .base import Metric, as_rgb, block_means, gradient_magnitude, mix, paired, remembered, safe_sqrt, similarity
 from .phase_congruency import frequency_grid
 
 LMN = ((0.06, 0.63, 0.27), (0.30, 0.04, -0.35), (0.34, -0.60, 0.17))
@@ -59,7 +59,7 @@ def _reduced(image: Tensor) -> Tensor:
     """
     k = max(1, round(min(image.shape[-2:]) / 256))
     before, after = k // 2, (k - 1) // 2
-    return functional.avg_pool2d(functional.pad(image, (before, after, before, after), mode="replicate"), k)
+    return block_means(functional.pad(image, (before, after, before, after), mode="replicate"), k)
 
 
 def _unit_range(x: Tensor) -> Tensor:
@@ -68,23 +68,29 @@ def _unit_range(x: Tensor) -> Tensor:
     return (x - low) / (high - low + torch.finfo(x.dtype).eps)
 
 
-def _saliency(rgb: Tensor, of_small: Callable[[Tensor], Tensor]) -> Tensor:
-    """SDSP saliency, (B, 3, H, W) in [0, 1] to (B, 1, H, W); of_small: that of 256 x 256 pixels."""
-    small = functional.interpolate(rgb, (SALIENCY_SIDE, SALIENCY_SIDE), mode="bilinear", align_corners=False)
-    return _unit_range(functional.interpolate(of_small(small), rgb.shape[-2:], mode="bilinear", align_corners=True))
-
-
 def _priors_multiplied(small: Tensor) -> Tensor:
     """Frequency, location and warm-colour priors of (B, 3, 256, 256) multiplied, (B, 1, 256, 256)."""
     lab = _lab(small)
     gabor, centre = _priors(small.dtype, small.device)
     frequency = safe_sqrt(torch.fft.ifft2(torch.fft.fft2(lab) * gabor).real.square().sum(1, keepdim=True))
     warmth = _unit_range(lab[:, 1:]).square().sum(1, keepdim=True)
-    colour = 1 - torch.exp(-warmth / SIGMA_C**2)
+    # From 50 on the result is 1, and exp takes ten times as long where it underflows.
+    colour = 1 - torch.exp(-(warmth / SIGMA_C**2).clamp_max(50))
     return frequency * centre * colour
 
 
-_priors_of_target = remembered(_priors_multiplied)
+_priors_of_target = remembered(_priors_multiplied)  # of a large one, too
+
+
+def _saliency(rgb: Tensor, of_small: Callable[[Tensor], Tensor]) -> Tensor:
+    """SDSP saliency, (B, 3, H, W) in [0, 1] to (B, 1, H, W); of_small: that of 256 x 256 pixels."""
+    small = functional.interpolate(rgb, (SALIENCY_SIDE, SALIENCY_SIDE), mode="bilinear", align_corners=False)
+    return _unit_range(functional.interpolate(of_small(small), rgb.shape[-2:], mode="bilinear", align_corners=True))
+
+
+@remembered
+def _saliency_of_target(rgb: Tensor) -> Tensor:
+    return _saliency(rgb, _priors_of_target)
 
 
 def vsi(image: Tensor, target: Tensor) -> Tensor:
@@ -97,8 +103,7 @@ def vsi(image: Tensor, target: Tensor) -> Tensor:
     Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
     """
     x, y = (as_rgb(side) for side in paired(image, target, smallest=3))
-    salience_x = _reduced(_saliency(x, _priors_multiplied))
-    salience_y = _reduced(_saliency(y, _priors_of_target))
+    salience_x, salience_y = _reduced(_saliency(x, _priors_multiplied)), _reduced(_saliency_of_target(y))
     x, y = (mix(_reduced(255 * side), LMN) for side in (x, y))
     chroma = similarity(x[:, 1:2], y[:, 1:2], C3) * similarity(x[:, 2:], y[:, 2:], C3)
     # The real part of a complex power, since the product may be negative.

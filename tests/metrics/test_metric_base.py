@@ -26,6 +26,19 @@ def test_a_result_is_kept_by_what_the_image_shows_and_the_oldest_goes_first() ->
     assert known(images[0].reshape(1, 1, 2, 8)).shape == (1, 1, 2, 8)
 
 
+def test_of_a_large_image_nothing_is_kept() -> None:
+    asked: list[int] = []
+
+    def counted(image: Tensor) -> int:
+        asked.append(image.numel())
+        return image.numel()
+
+    known = remembered(counted)
+    for side in (512, 513):
+        assert known(torch.zeros(1, 1, side, side)) == known(torch.zeros(1, 1, side, side)) == side**2
+    assert asked == [512**2, 513**2, 513**2]
+
+
 def test_with_a_gradient_nothing_is_kept() -> None:
     known = remembered(torch.square)
     known(torch.ones(1, 1, 4, 4))
