@@ -86,7 +86,7 @@ def phase_congruency(image: Tensor) -> Tensor:
     bank = _bank(image.shape[-2], image.shape[-1], image.dtype, image.device)
     response = torch.fft.ifft2(torch.fft.fft2(image)[:, :, None] * bank.filters)
     real, imaginary = response.real.contiguous(), response.imag.contiguous()
-    amplitude = safe_sqrt(real.square() + imaginary.square())  # five times as fast as abs() of complex numbers
+    amplitude = safe_sqrt(real.square() + imaginary.square())  # abs() of complex numbers takes three times as long
     # Of the responses, the part in phase with their sum over scales, and what deviates from it.
     sum_real, sum_imaginary = real.sum(2), imaginary.sum(2)
     length = safe_sqrt(sum_real.square() + sum_imaginary.square()) + torch.finfo(image.dtype).eps
