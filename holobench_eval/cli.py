@@ -116,9 +116,9 @@ def _run(
 
     console, study = console_for_people(), load_study(config)
     name, workers, address = where
-    if name not in executors.ELSEWHERE:
-        device = str(find(device))
-    shared = 0 if name in executors.ELSEWHERE else gpus(device)
+    elsewhere = name in executors.ELSEWHERE
+    device = device if elsewhere else str(find(device))
+    shared = int(device.startswith("cuda")) if elsewhere else gpus(device)
     wanted = executors.executor(name, workers, _small(study), address, shared)
     chosen = executors.Serial() if study.display.real else wanted  # there is one bench
     if study.display.real:

@@ -159,9 +159,10 @@ class Study:
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
     captures of ``holograms`` against those captures; ``focus`` scores the planes of focal stacks, each at its own
     distance. note: a paragraph that the report prints beside its tables.
-    repeats: how often every cell is measured, with new noise; sweeps: changes of the displays at test time; baseline:
-    label that paired tests compare against (the first method when the config names none); headline: the column the
-    report leads with.
+    repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
+    whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
+    changes of the displays at test time; baseline: label that paired tests compare against (the first method when the
+    config names none); headline: the column the report leads with.
     file, text: the config file as the user named it, and what is in it.
     """
 
@@ -176,6 +177,7 @@ class Study:
     note: str = ""
     seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
     repeats: Annotated[int, Interval(ge=1, le=1000)] = 1
+    timing: Literal["shared", "alone"] = "shared"
     protocol: Protocol = Protocol()
     baseline: str = ""
     headline: Text = "psnr_linear"

@@ -112,6 +112,7 @@ CHANGES = [
     ('label: "GS"', "label: wirtinger", "10:37: methods[1] and methods[0] share the label 'wirtinger'"),
     ('label: "GS"', "label: floor_black", "10:37: label 'floor_black' should be"),
     ('label: "GS"', 'label: "a\\nb"', "10:37: label 'a\\nb' should be printable"),
+    ("repeats: 2", "timing: serial", "11:9: timing should be 'shared' or 'alone', got \"serial\""),
     ("repeats: 2", "repeats: 0", "11:10: repeats should be greater than or equal to 1"),
     ("baseline: GS", "baseline: gs", "12:11: no method has the label 'gs'; "),
     ("headline: ssim_srgb", "headline: ssim_sgrb", "13:11: unknown metric 'ssim_sgrb'; did you mean 'ssim_srgb'?"),

@@ -189,6 +189,7 @@ def _words(
         "setup": setup(results, records),
         "profiles": description.displays,
         "parameters": sections.parameters(method_parameters(results, records)),
+        "timing": sections.timing(results, provenance.get("workers", 1)),
         "reported_source": layout.reported_source,
         "seed": layout.seed,
         "command": description.command or f"holoeval run {description.config_file or 'CONFIG.yaml'}",

@@ -14,8 +14,8 @@ from .markdown import code, table
 from .results import Results
 from .scores import DOMAINS, Score
 from .statistics import PairedTest
-from .tables import DONE, MEMORY_COLUMN
-from .wording import FILES
+from .tables import ALONE_COLUMN, DONE, MEMORY_COLUMN
+from .wording import FILES, words
 
 MEMORY = "memory [MiB]"
 ELSEWHERE = ("refine_", "second_")
@@ -194,6 +194,29 @@ def light_and_time(results: Results, condition: str) -> Markup:
         )
     columns = ["method", *effort.values(), *(["most saturated samples [%]"] if sensor else [])]
     return table([*columns, *(score.title for score in figures)], rows)
+
+
+def timing(results: Results, workers: int) -> str:
+    """What was at work beside the solutions that were timed, a sentence; workers: of the run.
+
+    Empty where a single worker left no note of it, as in records of earlier versions.
+    """
+    each, frame, row = results.layout.wording.each, results.frame, ["method", "condition"]
+    done = frame[(frame["state"] == DONE) & (frame["condition"] != REFERENCE)]
+    together = f"{each}s computed {f'{workers} ' * (workers > 1)}side by side, which disturb each other"
+    if ALONE_COLUMN not in done:
+        return f"The seconds are of {together}." if workers > 1 else ""
+    alone = done[done[ALONE_COLUMN] == 1]
+    if alone.empty:
+        return f"The seconds are of {together}."
+    if len(alone) == len(done):
+        return f"Each {each} was computed with nothing beside it."
+    one = alone.groupby(row)["seconds"].nunique().max() == 1  # cells of one solution have one time
+    chosen = f"one {each} a row, computed" if one else f"those {each}s of a row that were computed"
+    timed = set(alone[row].itertuples(index=False, name=None))
+    others = [pair for pair in done[row].drop_duplicates().itertuples(index=False, name=None) if pair not in timed]
+    rest = f"; those of {words([' on '.join(pair) for pair in others])} are of {together}" if others else ""
+    return f"The seconds are of {chosen} with nothing beside {'it' if one else 'them'}{rest}."
 
 
 def per_target(results: Results, condition: str) -> Markup:

@@ -30,6 +30,8 @@ TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)
 MEMORY_COLUMN = "memory_mib"
 STOPPED_COLUMN = "stopped"
 """Of studies in which a solution's memory was measured, or the display stopped a method; others lack them."""
+ALONE_COLUMN = "timed_alone"
+"""1 where nothing else was at work beside a solution, else 0; reports of earlier versions lack it."""
 TRACK_COLUMN = "track"
 """Which reports of earlier versions lack, and with it the columns that are computed from it."""
 MEASURED_COLUMNS = ("captures", "seconds", "registration_residual_px", "saturated")
@@ -37,7 +39,7 @@ IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol"
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
 _REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
-_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, STOPPED_COLUMN, TRACK_COLUMN}
+_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, ALONE_COLUMN, STOPPED_COLUMN, TRACK_COLUMN}
 DONE = "done"
 
 
@@ -68,6 +70,7 @@ def _row(record: Mapping[str, Any], identity: str, layout: Layout) -> dict[str, 
     numbers = {
         "repeat": cell.get("repeat", 0),
         **{key: record.get(key) for key in (*MEASURED_COLUMNS, MEMORY_COLUMN)},
+        ALONE_COLUMN: record.get("alone"),
         **({"captures": None} if layout.measure == FILES else {}),  # how many somebody else took is not known
         **scores,
     }
@@ -101,7 +104,8 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(column for column in frame.columns if column not in _NOT_SCORES) or [layout.headline]
     columns = ["method", "name", "condition", "target", "repeat", "state", "reason"]
-    measured = [*MEASURED_COLUMNS, *([MEMORY_COLUMN] if frame[MEMORY_COLUMN].notna().any() else [])]
+    known = [column for column in (MEMORY_COLUMN, ALONE_COLUMN) if frame[column].notna().any()]
+    measured = [*MEASURED_COLUMNS, *known]
     training = TRAINING_COLUMNS if layout.trained else ()
     stopped = [STOPPED_COLUMN] if frame[STOPPED_COLUMN].any() else []
     order = [*columns, *scores, *measured, *training, *stopped, TRACK_COLUMN, *IDENTITY_COLUMNS]
@@ -165,7 +169,7 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
         values = means[score].dropna().to_numpy()
         estimate = bootstrap_mean(values if values.size == n or not parse(score).domain else [])
         row |= {score: estimate.mean, f"{score}_lo": estimate.low, f"{score}_hi": estimate.high}
-    row |= {"captures": done["captures"].mean(), "seconds": done["seconds"].mean()}
+    row |= {"captures": done["captures"].mean(), "seconds": timed(done)["seconds"].mean()}
     if LEARNED_COLUMN in done:
         row |= {key: done[key].mean() for key in TRAINING_COLUMNS if key != LEARNED_COLUMN}
         row[LEARNED_COLUMN] = " ".join(sorted(set(done[LEARNED_COLUMN]) - {""}))
@@ -175,6 +179,12 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
         row |= {"total_captures": total_captures(done), TRACK_COLUMN: rows[TRACK_COLUMN].iloc[0], "rank": np.nan}
     published = layout.published(label, condition)
     return row | {f"reported_{name}": published.get(name, np.nan) for name in layout.reported_metrics}
+
+
+def timed(done: pd.DataFrame) -> pd.DataFrame:
+    """Of the done cells of a row those whose seconds count: what was solved alone if anything was, else all."""
+    alone = done[done[ALONE_COLUMN] == 1] if ALONE_COLUMN in done else done
+    return done if alone.empty else alone
 
 
 def total_captures(done: pd.DataFrame) -> float:

@@ -28,6 +28,8 @@ WORKER_ENVIRONMENT = {
 next one from there doubles the time of a step), and without a look at every worker's stack a hundred times a second."""
 ANSWER = 30.0
 """Seconds that a scheduler has to answer."""
+GPU = {"GPU": 1}
+"""The resource that a worker with a GPU declares, and that a job on one asks for."""
 SETTINGS = {
     # A worker lost twice on the same job is the job's fault.
     "distributed.scheduler.allowed-failures": 1,
@@ -42,7 +44,7 @@ SETTINGS = {
 class Local:
     """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try.
 
-    gpus: where there are several to compute on, each worker sees one of them.
+    gpus: to compute on, shared out among the workers: where there are several, each worker sees one of them.
     """
 
     workers: int
@@ -56,6 +58,7 @@ class Local:
             _settings(),
             LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=self.workers,
+                resources=GPU if self.gpus else None,
                 threads_per_worker=1,
                 processes=True,
                 memory_limit=0,  # no worker may die because others fill the memory
@@ -67,7 +70,7 @@ class Local:
             client.register_plugin(_bound_to_the_parent())
             if self.gpus > 1:
                 client.register_plugin(_one_gpu_each(self.gpus))
-            yield from _results(client, lambda: self.workers, function, jobs)
+            yield from _results(client, lambda: self.workers, function, jobs, on_gpu=self.gpus > 0)
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,11 @@ class Slurm:
     Queue, memory, cores, walltime and what else the site wants are those of Dask's own configuration
     (``~/.config/dask/jobqueue.yaml``, section ``jobqueue.slurm``). Records, artifacts and data lie in folders that all
     nodes see under the same names. A worker that the queue ends costs the job it had, after a second try elsewhere.
+    on_gpu: each worker has a GPU, which the site's configuration asks the queue for.
     """
 
     workers: int
+    on_gpu: bool = False
 
     def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results as they come, from the first worker that the queue starts on. UserError without dask-jobqueue."""
@@ -93,12 +98,13 @@ class Slurm:
 
         with _settings():
             try:
-                cluster = SLURMCluster(processes=1, job_script_prologue=_exports())
+                declared = _declared() if self.on_gpu else None  # None: the site's alone
+                cluster = SLURMCluster(processes=1, job_script_prologue=_exports(), worker_extra_args=declared)
                 cluster.scale(jobs=self.workers)  # type: ignore[no-untyped-call]
             except (ValueError, TypeError) as error:  # a configuration that says too little, or what cannot be
                 raise UserError(f"the SLURM cluster: {error}; see jobqueue.slurm in Dask's configuration") from error
             with cluster, Client(cluster) as client:  # type: ignore[no-untyped-call]
-                yield from _results(client, lambda: _there(client), function, jobs)
+                yield from _results(client, lambda: _there(client, self.on_gpu), function, jobs, self.on_gpu)
 
 
 @dataclass(frozen=True)
@@ -106,21 +112,22 @@ class Address:
     """Jobs on the workers of a Dask scheduler that runs already, which may come and go.
 
     Each worker has one thread (``dask worker --nthreads 1``): torch's settings are those of a process. Folders are as
-    for ``Slurm``. address: such as ``tcp://host:8786``.
+    for ``Slurm``. address: such as ``tcp://host:8786``; on_gpu: jobs go only to workers that declare a GPU.
     """
 
     address: str
+    on_gpu: bool = False
 
     @cached_property
     def workers(self) -> int:
         """Workers that are there now. UserError: the scheduler does not answer, or has none that can be used."""
         with self._client() as client:
-            return _there(client)
+            return _there(client, self.on_gpu)
 
     def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results as they come."""
         with _settings(), self._client() as client:
-            yield from _results(client, lambda: _there(client), function, jobs)
+            yield from _results(client, lambda: _there(client, self.on_gpu), function, jobs, self.on_gpu)
 
     @contextmanager
     def _client(self) -> Iterator[Any]:
@@ -131,18 +138,27 @@ class Address:
         except (OSError, ValueError, TimeoutError) as error:
             raise UserError(f"no Dask scheduler answers at '{self.address}' ({type(error).__name__})") from error
         with client:
-            workers = client.scheduler_info(n_workers=-1)["workers"]
+            workers = _usable(client, self.on_gpu)
             several = [name for name, worker in workers.items() if worker["nthreads"] != 1]
             if several:
                 raise UserError(f"worker {several[0]} has several threads; start workers with --nthreads 1")
+            if not workers and self.on_gpu:
+                start = f'dask worker {self.address} --nthreads 1 --resources "GPU=1"'
+                raise UserError(f"no worker at '{self.address}' declares a GPU; start one with: {start}")
             if not workers:
                 raise UserError(f"the Dask scheduler at '{self.address}' has no workers")
             yield client
 
 
-def _there(client: Any) -> int:
-    """Workers at this moment, at least one so that a job is always waiting for the first."""
-    return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+def _usable(client: Any, on_gpu: bool) -> dict[str, Any]:
+    """What the scheduler knows of its workers at this moment, by their names; on_gpu: of those that declare a GPU."""
+    workers = client.scheduler_info(n_workers=-1)["workers"]
+    return {name: one for name, one in workers.items() if not on_gpu or one["resources"].get("GPU", 0) >= GPU["GPU"]}
+
+
+def _there(client: Any, on_gpu: bool) -> int:
+    """Workers that can be used at this moment, at least one so that a job is always waiting for the first."""
+    return max(1, len(_usable(client, on_gpu)))
 
 
 @contextmanager
@@ -154,7 +170,7 @@ def _settings() -> Iterator[None]:
 
 
 def _results(
-    client: Any, workers: Callable[[], int], function: Callable[[J], R], jobs: Iterable[J | None]
+    client: Any, workers: Callable[[], int], function: Callable[[J], R], jobs: Iterable[J | None], on_gpu: bool
 ) -> Iterator[tuple[J, R | Exception]]:
     """Results as they come; as many jobs are taken as there are workers, so the scheduler never holds a whole study."""
     from distributed import as_completed
@@ -165,7 +181,7 @@ def _results(
 
     def fill() -> None:
         while len(running) < workers() and (job := next(waiting, None)) is not None:
-            future = client.submit(function, job, pure=False)
+            future = client.submit(function, job, pure=False, resources=GPU if on_gpu else None)
             running[future] = job
             completed.add(future)  # type: ignore[no-untyped-call]
 
@@ -180,6 +196,13 @@ def _results(
 def _exports() -> list[str]:
     """Lines of a job script that give a worker one thread."""
     return [f"export {name}={value}" for name, value in WORKER_ENVIRONMENT.items()]
+
+
+def _declared() -> list[str]:
+    """Arguments of a worker that has a GPU, the site's own before them."""
+    import dask
+
+    return [*dask.config.get("jobqueue.slurm.worker-extra-args"), "--resources", "GPU=1"]
 
 
 def _bound_to_the_parent() -> Any:

@@ -55,7 +55,7 @@ def executor(name: str, workers: int | None, small: bool = True, address: str | 
 
     "auto" is local where the study's panel is small and there is more than one worker to have, else serial: a small
     panel does not keep several threads busy, a large one fills the memory. With GPUs it is local where there are
-    several. address: of a running Dask scheduler.
+    several. address: of a running Dask scheduler; gpus: to compute on; for workers elsewhere, 1 if each has one.
     """
     if name not in NAMES:
         raise UserError(f"unknown executor '{name}'; {suggest(name, NAMES)}")
@@ -66,11 +66,11 @@ def executor(name: str, workers: int | None, small: bool = True, address: str | 
     if name in ("serial", "address") and workers not in (None, 1):
         raise UserError(f"--workers {workers} needs --executor local or slurm; {name} has its own")
     if address is not None:
-        return Address(address)
+        return Address(address, on_gpu=gpus > 0)
     if name == "slurm":
         if workers is None:
             raise UserError("--executor slurm needs --workers, how many SLURM jobs to start")
-        return Slurm(workers)
+        return Slurm(workers, on_gpu=gpus > 0)
     many = workers or gpus or _cores()
     if name == "serial" or (name == "auto" and (many == 1 or not (small or workers or gpus))):
         return Serial()

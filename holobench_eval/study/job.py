@@ -55,11 +55,15 @@ class Setting:
 
 @dataclass(frozen=True)
 class Job:
-    """A task, the cells of it that are wanted, and the setting of the run."""
+    """A task, the cells of it that are wanted, and the setting of the run.
+
+    alone: whether nothing else of the run is at work meanwhile, so that its time can be compared.
+    """
 
     task: Task
     wanted: frozenset[str]
     setting: Setting
+    alone: bool
 
     @property
     def device(self) -> torch.device:
@@ -68,9 +72,9 @@ class Job:
 
     @property
     def timing(self) -> str:
-        """The name of its timing."""
-        setting = self.setting
-        return timings.key(self.task, setting.threads, setting.workers, gpu_name(self.device))
+        """The name of its timing; what was measured alone serves a run with one worker, too."""
+        workers = 1 if self.alone else self.setting.workers
+        return timings.key(self.task, self.setting.threads, workers, gpu_name(self.device))
 
     @property
     def cells(self) -> list[tuple[Cell, Condition]]:

@@ -101,18 +101,25 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
     """A row per method, the floor first. gpu: as in ``timings.key``, as are threads and workers."""
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     labels = dict.fromkeys(task.label for task in plan.tasks)
-    machine = (threads, workers, gpu)
+    machine, timed = (threads, workers, gpu), timings.timed(study, plan)
+    todo = frozenset(cell.id for cell in store.missing(plan.cells, timed=timed))
     return [
-        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, machine)
+        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, todo, machine)
         for label in labels
     ]
 
 
-def _row(label: str, tasks: list[Task], limit: int | None, store: Store, machine: tuple[int, int, str]) -> Row:
+def _row(
+    label: str,
+    tasks: list[Task],
+    limit: int | None,
+    store: Store,
+    todo: frozenset[str],
+    machine: tuple[int, int, str],
+) -> Row:
     cells = [cell for task in tasks for cell in task.cells]
-    state = {cell.id: record.state if (record := store.read(cell.id)) else "missing" for cell in cells}
-    states = [state[cell.id] for cell in cells]
-    unsolved = [task for task in tasks if any(state[cell.id] == "missing" for cell in task.cells)]
+    states = [record.state for cell in cells if cell.id not in todo and (record := store.read(cell.id))]
+    unsolved = [task for task in tasks if any(cell.id in todo for cell in task.cells)]
     known = [timings.known(timings.key(task, *machine)) for task in tasks if not task.is_floor]
     timed = [effort.seconds for effort in known if effort is not None]
     return Row(
@@ -123,7 +130,7 @@ def _row(label: str, tasks: list[Task], limit: int | None, store: Store, machine
         captures=limit if isinstance(limit, int) else None,
         done=states.count("done"),
         failed=states.count("failed"),
-        missing=states.count("missing"),
+        missing=sum(cell.id in todo for cell in cells),
         seconds=sum(timed) / len(timed) * len(unsolved) if timed else None,
     )
 

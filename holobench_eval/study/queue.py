@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from .cell import work
 from .job import Job
@@ -19,20 +19,29 @@ def step(one: Step) -> Made:
     return train(one) if isinstance(one, TrainingJob) else work(one)
 
 
-def queue(trainings: Iterable[TrainingJob], jobs: Iterable[Job], unlearned: set[str]) -> Iterator[Step | None]:
-    """Trainings first, since they take longest; then jobs, those that need nothing of ``unlearned`` before the others.
+def queue(
+    trainings: Iterable[TrainingJob], jobs: Iterable[Job], unlearned: set[str], at_work: Collection[Step]
+) -> Iterator[Step | None]:
+    """Trainings first, since they take longest; then jobs, those that need nothing of ``unlearned`` before the others;
+    at the end, one by one, the jobs that are to be alone.
 
-    unlearned: ids of the preparations that are not there yet; whoever takes the results removes them as they come.
-    None: all that is left waits for a training that is still at work.
+    unlearned: ids of the preparations that are not there yet; at_work: the steps that were taken; whoever takes the
+    results removes both as they come. None: all that is left waits for a step that is still at work.
     """
     yield from trainings
-    waiting = list(jobs)
+    every = list(jobs)
+    waiting = [job for job in every if not job.alone]
     while waiting:
         ready = [job for job in waiting if unlearned.isdisjoint(_needs(job))]
         waiting = [job for job in waiting if not unlearned.isdisjoint(_needs(job))]
         yield from ready
         if not ready:
             yield None
+    for job in every:
+        if job.alone:
+            while at_work:
+                yield None
+            yield job
 
 
 def _needs(job: Job) -> set[str]:

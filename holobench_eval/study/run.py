@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..device import find, gpu_name
-from . import provenance
+from . import provenance, timings
 from .artifacts import Artifacts
 from .available import refuse_unavailable
-from .clusters import Local
+from .clusters import Address, Local
 from .executors import Executor, Serial
 from .job import Job, Setting
 from .plan import Plan, Task
@@ -88,7 +88,8 @@ def run(
         if retrain:
             refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
             forget(plan, store, Artifacts(artifacts))
-        missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed))
+        timed = timings.timed(study, plan)
+        missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed, timed))
         refuse_unavailable(plan, missing, study.folder)
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)
@@ -113,9 +114,13 @@ def run(
                 watch.training([(needed.name, Artifacts(artifacts).place(needed)) for needed in untrained])
             unlearned = {needed.id for needed in untrained}
             trainings = [TrainingJob(needed, artifacts, threads, device) for needed in untrained]
-            steps = queue(trainings, _jobs(plan, missing, setting), unlearned)
-            results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, watch))
+            at_work: list[Step] = []
+            single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
+            jobs = _jobs(plan, missing, missing if single else timed, setting)
+            steps = queue(trainings, jobs, unlearned, at_work)
+            results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, at_work, watch))
             for one, made in results:
+                at_work.remove(one)
                 if isinstance(one, TrainingJob):
                     reason = made if isinstance(made, str) else Artifacts(artifacts).fail(one.needed, _error(made))
                     unlearned.discard(one.needed.id)
@@ -149,17 +154,19 @@ def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Pr
     return waiting
 
 
-def _jobs(plan: Plan, missing: frozenset[str], setting: Setting) -> Iterator[Job]:
-    """The tasks with missing cells."""
+def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: Setting) -> Iterator[Job]:
+    """The tasks with missing cells. alone: cells whose task has nothing beside it."""
     for task in plan.tasks:
         wanted = missing.intersection(cell.id for cell in task.cells)
         if wanted:
-            yield Job(task, wanted, setting)
+            yield Job(task, wanted, setting, alone=not wanted.isdisjoint(alone))
 
 
-def _told(steps: Iterator[Step | None], watch: Watch) -> Iterator[Step | None]:
-    """The same steps; the watch is told of each task when an executor takes it."""
+def _told(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> Iterator[Step | None]:
+    """The same steps; each is at work when an executor takes it, and the watch is told of tasks."""
     for one in steps:
+        if one is not None:
+            at_work.append(one)
         if isinstance(one, Job):
             watch.started(one.task)
         yield one

@@ -21,7 +21,7 @@ from .plan import Cell, Plan
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
 """``missing`` is the state of a planned cell that has no record; ``Store.load`` gives it and no file holds it."""
 
-ADDED = frozenset({"memory_mib", "stopped"})
+ADDED = frozenset({"alone", "memory_mib", "stopped"})
 """What records of earlier versions lack."""
 
 TEMPORARY = ".writing-"
@@ -33,8 +33,9 @@ class Record:
     """What was measured in a cell.
 
     cell: its description; state: ``done``, or why there is no score in ``reason``; scores: flat metric names
-    to numbers; captures: camera captures the method used; seconds: wall time of the solution; memory_mib: the most
-    resident memory that it took beyond what was there before it [MiB]; label: the method's name in tables;
+    to numbers; captures: camera captures the method used; seconds: wall time of the solution; alone: whether
+    nothing else of the run was at work meanwhile (None: not known); memory_mib: the most resident memory that the
+    solution took beyond what was there before it [MiB]; label: the method's name in tables;
     registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
     saturated samples; learned: sha256, captures and seconds of the training that the method needed first; stopped: why
     the display ended the solution, whose best hologram so far was scored (empty: it did not). None: does not apply, as
@@ -48,6 +49,7 @@ class Record:
     scores: dict[str, float] = field(default_factory=dict)
     captures: int = 0
     seconds: float | None = None
+    alone: bool | None = None
     memory_mib: float | None = None
     registration_residual_px: float | None = None
     saturated: float | None = None
@@ -142,13 +144,18 @@ class Store:
             found.append({**vars(record), "label": label})
         return found
 
-    def missing(self, cells: tuple[Cell, ...], retry_failed: bool = False) -> list[Cell]:
-        """The cells that a run has to compute: those without a record, and failed ones if they are to be retried."""
+    def missing(
+        self, cells: tuple[Cell, ...], retry_failed: bool = False, timed: frozenset[str] = frozenset()
+    ) -> list[Cell]:
+        """The cells that a run has to compute: those without a record, failed ones if they are to be retried, and of
+        ``timed`` those whose solution was not timed alone."""
         records = {cell.id: self.read(cell.id) for cell in cells}
         return [
             cell
             for cell in cells
-            if (record := records[cell.id]) is None or (retry_failed and record.state == "failed")
+            if (record := records[cell.id]) is None
+            or (retry_failed and record.state == "failed")
+            or (cell.id in timed and record.state == "done" and not record.alone)
         ]
 
     @contextmanager
@@ -182,6 +189,8 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
         raise UserError(f"{path}: a score or a measurement is not a number; delete the file and run the study again")
     if not all(isinstance(text, str) for text in (record.label, record.reason, record.stopped)):
         raise UserError(f"{path}: label, reason and stopped are texts; delete the file and run the study again")
+    if not isinstance(record.alone, bool | None):
+        raise UserError(f"{path}: 'alone' is neither true nor false; delete the file and run the study again")
     if not (record.learned is None or isinstance(record.learned, dict)):
         raise UserError(f"{path}: 'learned' is no mapping; delete the file and run the study again")
     return record

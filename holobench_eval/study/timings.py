@@ -17,13 +17,16 @@ from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from .effort import Effort
 from .identity import digest
-from .plan import Task
+from .plan import Plan, Task
 from .store import write_atomically
+
+if TYPE_CHECKING:
+    from ..config import Study
 
 
 def folder() -> Path:
@@ -46,6 +49,23 @@ def cpu_model() -> str:
 def _torch() -> str:
     """Its version, read from its metadata once: that takes longer than all the rest of a name."""
     return version("torch")
+
+
+def timed(study: Study, plan: Plan) -> frozenset[str]:
+    """Cells of the solutions that a study with ``timing: alone`` measures with nothing beside them; none for another.
+
+    Of every row of the tables it is the last of the first repeat: a method's first solution also loads libraries.
+    """
+    if study.timing == "shared":
+        return frozenset()
+    last = {
+        (task.label, cell.condition): task
+        for task in plan.tasks
+        if not task.is_floor
+        for cell in task.cells
+        if cell.repeat == 0
+    }
+    return frozenset(cell.id for task in last.values() for cell in task.cells)
 
 
 def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:

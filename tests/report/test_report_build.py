@@ -108,6 +108,14 @@ def test_a_reader_finds_what_was_measured_and_how_to_do_it_again(report):
         assert phrase in report, phrase
 
 
+def test_a_reader_is_told_what_was_at_work_beside_what_was_timed(records, tmp_path):
+    kept, layout = minimal(records[1])
+    noted = [record | {"memory_mib": 9.0, "alone": record["cell"]["target"] == TARGETS[0]} for record in kept]
+    text = write_report(layout, noted, tmp_path, PROVENANCE, DESCRIPTION).read_text()
+    assert "Seconds and memory are the first measurement on this machine" in text
+    assert "The seconds are of one hologram a row, computed with nothing beside it. Memory is" in text
+
+
 def test_a_hole_is_listed_with_its_reason(report):
     assert "| GS | leto-aged | coffee | 0 | failed | CellError: registration residual 1.32 px" in report
     assert "| GS | 2 of 3 |" in report

@@ -7,7 +7,8 @@ import pytest
 import synthetic_study as made
 
 from holobench_eval.errors import UserError
-from holobench_eval.report import csv_text, read_records, recompute_table, records_frame, table_from_records
+from holobench_eval.report import Results, csv_text, read_records, recompute_table, records_frame, table_from_records
+from holobench_eval.report.sections import timing
 from holobench_eval.study.plan import FLOORS, REFERENCE
 
 PLAIN = made.layout(
@@ -89,6 +90,61 @@ def test_numbers_have_six_significant_digits():
     text = csv_text(records_frame(rows({"t1": 12.3456789}, seconds=1 / 3), PLAIN))
     assert ",12.3457," in text
     assert ",0.333333," in text
+
+
+ALONE = {"t1": (5.0, False), "t2": (3.0, True)}
+"""Seconds of each target, and whether they were measured alone."""
+
+
+def timed(label="a", alone=ALONE):
+    return [
+        made.record(label, made.cell(label, target, "bench"), {"psnr_linear": 1.0}, seconds=seconds, alone=quiet)
+        for target, (seconds, quiet) in alone.items()
+    ]
+
+
+def test_the_seconds_of_a_row_are_those_of_what_was_timed_alone_if_anything_was():
+    frame = records_frame([*timed(), *timed("b", {"t1": (5.0, False), "t2": (3.0, False)})], PLAIN)
+    table = table_from_records(frame, PLAIN)
+    assert row_of(table, "a")["seconds"] == 3.0
+    assert row_of(table, "b")["seconds"] == 4.0
+    assert recompute_table(csv_text(frame), PLAIN) == csv_text(table)
+
+
+def test_records_that_do_not_say_what_was_beside_them_have_no_column_for_it_and_all_their_seconds_count():
+    old = [{key: value for key, value in record.items() if key != "alone"} for record in timed()]
+    frame = records_frame(old, PLAIN)
+    assert "timed_alone" not in frame
+    assert row_of(table_from_records(frame, PLAIN), "a")["seconds"] == 4.0
+
+
+SHARED = {"t1": (5.0, False), "t2": (3.0, False)}
+ALL = {"t1": (5.0, True), "t2": (3.0, True)}
+BESIDE = "holograms computed 2 side by side, which disturb each other"
+SENTENCES = [
+    (timed(), "The seconds are of one hologram a row, computed with nothing beside it."),
+    (
+        [*timed(), *timed("b", SHARED)],
+        f"The seconds are of one hologram a row, computed with nothing beside it; those of b on bench are of {BESIDE}.",
+    ),
+    (
+        [*timed("a", SHARED), *timed("b", ALL)],
+        "The seconds are of those holograms of a row that were computed with nothing beside them; those of a on bench "
+        f"are of {BESIDE}.",
+    ),
+    (timed("a", SHARED), f"The seconds are of {BESIDE}."),
+    (timed("a", ALL), "Each hologram was computed with nothing beside it."),
+    (rows({"t1": 1.0}), f"The seconds are of {BESIDE}."),
+]
+
+
+@pytest.mark.parametrize(("found", "sentence"), SENTENCES)
+def test_the_report_says_what_was_at_work_beside_what_was_timed(found, sentence):
+    assert timing(Results(records_frame(found, PLAIN), PLAIN), workers=2) == sentence
+
+
+def test_nothing_is_said_of_records_that_a_single_worker_left_without_a_note():
+    assert timing(Results(records_frame(rows({"t1": 1.0}), PLAIN), PLAIN), workers=1) == ""
 
 
 def test_published_figures_have_columns_of_their_own(records):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import stat
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fake_study import fake_work, write_config
@@ -13,7 +15,7 @@ from test_executors import compute, untimed
 
 from holobench_eval.errors import UserError
 from holobench_eval.study import run as running
-from holobench_eval.study.clusters import Address, Slurm
+from holobench_eval.study.clusters import Address, Local, Slurm
 from holobench_eval.study.executors import Serial, executor
 
 SBATCH = """\
@@ -74,9 +76,60 @@ def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.Monkey
     assert "\n" not in str(caught.value)
 
 
+def resources(_: int) -> dict[str, float]:
+    """What the worker that computes this declares."""
+    from distributed import get_worker
+
+    return dict(get_worker().state.total_resources)
+
+
+@pytest.fixture
+def one_gpu_of_two() -> Iterator[str]:
+    """The address of a scheduler with two workers, one of which declares a GPU."""
+    from distributed import Client, Scheduler, SpecCluster, Worker
+
+    workers: dict[str, dict[str, Any]] = {
+        name: {"cls": Worker, "options": {"nthreads": 1, "resources": declared}}
+        for name, declared in (("plain", None), ("graphics", {"GPU": 1}))
+    }
+    scheduler = {"cls": Scheduler, "options": {"dashboard": False, "port": 0}}
+    with SpecCluster(workers=workers, scheduler=scheduler, silence_logs=50) as cluster, Client(cluster) as client:
+        client.wait_for_workers(2)
+        yield cluster.scheduler_address
+
+
+def test_on_a_gpu_every_job_goes_to_a_worker_that_declares_one(one_gpu_of_two: str) -> None:
+    chosen = Address(one_gpu_of_two, on_gpu=True)
+    assert chosen.workers == 1
+    assert [found for _, found in chosen.map(resources, range(6))] == [{"GPU": 1}] * 6
+
+
+def test_on_the_cpu_workers_that_declare_a_gpu_are_workers_like_others(one_gpu_of_two: str) -> None:
+    chosen = Address(one_gpu_of_two)
+    assert chosen.workers == 2
+    assert {len(found) for _, found in chosen.map(resources, range(6)) if isinstance(found, dict)} == {0, 1}
+
+
+def test_a_scheduler_without_a_gpu_says_how_to_start_a_worker_with_one() -> None:
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        with pytest.raises(UserError, match="declares a GPU; start one with: ") as caught:
+            _ = Address(address, on_gpu=True).workers
+    assert f'dask worker {address} --nthreads 1 --resources "GPU=1"' in str(caught.value)
+
+
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_physics", "importable")
-def test_a_slurm_queue_gives_the_table_of_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("importable")
+@pytest.mark.parametrize(("gpus", "declared"), [(0, {}), (1, {"GPU": 1})])
+def test_local_workers_declare_a_gpu_where_they_compute_on_one(gpus: int, declared: dict[str, float]) -> None:
+    assert [found for _, found in Local(1, gpus).map(resources, range(2))] == [declared] * 2
+
+
+@pytest.fixture
+def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A SLURM queue that starts every job at once, and the file that it keeps their scripts in."""
     pytest.importorskip("dask_jobqueue")
     import dask
 
@@ -87,15 +140,36 @@ def test_a_slurm_queue_gives_the_table_of_one_process(tmp_path: Path, monkeypatc
         tool.write_text(text.format(python=sys.executable, log=str(tmp_path)))
         tool.chmod(tool.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
+    site = {"queue": "normal", "cores": 1, "memory": "2GB", "interface": None, "local-directory": str(tmp_path)}
+    with dask.config.set({"jobqueue.slurm": {**dask.config.get("jobqueue.slurm", {}), **site}}):
+        yield tmp_path / "jobs"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_physics", "importable")
+def test_a_slurm_queue_gives_the_table_of_one_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, queue: Path
+) -> None:
     config = write_config(tmp_path)
     serial = compute(config, tmp_path / "serial", Serial())
     monkeypatch.setattr(running, "step", fake_work)
-    site = {"queue": "normal", "cores": 1, "memory": "2GB", "interface": None, "local-directory": str(tmp_path)}
-    with dask.config.set({"jobqueue.slurm": {**dask.config.get("jobqueue.slurm", {}), **site}}):
-        assert untimed(compute(config, tmp_path / "queued", Slurm(2))) == untimed(serial)
-    script = (tmp_path / "jobs").read_text()
+    assert untimed(compute(config, tmp_path / "queued", Slurm(2))) == untimed(serial)
+    script = queue.read_text()
     assert script.count("#SBATCH -J") == 2
     assert "export OMP_NUM_THREADS=1" in script
+    assert "--resources" not in script
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("importable")
+def test_jobs_of_a_slurm_queue_on_gpus_run_on_workers_that_declare_one_beside_the_sites_own_arguments(
+    queue: Path,
+) -> None:
+    import dask
+
+    with dask.config.set({"jobqueue.slurm.worker-extra-args": ["--lifetime", "1h"]}):
+        assert [found for _, found in Slurm(1, on_gpu=True).map(resources, range(2))] == [{"GPU": 1}] * 2
+    assert "--lifetime 1h --resources GPU=1" in queue.read_text()
 
 
 @pytest.mark.parametrize(

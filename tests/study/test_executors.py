@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_study import lose_a_worker, write_config
+from fake_study import lose_a_worker, noted_work, solves, write_config
 
 from holobench_eval.config import load_study
 from holobench_eval.errors import UserError
@@ -21,7 +21,7 @@ def compute(config: Path, output: Path, chosen: Executor) -> list[dict[str, Any]
 
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{**record, "seconds": None, "memory_mib": None} for record in records]
+    return [{**record, "seconds": None, "memory_mib": None, "alone": None} for record in records]
 
 
 @pytest.mark.slow
@@ -38,6 +38,26 @@ def test_worker_processes_give_what_one_process_gives_but_for_the_cell_of_a_lost
     assert all(record["reason"].startswith("KilledWorker") for record in local if record["state"] != "done")
     kept = [record for record, gone in zip(serial, lost, strict=True) if not gone]
     assert untimed([record for record in local if record["state"] == "done"]) == untimed(kept)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_physics")
+def test_one_solution_of_every_row_is_timed_when_no_worker_does_anything_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    methods = tuple(f'{{name: "plugins.py:Toy", label: m{i}, params: {{value: {i}, pause: 0.2}}}}' for i in range(3))
+    config = write_config(tmp_path, methods)
+    config.write_text(f"{config.read_text()}timing: alone\n")
+    monkeypatch.setattr(running, "step", noted_work)
+    found = compute(config, tmp_path / "out", Local(2))
+    solved = [record for record in found if record["seconds"] is not None]
+    timed = [record for record in solved if record["alone"]]
+    assert [(record["label"], record["cell"]["target"]) for record in timed] == [(f"m{i}", "gray 2") for i in range(3)]
+    assert [record["alone"] for record in solved].count(False) == 6
+    spans = [tuple(map(float, line.split()[1:])) for line in solves(tmp_path / "out")]
+    overlapping = [any(a < end and start < b for a, b in spans if (a, b) != (start, end)) for start, end in spans]
+    assert overlapping[-3:] == [False] * 3
+    assert True in overlapping
 
 
 def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:

@@ -17,6 +17,7 @@ class FakeCell:
 class FakeJob:
     name: str
     needs: tuple[str, ...] = ()
+    alone: bool = False
 
     @property
     def cells(self) -> list[tuple[FakeCell, None]]:
@@ -28,13 +29,13 @@ TRAININGS: Any = ["one", "two"]
 
 
 def test_cells_that_wait_for_nothing_come_right_after_the_trainings() -> None:
-    steps = queue(TRAININGS, JOBS, {"one", "two"})
+    steps = queue(TRAININGS, JOBS, {"one", "two"}, [])
     assert [next(steps) for _ in range(3)] == ["one", "two", JOBS[1]]
 
 
 def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_none_is_lost() -> None:
     unlearned = {"one", "two"}
-    steps = queue(TRAININGS, JOBS, unlearned)
+    steps = queue(TRAININGS, JOBS, unlearned, [])
     assert [next(steps) for _ in range(3)][-1] is JOBS[1]
     assert next(steps) is None
     unlearned.discard("two")
@@ -46,4 +47,22 @@ def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_none_is_lost()
 
 
 def test_without_trainings_cells_keep_the_order_of_the_plan() -> None:
-    assert list(queue([], JOBS, set())) == JOBS
+    assert list(queue([], JOBS, set(), [])) == JOBS
+
+
+def test_a_job_that_is_to_be_alone_comes_last_and_only_when_nothing_is_at_work() -> None:
+    quiet: Any = [FakeJob("x", ("one",), alone=True), FakeJob("y", alone=True)]
+    at_work: Any = ["a", "one"]
+    unlearned = {"one"}
+    steps = queue([], [quiet[0], FakeJob("a"), quiet[1]], unlearned, at_work)
+    assert next(steps) == FakeJob("a")
+    assert next(steps) is None
+    at_work.remove("a")
+    assert next(steps) is None
+    at_work.remove("one")
+    unlearned.remove("one")
+    assert next(steps) is quiet[0]
+    at_work.append("x")
+    assert next(steps) is None
+    at_work.remove("x")
+    assert list(steps) == [quiet[1]]

@@ -10,8 +10,10 @@ from fake_study import solves, write_config
 from holobench_eval.config import load_study
 from holobench_eval.errors import UserError
 from holobench_eval.study import provenance
-from holobench_eval.study.executors import Serial
+from holobench_eval.study.clusters import Address
+from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.plan import plan
+from holobench_eval.study.preview import preview
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import Outcome, run
 from holobench_eval.study.store import Store, file_name
@@ -19,10 +21,16 @@ from holobench_eval.study.store import Store, file_name
 pytestmark = pytest.mark.usefixtures("no_physics")
 
 
-def compute(config: Path, output: Path, write: Callable[[str], None] = lambda line: None, **options: Any) -> Outcome:
-    study = load_study(config)
+def compute(
+    config: Path,
+    output: Path,
+    write: Callable[[str], None] = lambda line: None,
+    executor: Executor | None = None,
+    **options: Any,
+) -> Outcome:
+    study, watch = load_study(config), Lines(write)
     artifacts = output.parent / "artifacts"
-    return run(study, plan(study), output, Serial(), Lines(write), threads=1, artifacts=artifacts, **options)
+    return run(study, plan(study), output, executor or Serial(), watch, threads=1, artifacts=artifacts, **options)
 
 
 def test_every_cell_of_the_plan_gets_a_record(tmp_path: Path) -> None:
@@ -164,6 +172,43 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, monkeypatch: pytes
     assert compute(config, tmp_path / "out").computed == 21 - 6
     earlier = provenance.read(tmp_path / "out")["earlier"]
     assert [run["ended"] for run in earlier] == [None]
+
+
+TWO = Serial(workers=2)
+"""Says that it has two workers; what they compute takes turns."""
+
+
+def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlier_run_again(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    shared = compute(config, tmp_path / "out", executor=TWO)
+    assert [record["alone"] for record in shared.records[-3:]] == [False] * 3
+    config.write_text(f"{config.read_text()}timing: alone\n")
+    study = load_study(config)
+    foreseen = preview(study, plan(study), Store(tmp_path / "out"), threads=1, workers=2)
+    assert [(row.done, row.missing) for row in foreseen] == [(18, 0), (2, 1)]
+    alone = compute(config, tmp_path / "out", executor=TWO)
+    assert alone.computed == 1
+    assert [record["alone"] for record in alone.records[-3:]] == [False, False, True]
+    assert compute(config, tmp_path / "out", executor=TWO).computed == 0
+
+
+def test_a_single_worker_times_every_solution_alone_and_shares_the_time_with_several(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    config.write_text(f"{config.read_text()}timing: alone\n")
+    single = compute(config, tmp_path / "single").records[-3:]
+    several = compute(config, tmp_path / "several", executor=TWO).records[-3:]
+    assert [record["alone"] for record in single] == [True] * 3
+    assert several[-1]["seconds"] == single[-1]["seconds"]
+    assert several[0]["seconds"] != single[0]["seconds"]
+
+
+def test_workers_that_may_come_while_a_study_runs_time_nothing_alone_unless_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Address, "workers", 1)
+    monkeypatch.setattr(Address, "map", Serial.map)
+    records = compute(write_config(tmp_path), tmp_path / "out", executor=Address("tcp://a:1")).records
+    assert [record["alone"] for record in records[-3:]] == [False] * 3
 
 
 def test_retiming_replaces_the_kept_time(tmp_path: Path) -> None:

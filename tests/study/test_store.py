@@ -51,10 +51,12 @@ def corrupt(text: str) -> dict[str, str]:
         "truth": json.dumps({**content, "saturated": True}),
         "label": json.dumps({**content, "label": None}),
         "learned": json.dumps({**content, "learned": [1]}),
+        "alone": json.dumps({**content, "alone": 1}),
     }
 
 
 FAULTS = ["truncated", "empty", "list", "foreign", "moved", "state", "huge", "infinite", "truth", "label", "learned"]
+FAULTS.append("alone")
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -65,6 +67,18 @@ def test_a_damaged_record_is_named(tmp_path: Path, grid: Plan, fault: str) -> No
     path.write_text(corrupt(path.read_text())[fault])
     with pytest.raises(UserError, match=rf"{path.name}: .*delete the file"):
         store.read(record.id)
+
+
+def test_a_record_of_an_earlier_version_says_not_what_was_at_work_beside_it(tmp_path: Path, grid: Plan) -> None:
+    store, record = Store(tmp_path / "out"), record_of(grid, seconds=0.1, alone=True)
+    store.write(record)
+    content = json.loads(store.path(record.id).read_text())
+    del content["alone"]
+    store.path(record.id).write_text(json.dumps(content))
+    read = store.read(record.id)
+    assert read is not None
+    assert (read.seconds, read.alone) == (0.1, None)
+    assert [cell.id for cell in store.missing(grid.cells[-1:], timed=frozenset({record.id}))] == [record.id]
 
 
 def test_a_planned_cell_without_a_record_is_shown_as_missing(tmp_path: Path, grid: Plan) -> None:

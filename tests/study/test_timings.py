@@ -59,6 +59,25 @@ def test_without_a_folder_to_write_to_what_was_measured_is_reported(
     assert timings.keep("a", Effort(3.5)) == Effort(3.5)
 
 
+def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repeat(tmp_path: Path) -> None:
+    from test_run import add_other_profile
+
+    add_other_profile(tmp_path)
+    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"), profiles="ideal, other.yaml")
+    config.write_text(f"{config.read_text()}repeats: 2\ntiming: alone\n")
+    study = load_study(config)
+    grid = plan(study)
+    timed = [cell for cell in grid.cells if cell.id in timings.timed(study, grid)]
+    assert [(cell.method.rpartition(":")[2], cell.condition) for cell in timed] == [
+        ("Toy", "ideal"),
+        ("Toy", "other"),
+        ("Seeing", "ideal"),
+        ("Seeing", "other"),
+    ]
+    assert {(cell.target, cell.repeat) for cell in timed} == {("gray 2", 0)}
+    assert not timings.timed(replace(study, timing="shared"), grid)
+
+
 def test_threads_workers_and_the_method_make_another_solution(task: Task) -> None:
     other = replace(task, cells=(replace(task.cells[0], method_sha256="changed"),))
     keys = {timings.key(task, 1, 1), timings.key(task, 2, 1), timings.key(task, 1, 2), timings.key(other, 1, 1)}
