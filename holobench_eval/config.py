@@ -126,9 +126,11 @@ class MethodEntry:
 
 @dataclass(frozen=True)
 class Protocol:
-    """Version of the metric protocol, and a file or folder of LPIPS trunk weights (None: torch's hub cache)."""
+    """Version of the metric protocol; names of the metrics to compute (None: all; they take 10 s for a capture of
+    1080 x 1920 pixels); a file or folder of LPIPS trunk weights (None: torch's hub cache)."""
 
     version: Literal["v1"] = "v1"
+    metrics: tuple[Text, ...] | None = None
     lpips_weights: Text | None = None
 
 
@@ -378,8 +380,15 @@ def _check_twins(study: Study, document: Document) -> None:
 def _check_headline(study: Study, document: Document) -> None:
     from .metrics.catalogue import catalogue
 
-    columns = [f"{metric.name}_{domain}" for metric in catalogue() for domain in metric.domains]
+    wanted, known = study.protocol.metrics, [metric.name for metric in catalogue()]
+    for index, name in enumerate(wanted or ()):
+        if name not in (*known, "speckle_contrast"):
+            message = f"unknown metric '{name}'; {suggest(name, [*known, 'speckle_contrast'])}"
+            raise document.error(("protocol", "metrics", index), message)
+    chosen = [metric for metric in catalogue() if wanted is None or metric.name in wanted]
+    columns = [f"{metric.name}_{domain}" for metric in chosen for domain in metric.domains]
     columns += SCORES if study.measure == "focus" else ()
     if study.headline not in columns:
-        message = f"unknown metric '{study.headline}'; {suggest(study.headline, columns)}"
+        fault = "unknown metric" if wanted is None else "not a column of protocol.metrics:"
+        message = f"{fault} '{study.headline}'; {suggest(study.headline, columns)}"
         raise document.error(("headline",), message)

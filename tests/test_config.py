@@ -122,6 +122,8 @@ CHANGES = [
     ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
     ("repeats: 2", "protocol: {version: v2}", "11:21: protocol.version should be 'v1'"),
     ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),
+    ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
+    ("repeats: 2", "protocol: {metrics: [psnr]}", "13:11: not a column of protocol.metrics: 'ssim_srgb'; "),
 ]
 
 

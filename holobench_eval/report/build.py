@@ -104,7 +104,7 @@ def _numbers(results: Results) -> dict[str, Any]:
         shown = [(condition, section(results, condition)) for condition in results.conditions]
         return [(condition, text) for condition, text in shown if text]
 
-    metrics = {score.metric for score in results.scores}
+    metrics, wanted = {score.metric for score in results.scores}, results.layout.metrics
     return {
         "counts": counts(results),
         "findings": findings(results),
@@ -115,7 +115,8 @@ def _numbers(results: Results) -> dict[str, Any]:
         "tracks": leaderboard.tracks(results),
         "leaderboard_reading": leaderboard.reading(results),
         "privileged": bool(results.layout.privileged),
-        "lpips": any(metric.startswith("lpips") for metric in metrics),
+        "lpips_missing": not any(metric.startswith("lpips") for metric in metrics)
+        and (wanted is None or any(metric.startswith("lpips") for metric in wanted)),
         "mofd": "mofd" in metrics,
         "floors": sections.floors(results) if results.floors else "",
         "baseline": results.layout.baseline,

@@ -66,7 +66,7 @@ class Layout:
     that is a trained network (None: benches).
     trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
     camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
-    of others. real: whether the display exists.
+    of others. real: whether the display exists. metrics: names of those the study wants (None: all).
     """
 
     title: str
@@ -89,6 +89,7 @@ class Layout:
     sweeps: tuple[Swept, ...] = ()
     planes: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     stacked: frozenset[str] = frozenset()
+    metrics: tuple[str, ...] | None = None
     real: bool = False
     values: str = ""
 
@@ -169,6 +170,7 @@ def layout_of(study: Study) -> Layout:
         reported_beside=names[reported.beside] if reported and reported.beside else None,
         note=study.note,
         measure=study.measure,
+        metrics=study.protocol.metrics,
         holograms=f"{probe.name} ({plain(probe.params)})" if study.measure == "prediction" else "",
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,

@@ -38,14 +38,16 @@ class Setting:
     """What a worker needs to know of a run besides its task.
 
     output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
-    what trained methods learned; threads: torch threads of a worker; workers: tasks computed side by side; retime:
-    measure wall times again, see ``timings``; device: name of where a worker computes, see ``device.find``.
+    what trained methods learned; metrics: names of those to compute (None: all); threads: torch threads of a worker;
+    workers: tasks computed side by side; retime: measure wall times again, see ``timings``; device: name of where a
+    worker computes, see ``device.find``.
     """
 
     output: Path
     folder: Path
     artifacts: Path
     save: Save
+    metrics: tuple[str, ...] | None
     lpips_weights: str | None
     threads: int
     workers: int

@@ -41,7 +41,7 @@ Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]
 
 def plain(job: Job, _: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
     """The scores of the metric protocol."""
-    return score(image, wanted, lpips_weights=job.setting.lpips_weights)
+    return score(image, wanted, metrics=job.setting.metrics, lpips_weights=job.setting.lpips_weights)
 
 
 def picture(job: Job) -> Measure:
@@ -174,7 +174,7 @@ def prediction(job: Job) -> Measure:
             cell=cell.description(),
             state="done",
             label=task.label,
-            scores=score(image, wanted, lpips_weights=setting.lpips_weights),
+            scores=plain(job, cell, image, wanted),
             seconds=taken.seconds,
             alone=job.alone,
             memory_mib=taken.memory_mib,

@@ -327,13 +327,15 @@ def _ids(*needed: Preparation | None) -> tuple[str, ...]:
 
 
 def _metrics(study: Study) -> tuple[str, ...]:
-    """Name and version of every metric that can be computed here: LPIPS needs weights that may come later."""
+    """Name and version of every wanted metric that can be computed here: LPIPS needs weights that may come later."""
     from ..metrics import catalogue
 
-    weights = study.protocol.lpips_weights
+    weights, wanted = study.protocol.lpips_weights, study.protocol.metrics
     known = catalogue(None if weights is None else Path(weights))
-    names = tuple(f"{metric.name} {metric.version}" for metric in known if metric.available() is None)
-    return (*names, IN_FOCUS) if study.measure == "focus" else names
+    computed = [metric for metric in known if metric.available() is None and (wanted is None or metric.name in wanted)]
+    names = [f"{metric.name} {metric.version}" for metric in computed]
+    names += ["speckle_contrast"] if wanted is not None and "speckle_contrast" in wanted else []
+    return (*names, IN_FOCUS) if study.measure == "focus" else tuple(names)
 
 
 def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ...]]:

@@ -102,6 +102,7 @@ def run(
             folder=study.folder,
             artifacts=artifacts,
             save=study.save,
+            metrics=study.protocol.metrics,
             lpips_weights=study.protocol.lpips_weights,
             threads=threads,
             workers=executor.workers,

@@ -116,6 +116,13 @@ def test_a_reader_is_told_what_was_at_work_beside_what_was_timed(records, tmp_pa
     assert "The seconds are of one hologram a row, computed with nothing beside it. Memory is" in text
 
 
+@pytest.mark.parametrize(("wanted", "missed"), [(None, True), (("psnr", "lpips_alex"), True), (("psnr",), False)])
+def test_lpips_is_missed_only_where_it_was_wanted(records, tmp_path, wanted, missed):
+    kept, layout = minimal(records[1], metrics=wanted)
+    text = write_report(layout, kept, tmp_path, PROVENANCE, DESCRIPTION).read_text()
+    assert ("LPIPS is not in these tables" in text) == missed
+
+
 def test_a_hole_is_listed_with_its_reason(report):
     assert "| GS | leto-aged | coffee | 0 | failed | CellError: registration residual 1.32 px" in report
     assert "| GS | 2 of 3 |" in report

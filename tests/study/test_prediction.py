@@ -108,3 +108,15 @@ def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path: Path, no_physi
     (tmp_path / "narrow.py").write_text(plugins.replace("*bench.spec.region.shape)", "5, 5)"))
     reason = compute(config).records[-1]["reason"]
     assert reason == "CellError: Even: predict returned (1, 3, 5, 5), not an image (1, 3, 104, 104)"
+
+
+@pytest.mark.parametrize("measure", ["picture", "prediction"])
+def test_only_the_metrics_that_a_study_names_are_computed(tmp_path: Path, measure: str) -> None:
+    kind = PREDICTION if measure == "prediction" else ("", "")
+    named = ("methods:", "protocol: {metrics: [psnr, speckle_contrast]}\nmethods:")
+    records = compute(write(tmp_path, METHODS, named, kind)).records
+    assert {record["state"] for record in records} == {"done"}
+    assert {tuple(record["cell"]["metrics"]) for record in records} == {("psnr 1", "speckle_contrast")}
+    scores = {key for record in records for key in record["scores"]}
+    assert {"psnr_linear", "psnr_srgb"} <= scores
+    assert not any(name in key for key in scores for name in ("ssim", "mofd", "flip", "vsi"))
