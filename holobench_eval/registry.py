@@ -116,7 +116,7 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
             raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, known)}")
     _check_nested(f"{kind[:-1]} '{name}'", cls, params, "")
     try:
-        return _adapter(cls).validate_json(json.dumps(params), strict=True)
+        return _adapter(cls).validate_json(json.dumps(params), strict=True)  # type: ignore[arg-type]
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
