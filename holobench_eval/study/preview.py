@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -101,10 +102,16 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
     """A row per method, the floor first. gpu: as in ``timings.key``, as are threads and workers."""
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     labels = dict.fromkeys(task.label for task in plan.tasks)
-    machine, timed = (threads, workers, gpu), timings.timed(study, plan)
-    todo = frozenset(cell.id for cell in store.missing(plan.cells, timed=timed))
+    todo = frozenset(cell.id for cell in store.missing(plan.cells, timed=timings.timed(study, plan)))
+    kept = timings.names()
+
+    def seconds(task: Task) -> float | None:
+        name = timings.key(task, threads, workers, gpu)
+        effort = timings.known(name) if name in kept else None
+        return None if effort is None else effort.seconds
+
     return [
-        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, todo, machine)
+        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, todo, seconds)
         for label in labels
     ]
 
@@ -115,13 +122,13 @@ def _row(
     limit: int | None,
     store: Store,
     todo: frozenset[str],
-    machine: tuple[int, int, str],
+    seconds: Callable[[Task], float | None],
 ) -> Row:
     cells = [cell for task in tasks for cell in task.cells]
     states = [record.state for cell in cells if cell.id not in todo and (record := store.read(cell.id))]
     unsolved = [task for task in tasks if any(cell.id in todo for cell in task.cells)]
-    known = [timings.known(timings.key(task, *machine)) for task in tasks if not task.is_floor]
-    timed = [effort.seconds for effort in known if effort is not None]
+    known = [seconds(task) for task in tasks if not task.is_floor]
+    timed = [taken for taken in known if taken is not None]
     return Row(
         label=label,
         conditions=len({cell.condition for cell in cells}),

@@ -149,11 +149,12 @@ class Store:
     ) -> list[Cell]:
         """The cells that a run has to compute: those without a record, failed ones if they are to be retried, and of
         ``timed`` those whose solution was not timed alone."""
-        records = {cell.id: self.read(cell.id) for cell in cells}
+        there = {path.stem for path in self.folder.glob("*.json")}  # to open each that is not there takes longer
         return [
             cell
             for cell in cells
-            if (record := records[cell.id]) is None
+            if cell.id not in there
+            or (record := self.read(cell.id)) is None
             or (retry_failed and record.state == "failed")
             or (cell.id in timed and record.state == "done" and not record.alone)
         ]

@@ -85,6 +85,11 @@ def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
     )
 
 
+def names() -> frozenset[str]:
+    """Those of all timings that are kept."""
+    return frozenset(path.stem for path in folder().glob("*.json"))
+
+
 def known(name: str) -> Effort | None:
     """The first measurement under a name, None if there is none; of an earlier version, without memory."""
     try:
