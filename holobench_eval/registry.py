@@ -10,7 +10,6 @@ from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Literal, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
@@ -54,8 +53,15 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     path = next((path for path in candidates if path.is_file()), None)
     if path is None:
         raise UserError(f"{kind[:-1]} '{name}': no such file: {candidates[0]}")
+    # the name differs from path to path, and the module is registered since dataclasses look their module up
+    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
+    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}_{unique}", path)
+    if spec is None or spec.loader is None:
+        raise UserError(f"{kind[:-1]} '{name}': {path} is no Python file")
+    module = importlib.util.module_from_spec(spec)  # anew each time: no cell may depend on those computed before it
+    sys.modules[spec.name] = module
     try:
-        module = _module(path.resolve(), path.read_bytes())
+        spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {type(error).__name__}: {error}") from error
     found = getattr(module, attribute, None)
@@ -63,20 +69,6 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and is_dataclass(value)]
         raise UserError(f"{kind[:-1]} '{name}': {path} has no class '{attribute}'; {suggest(attribute, classes)}")
     return _checked(kind, name, found)
-
-
-@lru_cache(maxsize=64)
-def _module(path: Path, _source: bytes) -> ModuleType:
-    """The module of a file, imported once as long as the file stays the same; what its import raises passes through."""
-    # the name differs from path to path, and the module is registered since dataclasses look their module up
-    name = f"holobench_user_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None  # its name ends in .py
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def _checked(kind: Kind, name: str, found: Any) -> type[Any]:

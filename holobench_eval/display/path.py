@@ -210,4 +210,4 @@ def finer_adjoint(lines: Tensor, factor: int, size: int) -> Tensor:
     """The adjoint of ``finer_line`` and a crop, ``(..., up to factor size)`` to ``(..., size)``."""
     fine = torch.fft.fft(lines, n=factor * size, norm="forward").mul_(factor)
     low, high = (size + 1) // 2, size // 2
-    return fine if factor == 1 else torch.cat([fine[..., :low], fine[..., -high:]], -1)
+    return fine if factor == 1 else torch.cat([fine[..., :low], fine[..., factor * size - high :]], -1)

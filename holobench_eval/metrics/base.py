@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, wraps
+from threading import Lock
 from typing import Literal, TypeVar
 
 import cv2
@@ -80,23 +81,29 @@ def paired(image: Tensor, target: Tensor, smallest: int = 1) -> tuple[Tensor, Te
 def remembered(function: Callable[[Tensor], T], most: int = 16) -> Callable[[Tensor], T]:
     """A function of one image whose last ``most`` results are kept, by what the image shows.
 
-    For the features of targets, since many pictures are compared with one target. Nothing is kept with a gradient, for
-    images of more than 2^18 values, whose features would fill the memory, and on other devices than the CPU.
+    For the features of targets, since many pictures are compared with one target. Nothing is kept with a gradient, in
+    inference mode, for images of more than 2^18 values, whose features would fill the memory, and on other devices than
+    the CPU.
     """
     kept: list[tuple[Tensor, T]] = []
+    lock = Lock()
 
     @wraps(function)
     def known(image: Tensor) -> T:
-        if not image.is_cpu or image.numel() > _LARGEST_KEPT or (image.requires_grad and torch.is_grad_enabled()):
+        differentiated = image.requires_grad and torch.is_grad_enabled()
+        if not image.is_cpu or image.numel() > _LARGEST_KEPT or differentiated or torch.is_inference_mode_enabled():
             return function(image)
-        for index, (own, result) in enumerate(kept):
-            if own.dtype == image.dtype and torch.equal(own, image):
-                kept.append(kept.pop(index))
-                return result
+        with lock:
+            for index, (own, result) in enumerate(kept):
+                if own.dtype == image.dtype and torch.equal(own, image):
+                    kept.append(kept.pop(index))
+                    return result
         own = image.detach().clone()
-        kept.append((own, function(own)))
-        del kept[:-most]
-        return kept[-1][1]
+        result = function(own)
+        with lock:
+            kept.append((own, result))
+            del kept[:-most]
+        return result
 
     return known
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -24,16 +25,22 @@ def in_blocks(work: Callable[[slice], None], like: Tensor, lines: int, elements:
     count = min(lines, math.ceil(elements * like.element_size() / BLOCK_BYTES)) if like.is_cpu else 1
     slices = [slice(lines * block // count, lines * (block + 1) // count) for block in range(count)]
     threads = torch.get_num_threads()
-    work = torch.no_grad()(work)
+    work = torch.inference_mode(torch.is_inference_mode_enabled())(torch.no_grad()(work))  # modes are a thread's own
     if threads == 1 or count == 1:
         for one in slices:
             work(one)
-    else:
+        return
+    try:
         for _ in _pool(threads).map(work, slices):
             pass
+    finally:
         torch.set_num_threads(threads)  # a new thread of the pool has changed what later threads begin with
 
 
 @lru_cache(maxsize=4)
 def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, "holobench_eval", initializer=torch.set_num_threads, initargs=(1,))
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # a child process has none of its parent's threads

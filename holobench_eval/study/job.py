@@ -75,7 +75,7 @@ class Job:
     @property
     def timing(self) -> str:
         """The name of its timing; what was measured alone serves a run with one worker, too."""
-        workers = 1 if self.alone else self.setting.workers
+        workers = 1 if self.alone else max(2, self.setting.workers)  # one on a cluster may be joined by others
         return timings.key(self.task, self.setting.threads, workers, gpu_name(self.device))
 
     @property

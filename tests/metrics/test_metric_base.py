@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import torch
 from torch import Tensor
 
@@ -47,3 +50,24 @@ def test_with_a_gradient_nothing_is_kept() -> None:
     assert image.grad is not None
     assert torch.equal(image.grad, torch.full((1, 1, 4, 4), 2.0))
     assert not known(torch.ones(1, 1, 4, 4)).requires_grad
+
+
+def test_threads_that_ask_for_different_images_get_their_own_results() -> None:
+    known = remembered(lambda image: float(image.max()), most=2)
+    images = [torch.full((1, 1, 4, 4), float(value)) for value in range(12)]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            assert list(pool.map(known, images * 50)) == list(range(12)) * 50
+    finally:
+        sys.setswitchinterval(before)
+
+
+def test_what_was_asked_for_in_inference_mode_can_be_differentiated_later() -> None:
+    known = remembered(torch.square)
+    with torch.inference_mode():
+        known(torch.full((1, 1, 4, 4), 3.0))
+    weight = torch.ones(1, requires_grad=True)
+    (weight * known(torch.full((1, 1, 4, 4), 3.0))).sum().backward()
+    assert weight.grad == 16 * 9
