@@ -14,6 +14,8 @@ from .cli_output import write_report
 from .errors import UserError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from .config import Study
 
 INTERRUPTED = 130
@@ -127,7 +129,7 @@ def _run(
     with progress.watching(console) as watch:
         outcome = compute(study, grid, folder, chosen, watch, many, artifacts, **again, device=device)
     keep_training_records(grid, Artifacts(artifacts), folder)
-    _sheets(study, folder)
+    _sheets(console, study, folder, _threads(threads, 1, study))
     write_report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
@@ -144,8 +146,10 @@ def _prepare_bench(study: Study) -> None:
         _ = workbench(place, study.seed)
 
 
-def _sheets(study: Study, output: Path) -> None:
+def _sheets(console: Console, study: Study, output: Path, threads: int) -> None:
     """Draw the stages of every display of a study beside its report, where it is not there as this code draws it."""
+    import torch
+
     from .display import load_profile
     from .report.sheet import drawn_from, save_sheet
     from .study.bench import condition, simulated
@@ -156,6 +160,8 @@ def _sheets(study: Study, output: Path) -> None:
         path = output / "figures" / f"stages-{place.name}.png"
         wanted = digest([place.digest, list(place.spec.shape), study.seed, harness_digest()])
         if drawn_from(path) != wanted:
+            console.print(f"drawing the stages of {place.name}", markup=False)
+            torch.set_num_threads(threads)
             note = load_profile(source, study.folder).scaling_note(study.display.panel)
             try:
                 save_sheet(simulated(place, study.seed), note, path, wanted)
@@ -260,12 +266,15 @@ def show(
     output: Annotated[Path | None, typer.Option(help="Picture to write.")] = None,
 ) -> None:
     """Draw what a display does to a hologram, stage by stage, and list its effects."""
+    import torch
     from rich.markup import escape
     from rich.table import Table
 
     from .report.sheet import draw_sheet
     from .study.listing import effects
 
+    if panel is None or panel[0] * panel[1] < LARGE_PANEL:
+        torch.set_num_threads(1)  # see _threads
     path, table = draw_sheet(profile, panel, output), Table(title=f"effects of {profile}", title_justify="left")
     for heading in ("effect", "", "parametric model"):
         table.add_column(heading)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import signal
 import threading
 import time
@@ -10,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import UserError
@@ -169,19 +171,28 @@ def _settings() -> Iterator[None]:
         yield
 
 
+def _at_home(home: str, function: Callable[[J], R], job: J) -> R:
+    """The result of a job, whose relative paths start in the folder ``home``, wherever its worker was started."""
+    try:
+        os.chdir(home)
+    except OSError as error:
+        raise UserError(f"the worker on {platform.node()} does not see the folder {home}: {error.strerror}") from error
+    return function(job)
+
+
 def _results(
     client: Any, workers: Callable[[], int], function: Callable[[J], R], jobs: Iterable[J | None], on_gpu: bool
 ) -> Iterator[tuple[J, R | Exception]]:
     """Results as they come; as many jobs are taken as there are workers, so the scheduler never holds a whole study."""
     from distributed import as_completed
 
-    waiting = iter(jobs)
+    home, waiting = str(Path.cwd()), iter(jobs)
     running: dict[Any, J] = {}
     completed = as_completed()  # type: ignore[no-untyped-call]
 
     def fill() -> None:
         while len(running) < workers() and (job := next(waiting, None)) is not None:
-            future = client.submit(function, job, pure=False, resources=GPU if on_gpu else None)
+            future = client.submit(_at_home, home, function, job, pure=False, resources=GPU if on_gpu else None)
             running[future] = job
             completed.add(future)  # type: ignore[no-untyped-call]
 

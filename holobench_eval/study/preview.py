@@ -14,7 +14,7 @@ from . import timings
 from .artifacts import FAILURE, UNFINISHED, Artifacts
 from .plan import Plan, Task
 from .preparation import Preparation
-from .store import Store
+from .store import State, Store
 from .training_record import known, progress
 
 if TYPE_CHECKING:
@@ -102,8 +102,7 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
     """A row per method, the floor first. gpu: as in ``timings.key``, as are threads and workers."""
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     labels = dict.fromkeys(task.label for task in plan.tasks)
-    todo = frozenset(cell.id for cell in store.missing(plan.cells, timed=timings.timed(study, plan)))
-    kept = timings.names()
+    states, kept = store.states(plan.cells, timings.timed(study, plan)), timings.names()
 
     def seconds(task: Task) -> float | None:
         name = timings.key(task, threads, workers, gpu)
@@ -111,7 +110,7 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
         return None if effort is None else effort.seconds
 
     return [
-        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), store, todo, seconds)
+        _row(label, [task for task in plan.tasks if task.label == label], limits.get(label), states, seconds)
         for label in labels
     ]
 
@@ -120,13 +119,12 @@ def _row(
     label: str,
     tasks: list[Task],
     limit: int | None,
-    store: Store,
-    todo: frozenset[str],
+    state: dict[str, State],
     seconds: Callable[[Task], float | None],
 ) -> Row:
     cells = [cell for task in tasks for cell in task.cells]
-    states = [record.state for cell in cells if cell.id not in todo and (record := store.read(cell.id))]
-    unsolved = [task for task in tasks if any(cell.id in todo for cell in task.cells)]
+    states = [state[cell.id] for cell in cells]
+    unsolved = [task for task in tasks if any(state[cell.id] == "missing" for cell in task.cells)]
     known = [seconds(task) for task in tasks if not task.is_floor]
     timed = [taken for taken in known if taken is not None]
     return Row(
@@ -137,7 +135,7 @@ def _row(
         captures=limit if isinstance(limit, int) else None,
         done=states.count("done"),
         failed=states.count("failed"),
-        missing=sum(cell.id in todo for cell in cells),
+        missing=states.count("missing"),
         seconds=sum(timed) / len(timed) * len(unsolved) if timed else None,
     )
 
@@ -152,7 +150,9 @@ def table(study: Study, rows: list[Row]) -> Table:
         result.add_column(name, justify="right", footer=str(sum(getattr(row, name) for row in rows)))
     result.add_column("captures", justify="right")
     known = [row.seconds for row in rows if row.seconds is not None]
-    result.add_column(escape("solving [s]"), justify="right", footer=f"{sum(known):.3g}" if known else "")
+    untimed = any(row.seconds is None and row.label != "floor" for row in rows)
+    solving = f"{'at least ' * untimed}{sum(known):.3g}" if known else ""
+    result.add_column(escape("solving [s]"), justify="right", footer=solving)
     for row in rows:
         limit = "" if row.captures is None else str(row.captures)
         seconds = "" if row.label == "floor" else "not timed" if row.seconds is None else f"{row.seconds:.3g}"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..device import find, gpu_name
+from ..errors import UserError
 from . import provenance, timings
 from .artifacts import Artifacts
 from .available import refuse_unavailable
@@ -22,6 +24,10 @@ from .training import TrainingJob
 
 if TYPE_CHECKING:
     from ..config import Study
+
+
+LATE = 10.0
+"""Seconds after which a record on a shared disk should be seen by all."""
 
 
 class Watch(Protocol):
@@ -127,7 +133,9 @@ def run(
                     unlearned.discard(one.needed.id)
                     watch.trained(one.needed.name, reason)
                 else:
-                    watch.finished(made if isinstance(made, list) else _lost(one, _error(made), store))
+                    records = made if isinstance(made, list) else _lost(one, _error(made), store)
+                    _refuse_unseen(records, store)
+                    watch.finished(records)
         if described.get("ended") is None:
             described = provenance.end(output, described)
         return Outcome(store.load(plan), described, len(missing))
@@ -171,6 +179,19 @@ def _told(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> It
         if isinstance(one, Job):
             watch.started(one.task)
         yield one
+
+
+def _refuse_unseen(records: list[Record], store: Store) -> None:
+    """UserError for records that were written, but not where this process reads them: all results would be holes."""
+    until = time.monotonic() + LATE
+    for record in records:
+        while not store.path(record.id).exists():
+            if time.monotonic() > until:
+                raise UserError(
+                    f"a worker has written a record that is not in {store.folder.absolute()}; workers have to see this "
+                    "folder under the same name"
+                )
+            time.sleep(0.1)
 
 
 def _error(made: Made | Exception) -> Exception:

@@ -116,7 +116,9 @@ class Store:
         return self.folder / f"target-{file_name(target)}.png"
 
     def write(self, record: Record) -> None:
-        """Write a record, whole or not at all."""
+        """Write a record, whole or not at all. A failure never replaces a score, which was only to be timed again."""
+        if record.state == "failed" and (known := self.read(record.id)) is not None and known.state == "done":
+            return
         text = json.dumps(vars(record), indent=1, sort_keys=True, allow_nan=False)
         write_atomically(self.path(record.id), f"{text}\n".encode())
 
@@ -149,15 +151,21 @@ class Store:
     ) -> list[Cell]:
         """The cells that a run has to compute: those without a record, failed ones if they are to be retried, and of
         ``timed`` those whose solution was not timed alone."""
-        there = {path.stem for path in self.folder.glob("*.json")}  # to open each that is not there takes longer
+        states = self.states(cells, timed)
         return [
-            cell
-            for cell in cells
-            if cell.id not in there
-            or (record := self.read(cell.id)) is None
-            or (retry_failed and record.state == "failed")
-            or (cell.id in timed and record.state == "done" and not record.alone)
+            cell for cell in cells if states[cell.id] == "missing" or (retry_failed and states[cell.id] == "failed")
         ]
+
+    def states(self, cells: tuple[Cell, ...], timed: frozenset[str] = frozenset()) -> dict[str, State]:
+        """The state of every cell's record by the cell's id; those of ``timed`` that were not timed alone are missing."""
+        there = {path.stem for path in self.folder.glob("*.json")}  # to open each that is not there takes longer
+
+        def state(cell: Cell) -> State:
+            record = self.read(cell.id) if cell.id in there else None
+            again = cell.id in timed and record is not None and record.state == "done" and not record.alone
+            return "missing" if record is None or again else record.state
+
+        return {cell.id: state(cell) for cell in cells}
 
     @contextmanager
     def locked(self) -> Iterator[None]:

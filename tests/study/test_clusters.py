@@ -6,6 +6,7 @@ import os
 import stat
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from fake_study import fake_work, write_config
 from test_executors import compute, untimed
 
 from holobench_eval.errors import UserError
+from holobench_eval.study import clusters
 from holobench_eval.study import run as running
 from holobench_eval.study.clusters import Address, Local, Slurm
 from holobench_eval.study.executors import Serial, executor
@@ -57,6 +59,42 @@ def test_a_running_scheduler_gives_the_table_of_one_process(tmp_path: Path, monk
         chosen = Address(cluster.scheduler_address)
         assert chosen.workers == 2
         assert untimed(compute(config, tmp_path / "there", chosen)) == untimed(serial)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_physics", "importable")
+def test_workers_that_were_started_in_another_folder_write_where_the_run_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from distributed import LocalCluster
+
+    config = write_config(tmp_path)
+    monkeypatch.setattr(running, "step", fake_work)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        monkeypatch.chdir(tmp_path)
+        records = compute(Path(config.name), Path("out"), Address(cluster.scheduler_address))
+    assert {record["state"] for record in records} == {"done"}
+    assert not list((tmp_path / "elsewhere").iterdir())
+
+
+def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"does not see the folder .*gone"):
+        clusters._at_home(str(tmp_path / "gone"), resources, 0)
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_records_that_cannot_be_seen_end_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "LATE", 0.0)
+
+    class Elsewhere(Serial):
+        def map(self, function: Any, jobs: Any) -> Any:
+            for job in jobs:
+                yield job, function(replace(job, setting=replace(job.setting, output=tmp_path / "other")))
+
+    with pytest.raises(UserError, match=r"a worker has written a record that is not in .*out/records; workers have to"):
+        compute(write_config(tmp_path), tmp_path / "out", Elsewhere())
 
 
 def test_workers_with_several_threads_are_refused() -> None:

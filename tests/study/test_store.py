@@ -133,3 +133,13 @@ def test_names_of_files_stay_in_their_folder() -> None:
 @given(st.text(max_size=12), st.text(max_size=12))
 def test_different_names_get_different_files(one: str, other: str) -> None:
     assert (file_name(one) == file_name(other)) == (one == other)
+
+
+def test_a_failure_never_replaces_a_score(tmp_path: Path, grid: Plan) -> None:
+    store = Store(tmp_path / "out")
+    done = record_of(grid, scores={"psnr_linear": 20.0})
+    failed = Record(done.cell, "failed", "Toy", "ZeroDivisionError")
+    store.write(failed)
+    store.write(done)
+    store.write(failed)
+    assert store.read(done.id) == done
