@@ -14,12 +14,13 @@ from typing import Annotated, Any, Literal
 from annotated_types import Interval, MinLen
 
 from . import registry
+from .config_metrics import check_metrics
 from .config_sweeps import subset, sweep_of
 from .errors import UserError, suggest
 from .study.bench import LEARNED, condition, real_condition
 from .study.identity import params_of
 from .study.plan import FLOORS, REFERENCE, scored_dataset
-from .study.stacks import SCORES, planes_of
+from .study.stacks import planes_of
 from .typed_yaml import check_keys, placed, typed
 from .yaml_source import Document, Keys, load
 
@@ -218,7 +219,7 @@ def load_study(path: Path | str) -> Study:
     study = replace(study, methods=entries)
     _check_labels(study, document)
     _check_twins(study, document)
-    _check_headline(study, document)
+    check_metrics(study, document)
     if study.reported and study.reported.beside not in (None, *study.display.sources):
         near = suggest(str(study.reported.beside), study.display.sources)
         message = f"'{study.reported.beside}' is not in display.profiles; {near}"
@@ -375,20 +376,3 @@ def _check_twins(study: Study, document: Document) -> None:
             if same and set(entry.profiles) & set(other.profiles):
                 message = f"methods[{index}] has the method, parameters and display of '{other.label}'; remove one"
                 raise document.error(("methods", index), message)
-
-
-def _check_headline(study: Study, document: Document) -> None:
-    from .metrics.catalogue import catalogue
-
-    wanted, known = study.protocol.metrics, [metric.name for metric in catalogue()]
-    for index, name in enumerate(wanted or ()):
-        if name not in (*known, "speckle_contrast"):
-            message = f"unknown metric '{name}'; {suggest(name, [*known, 'speckle_contrast'])}"
-            raise document.error(("protocol", "metrics", index), message)
-    chosen = [metric for metric in catalogue() if wanted is None or metric.name in wanted]
-    columns = [f"{metric.name}_{domain}" for metric in chosen for domain in metric.domains]
-    columns += SCORES if study.measure == "focus" else ()
-    if study.headline not in columns:
-        fault = "unknown metric" if wanted is None else "not a column of protocol.metrics:"
-        message = f"{fault} '{study.headline}'; {suggest(study.headline, columns)}"
-        raise document.error(("headline",), message)

@@ -233,5 +233,8 @@ def read_records(text: str) -> pd.DataFrame:
     text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, STOPPED_COLUMN, TRACK_COLUMN}
     for column in frame.columns:
         if column not in text_columns:
-            frame[column] = [float(value) if value else np.nan for value in frame[column]]
+            try:
+                frame[column] = [float(value) if value else np.nan for value in frame[column]]
+            except ValueError as error:
+                raise UserError(f"records.csv, column {column}: {error}") from error
     return frame

@@ -157,7 +157,7 @@ class Store:
         ]
 
     def states(self, cells: tuple[Cell, ...], timed: frozenset[str] = frozenset()) -> dict[str, State]:
-        """The state of every cell's record by the cell's id; those of ``timed`` that were not timed alone are missing."""
+        """State of every cell's record, by the cell's id; those of ``timed`` that were not timed alone are missing."""
         there = {path.stem for path in self.folder.glob("*.json")}  # to open each that is not there takes longer
 
         def state(cell: Cell) -> State:
