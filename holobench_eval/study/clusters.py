@@ -138,7 +138,7 @@ class Address:
         try:
             client = Client(self.address, timeout=ANSWER)  # type: ignore[no-untyped-call]
         except (OSError, ValueError, TimeoutError) as error:
-            raise UserError(f"no Dask scheduler answers at '{self.address}' ({type(error).__name__})") from error
+            raise UserError(f"no Dask scheduler answers at '{self.address}' (like tcp://host:8786)") from error
         with client:
             workers = _usable(client, self.on_gpu)
             several = [name for name, worker in workers.items() if worker["nthreads"] != 1]
