@@ -126,15 +126,23 @@ def _timed(one: subprocess.Popen[str], case: str, calls: int) -> float:
 
 
 def _extract(revision: str, folder: Path) -> Path:
-    """The files of a git revision. UserError: there is none of that name."""
-    done = subprocess.run(
-        ["git", "archive", "--format=tar", revision, "--"], cwd=CHECKOUT, capture_output=True, check=False
-    )
-    if done.returncode:
-        raise UserError(f"--against {revision}: {done.stderr.decode(errors='replace').strip()}")
-    with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
+    """The files of a git revision. UserError: there is none of that name, or no git checkout."""
+    if not (CHECKOUT / ".git").exists():
+        raise UserError(f"--against needs a git checkout, which {CHECKOUT} is not")
+    # A revision may begin with a dash; what git archive is given is always a hash.
+    found = _git("rev-parse", "--verify", "--quiet", "--end-of-options", revision)
+    if found.returncode == 0:
+        found = _git("archive", "--format=tar", f"{found.stdout.decode().strip()}^{{commit}}")
+    if found.returncode:
+        said = found.stderr.decode(errors="replace").strip()
+        raise UserError(f"--against {revision}: no such commit" + (f"; git says: {said}" if said else ""))
+    with tarfile.open(fileobj=BytesIO(found.stdout)) as archive:
         archive.extractall(folder, filter="data")
     return folder
+
+
+def _git(*arguments: str) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(["git", *arguments], cwd=CHECKOUT, capture_output=True, check=False)
 
 
 def _lay_out(checkout: Path, folder: Path) -> None:

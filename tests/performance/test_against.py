@@ -1,6 +1,8 @@
 """One revision against another: what the verdict says, and that two processes really take turns with two packages."""
 
 import math
+import re
+import subprocess
 
 import pytest
 
@@ -30,9 +32,36 @@ def test_more_cases_widen_every_interval():
     assert one.upper < many.upper
 
 
-def test_an_unknown_revision_is_one_line(tmp_path):
-    with pytest.raises(UserError, match="--against no-such-revision"):
-        against._extract("no-such-revision", tmp_path)
+@pytest.fixture
+def repository(tmp_path, monkeypatch):
+    """A checkout with one commit."""
+    folder = tmp_path / "repository"
+    folder.mkdir()
+    (folder / "file").write_text("text\n")
+    author = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "commit.gpgsign=false"]
+    for command in (["init", "-q"], ["add", "file"], [*author, "commit", "-q", "-m", "a [/] in its message"]):
+        subprocess.run(["git", *command], cwd=folder, check=True)
+    monkeypatch.setattr(against, "CHECKOUT", folder)
+    return folder
+
+
+@pytest.mark.parametrize("revision", ["no-such-revision", "", "-h", "--list", "--output=file", "^HEAD", "HEAD:file"])
+def test_an_unknown_revision_is_one_line_and_never_an_option(repository, tmp_path, revision):
+    with pytest.raises(UserError, match=f"--against {re.escape(revision)}: no such commit"):
+        against._extract(revision, tmp_path / "extracted")
+    assert (repository / "file").read_text() == "text\n"
+
+
+@pytest.mark.parametrize("revision", ["HEAD", "HEAD^{/[/]}", ":/in its"])
+def test_whatever_names_a_commit_is_a_revision(repository, tmp_path, revision):
+    extracted = against._extract(revision, tmp_path / "extracted")
+    assert (extracted / "file").read_text() == "text\n"
+
+
+def test_without_git_there_is_nothing_to_compare_with(tmp_path, monkeypatch):
+    monkeypatch.setattr(against, "CHECKOUT", tmp_path)
+    with pytest.raises(UserError, match="needs a git checkout"):
+        against._extract("HEAD", tmp_path)
 
 
 class Replies:
