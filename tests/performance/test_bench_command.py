@@ -69,3 +69,14 @@ def test_a_slower_case_is_exit_code_1(monkeypatch, verdict, code):
     assert done.exit_code == code
     assert verdict in done.output
     assert "1.100 to 1.300" in done.output
+
+
+def test_revisions_cases_and_reasons_are_shown_as_they_are(monkeypatch):
+    def told(revision, cases, said):
+        said("a case [/]", 0, 1)
+        return [Comparison("a case [/]", "not in both", reason="KeyError: [/red]")]
+
+    monkeypatch.setattr(against, "against", told)
+    done = CliRunner().invoke(app, ["bench", "--against", "HEAD^{/[/]}"])
+    assert done.exit_code == 0
+    assert all(text in done.output for text in ("HEAD^{/[/]}", "a case [/]", "KeyError: [/red]"))
