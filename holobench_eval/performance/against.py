@@ -27,7 +27,7 @@ from scipy import stats
 
 from ..errors import UserError
 from ..seeds import seed
-from .suite import CHECKOUT, suite, worker
+from .suite import CHECKOUT, worker
 
 STARTS, TURNS = 11, 21
 TURN_SECONDS = 0.05
@@ -101,7 +101,7 @@ def judge(case: str, logarithms: Sequence[float], cases: int) -> Comparison:
 def _start(case: str, here: Path, there: Path, draw: random.Random) -> float:
     """Logarithm of the ratio of times, over turns of two fresh processes. LookupError: one cannot do the case."""
     with ExitStack() as stack:
-        workers = [stack.enter_context(worker([place, suite()])) for place in (here, there)]
+        workers = [stack.enter_context(worker(place)) for place in (here, there)]
         for one in workers:
             stack.callback(one.kill)
         calls = max(1, math.ceil(TURN_SECONDS / max(_timed(one, case, 1) for one in workers)))

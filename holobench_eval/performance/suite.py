@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -99,14 +97,12 @@ def peak_memory(timing: Timing) -> float | None:
     return json.loads(done.stdout) if done.returncode == 0 else None
 
 
-def worker(paths: Sequence[Path]) -> subprocess.Popen[str]:
-    """A process that times benchmarks on request, with packages from ``paths`` before installed ones."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths))}
+def worker(place: Path) -> subprocess.Popen[str]:
+    """A process that times benchmarks on request, with the package from the folder ``place`` and nowhere else."""
     return subprocess.Popen(
-        [sys.executable, str(suite() / "worker.py")],
+        [sys.executable, str(suite() / "worker.py"), "--from", str(place)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
-        env=environment,
     )
