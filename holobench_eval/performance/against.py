@@ -27,7 +27,7 @@ from scipy import stats
 
 from ..errors import UserError
 from ..seeds import seed
-from .suite import CHECKOUT, worker
+from .suite import CHECKOUT, suite, worker
 
 STARTS, TURNS = 11, 21
 TURN_SECONDS = 0.05
@@ -62,6 +62,7 @@ class Comparison:
 
 def against(revision: str, cases: Sequence[str], said: Callable[[str, int, int], None]) -> list[Comparison]:
     """Compare the working tree with a git revision; ``said`` is told of each start: case, and starts done of all."""
+    suite()  # without a checkout there is nothing to lay out
     with TemporaryDirectory() as folder:
         here, there = Path(folder) / "here", Path(folder) / "there"
         _lay_out(CHECKOUT, here)

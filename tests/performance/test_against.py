@@ -141,8 +141,15 @@ def test_every_case_has_a_name_of_its_own():
 
 def test_the_benchmarks_of_an_installed_package_are_missed_in_one_line(monkeypatch, tmp_path):
     monkeypatch.setattr(suite, "CHECKOUT", tmp_path)
-    with pytest.raises(UserError, match="no benchmarks in"):
-        suite.suite()
+    for call in (suite.suite, lambda: suite.measure(None), lambda: against.against("HEAD", [], print)):
+        with pytest.raises(UserError, match=r"no benchmarks in .*; in a checkout: pip install"):
+            call()
+
+
+def test_a_plain_install_is_told_what_benchmarks_need(monkeypatch):
+    monkeypatch.setattr(suite, "find_spec", lambda name: None)
+    with pytest.raises(UserError, match=r"pytest-benchmark is not installed.*'\.\[dev\]'"):
+        suite.measure(None)
 
 
 def test_peak_memory_counts_what_is_held():
