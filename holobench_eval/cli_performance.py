@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -17,13 +18,16 @@ def bench(
     against: Annotated[str | None, typer.Option(help="Compare the working tree with this git revision.")] = None,
 ) -> None:
     """Time propagations, gradient steps, captures, metrics and cells beside others' code, or against a revision."""
+    from .performance import machine, report, suite
+
+    load = machine.load()
+    if load is not None and load > machine.BUSY:
+        print(f"holoeval: the machine is busy (load {load}): short calls will seem to take longer", file=sys.stderr)
     if against is not None:
         _compare(against, only)
         return
-    from .performance import machine, report, suite
-
     timings, complete = suite.measure(only)
-    before = machine.describe()
+    before = machine.describe(load)
     compared = report.beside_others(timings)
     timings = [replace(one, memory=suite.peak_memory(one)) if one.group in compared else one for one in timings]
     print(report.write(output, timings, before))

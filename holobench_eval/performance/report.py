@@ -115,11 +115,13 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
     others = {name: rows for name, rows in found.items() if name not in compared and name not in sizes}
     dirty = ", with changes" if machine.get("dirty") else ""
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
+    load = machine.get("load_before")
+    busy = "" if load is None else f"; load before: {load}"
     parts = [
         "# Speed",
         f"Medians of repeated calls in one run, after a warm-up, on {machine['threads']} threads of "
         f"{machine['cpu']} ({machine['platform']}), {machine['date']}; revision {machine['revision']}{dirty}; Python "
-        f"{machine['python']}, {packages}. Memory copies {bandwidth / 1e9:.1f} GB/s (read and written). "
+        f"{machine['python']}, {packages}{busy}. Memory copies {bandwidth / 1e9:.1f} GB/s (read and written). "
         "Compare ratios, not seconds; another machine has others. `holoeval bench` makes this report.",
     ]
     if compared:
