@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -17,13 +18,16 @@ def bench(
     against: Annotated[str | None, typer.Option(help="Compare the working tree with this git revision.")] = None,
 ) -> None:
     """Time propagations, gradient steps, captures, metrics and cells beside others' code, or against a revision."""
+    from .performance import machine, report, suite
+
+    load = machine.load()
+    if load is not None and load > machine.BUSY:
+        print(f"holoeval: the machine is busy (load {load}): short calls will seem to take longer", file=sys.stderr)
     if against is not None:
         _compare(against, only)
         return
-    from .performance import machine, report, suite
-
     timings, complete = suite.measure(only)
-    before = machine.describe()
+    before = machine.describe(load)
     compared = report.beside_others(timings)
     timings = [replace(one, memory=suite.peak_memory(one)) if one.group in compared else one for one in timings]
     print(report.write(output, timings, before))
@@ -34,6 +38,7 @@ def bench(
 
 def _compare(revision: str, only: str | None) -> None:
     """Print a verdict for every case; exit code 1 if one is slower."""
+    from rich.markup import escape
     from rich.progress import Progress, TimeRemainingColumn
     from rich.table import Table
 
@@ -42,19 +47,20 @@ def _compare(revision: str, only: str | None) -> None:
 
     cases = COMPARED if only is None else names(only)
     screen = console()
-    with Progress(*Progress.get_default_columns()[:-1], TimeRemainingColumn(), console=screen) as progress:
+    columns = (*Progress.get_default_columns()[:-1], TimeRemainingColumn())
+    with Progress(*columns, console=screen, transient=True) as progress:
         task = progress.add_task("timing", total=None)
 
         def said(case: str, done: int, total: int) -> None:
-            progress.update(task, description=case, completed=done, total=total)
+            progress.update(task, description=escape(case), completed=done, total=total)
 
         found = against(revision, cases, said)
-    table = Table(title=f"working tree over {revision}", title_justify="left")
+    table = Table(title=f"working tree over {escape(revision)}", title_justify="left")
     for heading in ("", "ratio of times", "interval", "verdict"):
         table.add_column(heading)
     for one in found:
         interval = one.reason or f"{one.lower:.3f} to {one.upper:.3f}"
-        table.add_row(one.case, f"{one.ratio:.3f}", interval, one.verdict)
+        table.add_row(escape(one.case), f"{one.ratio:.3f}", escape(interval), one.verdict)
     screen.print(table)
     screen.print(f"intervals: 99 % for all together; changes below {MARGIN - 1:.0%} are not counted", markup=False)
     if any(one.verdict == "slower" for one in found):

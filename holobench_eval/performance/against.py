@@ -62,6 +62,7 @@ class Comparison:
 
 def against(revision: str, cases: Sequence[str], said: Callable[[str, int, int], None]) -> list[Comparison]:
     """Compare the working tree with a git revision; ``said`` is told of each start: case, and starts done of all."""
+    suite()  # without a checkout there is nothing to lay out
     with TemporaryDirectory() as folder:
         here, there = Path(folder) / "here", Path(folder) / "there"
         _lay_out(CHECKOUT, here)
@@ -101,7 +102,7 @@ def judge(case: str, logarithms: Sequence[float], cases: int) -> Comparison:
 def _start(case: str, here: Path, there: Path, draw: random.Random) -> float:
     """Logarithm of the ratio of times, over turns of two fresh processes. LookupError: one cannot do the case."""
     with ExitStack() as stack:
-        workers = [stack.enter_context(worker([place, suite()])) for place in (here, there)]
+        workers = [stack.enter_context(worker(place)) for place in (here, there)]
         for one in workers:
             stack.callback(one.kill)
         calls = max(1, math.ceil(TURN_SECONDS / max(_timed(one, case, 1) for one in workers)))
@@ -126,15 +127,23 @@ def _timed(one: subprocess.Popen[str], case: str, calls: int) -> float:
 
 
 def _extract(revision: str, folder: Path) -> Path:
-    """The files of a git revision. UserError: there is none of that name."""
-    done = subprocess.run(
-        ["git", "archive", "--format=tar", revision, "--"], cwd=CHECKOUT, capture_output=True, check=False
-    )
-    if done.returncode:
-        raise UserError(f"--against {revision}: {done.stderr.decode(errors='replace').strip()}")
-    with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
+    """The files of a git revision. UserError: there is none of that name, or no git checkout."""
+    if not (CHECKOUT / ".git").exists():
+        raise UserError(f"--against needs a git checkout, which {CHECKOUT} is not")
+    # A revision may begin with a dash; what git archive is given is always a hash.
+    found = _git("rev-parse", "--verify", "--quiet", "--end-of-options", revision)
+    if found.returncode == 0:
+        found = _git("archive", "--format=tar", f"{found.stdout.decode().strip()}^{{commit}}")
+    if found.returncode:
+        said = found.stderr.decode(errors="replace").strip()
+        raise UserError(f"--against {revision}: no such commit" + (f"; git says: {said}" if said else ""))
+    with tarfile.open(fileobj=BytesIO(found.stdout)) as archive:
         archive.extractall(folder, filter="data")
     return folder
+
+
+def _git(*arguments: str) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(["git", *arguments], cwd=CHECKOUT, capture_output=True, check=False)
 
 
 def _lay_out(checkout: Path, folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import time
 from typing import Any
@@ -15,11 +16,21 @@ from .suite import THREADS
 
 COPIED = 256 * 2**20
 """Bytes, far more than a cache holds."""
+BUSY = 0.5
+"""Load above which times of short calls are more the scheduler's than the code's."""
 PACKAGES = ("torch", "numpy", "opencv-python-headless", "scikit-image", "odak", "torchoptics", "pytest-benchmark")
 
 
-def describe() -> dict[str, Any]:
-    """What a reader needs to judge the timings of this run."""
+def load() -> float | None:
+    """Programs that computed or waited to, on average over the last minute; None where the system does not tell."""
+    try:
+        return round(os.getloadavg()[0], 2)
+    except (AttributeError, OSError):
+        return None
+
+
+def describe(load_before: float | None) -> dict[str, Any]:
+    """What a reader needs to judge the timings of this run. load_before: the ``load`` when it was started."""
     return {
         **revision(),
         "date": now(),
@@ -29,6 +40,7 @@ def describe() -> dict[str, Any]:
         "packages": {name: found for name in PACKAGES if (found := installed(name))},
         "threads": THREADS,
         "bandwidth": bandwidth(),
+        "load_before": load_before,
     }
 
 

@@ -7,7 +7,7 @@ import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,9 @@ COLUMNS = ("group", "version", "median_s", "lower_s", "upper_s", "rounds", "rows
 PASSES = 8
 """Times that four transforms read or write their array, if each reads and writes it once."""
 COMPLEX64 = 8
+LARGEST = 10**15
+"""No measurement is as large, in any unit used here."""
+Number = TypeVar("Number", int, float)
 
 
 def write(folder: Path, timings: Sequence[Timing], machine: dict[str, Any]) -> Path:
@@ -40,14 +43,9 @@ def problems(folder: Path) -> list[str]:
         timings = from_csv((folder / TIMINGS).read_text(encoding="utf-8"))
         again = text(timings, json.loads((folder / MACHINE).read_text(encoding="utf-8")))
         same = again == (folder / REPORT).read_text(encoding="utf-8")
-    except (
-        UserError,
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-    ) as error:  # whatever a damaged file brings
+    except (UserError, OSError) as error:
+        return [str(error)]
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, csv.Error) as error:  # of a damaged file
         return [f"{type(error).__name__}: {error}"]
     return [] if same else [f"{REPORT} does not follow from {TIMINGS} and {MACHINE}; run 'holoeval bench' again"]
 
@@ -69,20 +67,30 @@ def from_csv(content: str) -> list[Timing]:
     rows = csv.DictReader(io.StringIO(content))
     if tuple(rows.fieldnames or ()) != COLUMNS:
         raise UserError(f"{TIMINGS} should have the columns {', '.join(COLUMNS)}")
-    return [
-        Timing(
-            group=row["group"],
-            version=row["version"],
-            median=float(row["median_s"]),
-            lower=float(row["lower_s"]),
-            upper=float(row["upper_s"]),
-            rounds=int(row["rounds"]),
-            padded=(int(row["rows"]), int(row["columns"])) if row["rows"] else None,
-            error=float(row["error"]) if row["error"] else None,
-            memory=float(row["memory_bytes"]) if row["memory_bytes"] else None,
-        )
-        for row in rows
-    ]
+    return [_timing(row) for row in rows]
+
+
+def _timing(row: dict[str, str]) -> Timing:
+    name = f"{TIMINGS}: {row['group']!r}, {row['version']!r}"
+    rows, columns = row["rows"], row["columns"]
+    return Timing(
+        group=row["group"],
+        version=row["version"],
+        median=_positive(float(row["median_s"]), f"{name}: median_s"),
+        lower=_positive(float(row["lower_s"]), f"{name}: lower_s"),
+        upper=_positive(float(row["upper_s"]), f"{name}: upper_s"),
+        rounds=_positive(int(row["rounds"]), f"{name}: rounds"),
+        padded=(_positive(int(rows), f"{name}: rows"), _positive(int(columns), f"{name}: columns")) if rows else None,
+        error=float(row["error"]) if row["error"] else None,
+        memory=float(row["memory_bytes"]) if row["memory_bytes"] else None,
+    )
+
+
+def _positive(number: Number, name: str) -> Number:
+    """The number, if it can be divided by and multiplied. UserError: no measurement gives it."""
+    if not 0 < number < LARGEST:
+        raise UserError(f"{name} is {number}, should be positive and less than {LARGEST:g}")
+    return number
 
 
 def groups(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
@@ -100,17 +108,20 @@ def beside_others(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
 
 def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
     """The report in Markdown."""
+    bandwidth = _positive(machine["bandwidth"], f"{MACHINE}: bandwidth")
     found = groups(timings)
     compared = beside_others(timings)
     sizes = {name: rows for name, rows in found.items() if _bare(rows) is not None and _ours(rows) is not None}
     others = {name: rows for name, rows in found.items() if name not in compared and name not in sizes}
     dirty = ", with changes" if machine.get("dirty") else ""
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
+    load = machine.get("load_before")
+    busy = "" if load is None else f"; load before: {load}"
     parts = [
         "# Speed",
         f"Medians of repeated calls in one run, after a warm-up, on {machine['threads']} threads of "
         f"{machine['cpu']} ({machine['platform']}), {machine['date']}; revision {machine['revision']}{dirty}; Python "
-        f"{machine['python']}, {packages}. Memory copies {machine['bandwidth'] / 1e9:.1f} GB/s (read and written). "
+        f"{machine['python']}, {packages}{busy}. Memory copies {bandwidth / 1e9:.1f} GB/s (read and written). "
         "Compare ratios, not seconds; another machine has others. `holoeval bench` makes this report.",
     ]
     if compared:
@@ -131,7 +142,7 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
             f"*bare* is the same number of Fourier transforms of the padded size and nothing else; *memory bound* what "
             f"{PASSES} passes of a step over the padded array ({PASSES // 2} for a propagation) would take at the "
             "bandwidth above. Padding is what the stated accuracy needs.",
-            _sizes(sizes, machine["bandwidth"]),
+            _sizes(sizes, bandwidth),
         ]
     if others:
         lines = [
@@ -187,7 +198,8 @@ def _sizes(sizes: dict[str, list[Timing]], bandwidth: float) -> str:
         ours, bare = _ours(rows), _bare(rows)
         assert ours is not None
         assert bare is not None
-        assert ours.padded is not None
+        if ours.padded is None:
+            raise UserError(f"{TIMINGS}: {name!r}, {OURS!r}: rows and columns are missing")
         passes = PASSES if bare.version.startswith("four") else PASSES // 2
         bound = passes * COMPLEX64 * ours.padded[0] * ours.padded[1] / bandwidth
         lines.append(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,6 +14,7 @@ from ..errors import UserError
 
 THREADS = 2
 CHECKOUT = Path(__file__).parents[2]
+INSTALL = "pip install -c constraints.txt -e '.[dev]' ('.[dev,peers]' to time others' code, too)"
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def suite() -> Path:
     """Folder of the benchmarks. UserError: the package does not lie in a checkout."""
     folder = CHECKOUT / "tests" / "benchmarks"
     if not (folder / "cases.py").is_file():
-        raise UserError(f"no benchmarks in {folder}; install the package from a checkout (pip install -e .)")
+        raise UserError(f"no benchmarks in {folder}; in a checkout: {INSTALL}")
     return folder
 
 
@@ -49,9 +49,12 @@ def measure(only: str | None) -> tuple[list[Timing], bool]:
 
     Also whether all could be timed. UserError: none could.
     """
+    benchmarks = suite()
+    if find_spec("pytest_benchmark") is None:
+        raise UserError(f"pytest-benchmark is not installed; in the checkout: {INSTALL}")
     with TemporaryDirectory() as folder:
         found = Path(folder) / "found.json"
-        command = [sys.executable, "-m", "pytest", str(suite()), "--benchmark-enable", "--benchmark-only", "-vv"]
+        command = [sys.executable, "-m", "pytest", str(benchmarks), "--benchmark-enable", "--benchmark-only", "-vv"]
         command += ["--benchmark-quiet", f"--benchmark-json={found}", "--no-header", "-p", "no:cacheprovider"]
         if only:
             command += [f"--only={only}"]
@@ -99,14 +102,12 @@ def peak_memory(timing: Timing) -> float | None:
     return json.loads(done.stdout) if done.returncode == 0 else None
 
 
-def worker(paths: Sequence[Path]) -> subprocess.Popen[str]:
-    """A process that times benchmarks on request, with packages from ``paths`` before installed ones."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths))}
+def worker(place: Path) -> subprocess.Popen[str]:
+    """A process that times benchmarks on request, with the package from the folder ``place`` and nowhere else."""
     return subprocess.Popen(
-        [sys.executable, str(suite() / "worker.py")],
+        [sys.executable, str(suite() / "worker.py"), "--from", str(place)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
-        env=environment,
     )

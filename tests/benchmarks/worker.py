@@ -1,39 +1,68 @@
 """Times cases on request, so that two processes with two versions of the package can take turns.
 
-Reads lines from standard input: a case's name and how often to call it. Answers each with a line of JSON: seconds, or
-why there is none. ``worker.py --names`` lists them all; ``worker.py --memory NAME`` prints the most memory that a case
-holds while it is called, in bytes, beyond what its process had before it was prepared.
+``worker.py --from FOLDER``, the package being taken from there, reads lines from standard input: a case's name and how
+often to call it. Answers each with a line of JSON: seconds, or why there is none. ``worker.py --names`` lists all;
+``worker.py --memory NAME`` prints the most memory that a case holds while it is called, in bytes, beyond what its
+process had before it was prepared.
 """
 
 import json
 import sys
 import time
+from contextlib import suppress
+from importlib.machinery import PathFinder
 
 import torch
-from cases import CASES, Case
 
-from holobench_eval.allocator import keep_freed_memory
-from holobench_eval.study import effort
-
+PACKAGE = "holobench_eval"
 THREADS = 2
 
 
+class OnlyFrom:
+    """Finds the package in one folder or not at all: an installed one would lend an older version what that lacks."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] != PACKAGE:
+            return None
+        found = PathFinder.find_spec(name, [self.folder] if path is None else path)
+        if found is None:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        return found
+
+
 def main():
+    option, *rest = sys.argv[1:]
+    if option == "--from":
+        sys.meta_path.insert(0, OnlyFrom(*rest))
+        serve()
+    elif option == "--memory":
+        print(json.dumps(memory(known()[rest[0]])))
+    elif option == "--names":
+        print(json.dumps(list(known())))
+
+
+def known():
+    """All cases by name. Nothing of the package is imported before it is known where it comes from."""
+    from cases import CASES
+
     torch.set_num_threads(THREADS)
-    keep_freed_memory()  # as a study does
-    known = {case.name: case for case in CASES}
-    if sys.argv[1:2] == ["--memory"]:
-        print(json.dumps(memory(known[sys.argv[2]])))
-        return
-    if sys.argv[1:2] == ["--names"]:
-        print(json.dumps(list(known)))
-        return
+    with suppress(ModuleNotFoundError):  # of a version that is older than this
+        from holobench_eval.allocator import keep_freed_memory
+
+        keep_freed_memory()  # as a study does
+    return {case.name: case for case in CASES}
+
+
+def serve():
     ready = {}
     for line in sys.stdin:
         name, _, calls = line.rstrip("\n").rpartition("\t")
         try:
             if name not in ready:
-                ready = {name: known[name].work().call}
+                ready = {name: known()[name].work().call}
                 ready[name]()
             started = time.perf_counter()
             for _ in range(int(calls)):
@@ -44,8 +73,10 @@ def main():
         print(json.dumps(answer), flush=True)
 
 
-def memory(case: Case) -> float | None:
+def memory(case):
     """Bytes; None where the system does not tell."""
+    from holobench_eval.study import effort
+
     case.shrunk().work().call()  # libraries load more of themselves when they are first used
     before = effort.start().before
     work = case.work()

@@ -64,3 +64,36 @@ def test_damaged_files_are_a_problem_and_not_a_traceback(tmp_path):
     assert "should have the columns" in report.problems(tmp_path)[0]
     with pytest.raises(UserError, match="columns"):
         report.from_csv("a,b\n")
+
+
+@pytest.mark.parametrize("bandwidth", [0, -1, float("nan"), float("inf"), 10**400])
+def test_a_bandwidth_that_nothing_has_is_a_problem(tmp_path, bandwidth):
+    report.write(tmp_path, TIMINGS, MACHINE)
+    (tmp_path / "machine.json").write_text(json.dumps(MACHINE | {"bandwidth": bandwidth}))
+    assert report.problems(tmp_path)[0].startswith("machine.json: bandwidth is ")
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ("0.06,0.059", "0,0.059", "median_s is 0.0, should be positive"),
+        ("0.06,0.059", "nan,0.059", "median_s is nan"),
+        ("0.06,0.059", "inf,0.059", "median_s is inf"),
+        ("0.0015,0.001,0.002,21,300,300", "0.0015,0.001,0.002,0,300,300", "rounds is 0"),
+        ("0.0015,0.001,0.002,21,300,300", "0.0015,0.001,0.002,21,,", "rows and columns are missing"),
+        ("0.0015,0.001,0.002,21,300,300", f"0.0015,0.001,0.002,21,300,1{400 * '0'}", "columns is 1000"),
+        ("psnr", 200_000 * "x", "field larger than field limit"),
+    ],
+)
+def test_timings_that_nothing_takes_are_a_problem(tmp_path, right, wrong, told):
+    report.write(tmp_path, TIMINGS, MACHINE)
+    content = (tmp_path / "timings.csv").read_text()
+    assert right in content
+    (tmp_path / "timings.csv").write_text(content.replace(right, wrong))
+    assert told in report.problems(tmp_path)[0]
+
+
+def test_deeply_nested_json_is_a_problem(tmp_path):
+    report.write(tmp_path, TIMINGS, MACHINE)
+    (tmp_path / "machine.json").write_text(100_000 * "[")
+    assert "RecursionError" in report.problems(tmp_path)[0]
