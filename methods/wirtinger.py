@@ -123,9 +123,15 @@ class Objective:
         at_panel = unit_field(phase)
         image = self.model.forward(at_panel)
         at_image = self.region.crop(image)
+        loss, slope = self._slope(at_image)
+        at_image.mul_(2 * slope)  # in the place of the field: a new array costs as much as the product
+        del slope  # the adjoint takes the most memory
+        returned = self.model.adjoint(self.region.clear_around(image))
+        return loss, (at_panel.real * returned.imag).addcmul_(at_panel.imag, returned.real, value=-1)
+
+    def _slope(self, at_image: Tensor) -> tuple[Tensor, Tensor]:
+        """Loss ``(B,)`` of the field in the region, and dL/dI ``(B, h, w)``."""
         intensity = (at_image.real.square() + at_image.imag.square()).requires_grad_()
         loss = self.loss(intensity, self.target)
         (slope,) = torch.autograd.grad(loss.sum(), intensity)
-        at_image.mul_(2 * slope)  # in the place of the field: a new array costs as much as the product
-        returned = self.model.adjoint(self.region.clear_around(image))
-        return loss.detach(), (at_panel.real * returned.imag).addcmul_(at_panel.imag, returned.real, value=-1)
+        return loss.detach(), slope
