@@ -93,12 +93,6 @@ def _check_nested(who: str, cls: type[Any], params: dict[str, Any], place: str) 
         _check_nested(who, inner, value, f"{place}{key}.")
 
 
-@lru_cache(maxsize=64)
-def _adapter(cls: type[Any]) -> TypeAdapter[Any]:
-    """What checks the parameters of a class; made once, which takes longer than to use it."""
-    return TypeAdapter(cls)
-
-
 def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = None) -> Any:
     """An instance with validated parameters; a wrong key, type or range is one line naming the parameter."""
     cls = find(kind, name, folder)
@@ -108,7 +102,7 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
             raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, known)}")
     _check_nested(f"{kind[:-1]} '{name}'", cls, params, "")
     try:
-        return _adapter(cls).validate_json(json.dumps(params), strict=True)  # type: ignore[arg-type]
+        return TypeAdapter(cls).validate_json(json.dumps(params), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

@@ -123,12 +123,6 @@ CHANGES = [
     ("repeats: 2", "protocol: {version: v2}", "11:21: protocol.version should be 'v1'"),
     ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),
     ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
-    ("repeats: 2", "protocol: {metrics: [ssim, lpips_alex]}", "11:28: lpips_alex: no trunk weights; put https:"),
-    (
-        "headline: ssim_srgb",
-        "headline: lpips_alex_srgb",
-        "13:11: the headline cannot be computed: lpips_alex: ",
-    ),
     ("headline: ssim_srgb", "headline: ms_ssim_linear", "13:11: 'ideal' scores 104 x 208 pixels; ms_ssim needs 161"),
     ("repeats: 2", "protocol: {metrics: [psnr]}", "11:21: the headline is 'ssim_srgb'; add ssim to the metrics, or "),
 ]

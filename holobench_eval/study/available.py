@@ -1,4 +1,4 @@
-"""Methods that need what is not installed here: found out before anything is computed."""
+"""Methods and metrics that need what is not installed here: found out before anything is computed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ..errors import UserError
 from .identity import canonical
 
 if TYPE_CHECKING:
+    from ..config import Study
     from .plan import Cell, Plan
 
 
@@ -29,6 +30,17 @@ def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> Non
                 reason = _reason(name, params, folder)
                 if reason is not None:
                     raise UserError(f"method '{name}' cannot run here: {reason}")
+
+
+def refuse_unscored(study: Study) -> None:
+    """UserError, in one line, if a metric that the study names, or that its headline is of, cannot be computed here."""
+    from ..metrics import catalogue
+
+    weights, wanted = study.protocol.lpips_weights, study.protocol.metrics or ()
+    for metric in catalogue(None if weights is None else Path(weights)):
+        heads = study.headline in (f"{metric.name}_{domain}" for domain in metric.domains)
+        if (metric.name in wanted or heads) and (reason := metric.available()):
+            raise UserError(f"metric '{metric.name}' cannot be computed here: {reason}")
 
 
 def _used(cell: Cell) -> list[tuple[str, dict[str, Any]]]:

@@ -12,7 +12,7 @@ from ..device import find, gpu_name
 from ..errors import UserError
 from . import provenance, timings
 from .artifacts import Artifacts
-from .available import refuse_unavailable
+from .available import refuse_unavailable, refuse_unscored
 from .clusters import Address, Local
 from .executors import Executor, Serial
 from .job import Job, Setting
@@ -92,10 +92,13 @@ def run(
     store = Store(output)
     with store.locked():
         if retrain:
+            refuse_unscored(study)
             refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
             forget(plan, store, Artifacts(artifacts))
         timed = timings.timed(study, plan)
         missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed, timed))
+        if missing:
+            refuse_unscored(study)
         refuse_unavailable(plan, missing, study.folder)
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)

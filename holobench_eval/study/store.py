@@ -101,7 +101,7 @@ class Store:
 
     def path(self, identity: str) -> Path:
         """The record's file."""
-        return self.output / f"records/{identity}.json"
+        return self.folder / f"{identity}.json"
 
     def log(self, identity: str) -> Path:
         """The file with the traceback of a failed cell."""

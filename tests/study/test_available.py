@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import torch
 from fake_study import solves, write_config
 
 from holobench_eval.config import load_study
@@ -55,3 +56,16 @@ def test_what_was_computed_needs_no_method_any_more(tmp_path: Path) -> None:
     (tmp_path / "here").unlink()
     compute()
     assert len(solves(tmp_path)) == 6
+
+
+@pytest.mark.parametrize("asked", ["protocol: {metrics: [psnr, lpips_alex]}", "headline: lpips_alex_srgb"])
+def test_a_metric_without_its_weights_is_refused_by_a_run_and_not_by_reading_the_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
+) -> None:
+    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path / "hub"))
+    config = write_config(tmp_path)
+    config.write_text(f"{config.read_text()}\n{asked}\n")
+    study = load_study(config)
+    with pytest.raises(UserError, match="metric 'lpips_alex' cannot be computed here: lpips_alex: no trunk weights"):
+        run(study, plan(study), tmp_path / "out", Serial(), Lines(lambda _: None), 1, tmp_path / "artifacts")
+    assert not solves(tmp_path)
