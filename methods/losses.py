@@ -39,7 +39,7 @@ class _LeastSquares(torch.autograd.Function):
     def forward(context: Any, intensity: Tensor, target: Tensor) -> Tensor:
         scale = _dot(intensity, target) / _dot(intensity, intensity).clamp_min(_TINY)
         size = _dot(target, target).clamp_min(_TINY)
-        error = torch.addcmul(-target, intensity, scale[:, None, None])
+        error = torch.mul(intensity, scale[:, None, None]).sub_(target)
         context.save_for_backward(error, 2 * scale / size)
         return _dot(error, error) / size
 
@@ -51,8 +51,7 @@ class _LeastSquares(torch.autograd.Function):
 
 def _dot(a: Tensor, b: Tensor) -> Tensor:
     """Sum of products per image, ``(B, h, w)`` twice to ``(B,)``."""
-    total: Tensor = torch.linalg.vecdot(a.flatten(1), b.flatten(1))
-    return total
+    return torch.bmm(a.flatten(1)[:, None, :], b.flatten(1)[:, :, None]).flatten()  # several times as fast as vecdot
 
 
 def intensity_l2(intensity: Tensor, target: Tensor) -> Tensor:

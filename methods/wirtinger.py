@@ -14,7 +14,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..optics import AngularSpectrum
-from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
+from .common import Bench, Offset, nominal_model, per_channel, with_offset
 from .descent import Best, cosine_decay
 from .initial_phase import InitialPhase, initial_phase
 from .losses import LOSSES, Loss, LossName
@@ -120,18 +120,25 @@ class Objective:
         For E = P(exp(i phi)) and I = |E|^2, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
         and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)). dL/dI alone is left to autograd.
         """
-        at_panel = unit_field(phase)
-        image = self.model.forward(at_panel)
+        field = self.model.blank(len(phase))
+        at_panel = _panel(field, phase)
+        torch.complex(phase.cos(), phase.sin(), out=at_panel)
+        image = self.model.forward(field)
         at_image = self.region.crop(image)
         loss, slope = self._slope(at_image)
-        at_image.mul_(2 * slope)  # in the place of the field: a new array costs as much as the product
+        at_image.mul_(slope)  # in the place of the field: a new array costs as much as the product
         del slope  # the adjoint takes the most memory
-        returned = self.model.adjoint(self.region.clear_around(image))
+        returned = _panel(self.model.adjoint(self.region.clear_around(image)), phase)
         return loss, (at_panel.real * returned.imag).addcmul_(at_panel.imag, returned.real, value=-1)
 
     def _slope(self, at_image: Tensor) -> tuple[Tensor, Tensor]:
-        """Loss ``(B,)`` of the field in the region, and dL/dI ``(B, h, w)``."""
-        intensity = (at_image.real.square() + at_image.imag.square()).requires_grad_()
+        """Loss ``(B,)`` of the field in the region, and 2 dL/dI ``(B, h, w)``."""
+        intensity = torch.square(at_image.real).addcmul_(at_image.imag, at_image.imag).requires_grad_()
         loss = self.loss(intensity, self.target)
-        (slope,) = torch.autograd.grad(loss.sum(), intensity)
+        (slope,) = torch.autograd.grad(2 * loss.sum(), intensity)
         return loss.detach(), slope
+
+
+def _panel(field: Tensor, phase: Tensor) -> Tensor:
+    """The part of a field like ``blank`` that is the panel; a view."""
+    return field[..., : phase.shape[-2], : phase.shape[-1]]

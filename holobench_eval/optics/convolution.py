@@ -42,8 +42,17 @@ class Convolution:
         """(rows, columns) of the transform."""
         return self.transfer.shape[-2], self.transfer.shape[-1]
 
+    def blank(self, *batch: int) -> Tensor:
+        """A dark field ``(*batch, H, W)`` to write light into, or one that is padded already where that saves a copy.
+
+        ``forward`` and ``adjoint`` take and give it as it is: whatever they find outside ``(H, W)`` must be zero, and
+        what they leave there means nothing.
+        """
+        shape = self.shape if is_large(self.transfer) else self.padded_shape
+        return self.transfer.new_zeros((*batch, *shape))
+
     def forward(self, field: Tensor) -> Tensor:
-        """Propagate ``(..., H, W)`` complex to ``(..., H, W)``; differentiable."""
+        """Propagate ``(..., H, W)`` complex to ``(..., H, W)``; differentiable. Or a field like ``blank``."""
         return self._convolve(field, conjugated=False)
 
     def adjoint(self, field: Tensor) -> Tensor:
@@ -58,7 +67,7 @@ class Convolution:
         return conjugate if is_large(conjugate) else conjugate.resolve_conj()
 
     def _convolve(self, field: Tensor, conjugated: bool) -> Tensor:
-        if tuple(field.shape[-2:]) != self.shape:
+        if tuple(field.shape[-2:]) not in (self.shape, self.padded_shape):
             raise ValueError(f"field is {tuple(field.shape[-2:])}, the propagator was made for {self.shape}")
         field = field.to(torch.promote_types(field.dtype, self.transfer.dtype))
         convolved: Tensor = _Convolved.apply(field, self, conjugated)  # type: ignore[no-untyped-call]

@@ -163,6 +163,18 @@ def test_blocks_of_rows_and_columns_change_nothing(monkeypatch):
         assert relative(model.forward(field), padded) < 1e-14
 
 
+@pytest.mark.parametrize("kept", [0, 2**30])
+def test_light_written_into_a_blank_field_propagates_as_an_unpadded_field_does(monkeypatch, kept):
+    monkeypatch.setattr(convolution, "LARGEST_KEPT", kept)
+    model, fields = AngularSpectrum((23, 18), PITCH, WAVELENGTH, 5e-3), white((2, 23, 18)).to(torch.complex64)
+    blank = model.blank(2)
+    assert blank.shape[-2:] == (model.padded_shape if kept else model.shape)
+    assert not blank.any()
+    blank[:, :23, :18] = fields
+    for propagate in (model.forward, model.adjoint):
+        assert relative(propagate(blank)[:, :23, :18], propagate(fields)) < 1e-6
+
+
 def test_transfer_functions_are_cached():
     first = AngularSpectrum((50, 50), PITCH, WAVELENGTH, 0.01)
     assert AngularSpectrum((50, 50), PITCH, WAVELENGTH, 0.01).transfer is first.transfer
