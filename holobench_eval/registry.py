@@ -7,7 +7,7 @@ import importlib.util
 import json
 import sys
 from dataclasses import fields, is_dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
@@ -36,7 +36,7 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
     A relative path is taken from ``folder`` (the folder of the config that names it) first, then from the
     working directory.
     """
-    if ".py:" in name:
+    if _is_file(name):
         return _from_file(kind, name, folder)
     entries = _entries(kind)
     if name not in entries:
@@ -45,6 +45,10 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
         return _checked(kind, name, entries[name].load())
     except (ImportError, AttributeError) as error:
         raise UserError(f"{kind[:-1]} '{name}' cannot be imported: {error}") from error
+
+
+def _is_file(name: str) -> bool:
+    return ".py:" in name
 
 
 def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
@@ -93,6 +97,12 @@ def _check_nested(who: str, cls: type[Any], params: dict[str, Any], place: str) 
         _check_nested(who, inner, value, f"{place}{key}.")
 
 
+@cache
+def _kept_adapter(cls: type[Any]) -> TypeAdapter[Any]:
+    """Of an installed class: a file's is made anew with each import, and would be kept for ever."""
+    return TypeAdapter(cls)
+
+
 def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = None) -> Any:
     """An instance with validated parameters; a wrong key, type or range is one line naming the parameter."""
     cls = find(kind, name, folder)
@@ -102,7 +112,8 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
             raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, known)}")
     _check_nested(f"{kind[:-1]} '{name}'", cls, params, "")
     try:
-        return TypeAdapter(cls).validate_json(json.dumps(params), strict=True)
+        adapter: TypeAdapter[Any] = TypeAdapter(cls) if _is_file(name) else _kept_adapter(cls)
+        return adapter.validate_json(json.dumps(params), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

@@ -6,6 +6,7 @@ similarity", IEEE Trans. Image Process. 13 (2004).
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from itertools import product
@@ -24,6 +25,9 @@ C1 = 0.01**2
 C2 = 0.03**2
 STRIP = 2**17
 """Pixels that are compared together: few enough to stay in the cache."""
+
+LARGE = 2**20
+"""Pixels from which on another thread takes less time than it saves."""
 
 Plane = NDArray[np.floating]
 
@@ -89,7 +93,7 @@ def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
         return _sums(planes[0][plane, rows], planes[1][plane, rows])
 
     # Strips do not depend on the number of threads, and are added in their order: nor does the value.
-    threads = min(torch.get_num_threads(), len(places))
+    threads = min(torch.get_num_threads(), math.ceil(image.numel() / LARGE))
     if threads > 1:
         with ThreadPoolExecutor(threads) as pool:
             found = list(pool.map(sums, places))

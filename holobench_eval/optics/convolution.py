@@ -154,7 +154,7 @@ def iris(fy: Tensor, fx: Tensor, pitch: float, pupil: float | None) -> Tensor:
     that only several times the padding removes, and an iris a little out of the Fourier plane is not hard.
     """
     if pupil is None:
-        return torch.ones(torch.broadcast_shapes(fy.shape, fx.shape), dtype=torch.float64, device=fy.device)
+        return torch.ones_like(fy + fx)
     radius = torch.sqrt(fy**2 + fx**2) * (2 * pitch / pupil)
     edge = ((radius - (1 - IRIS_EDGE)) / (2 * IRIS_EDGE)).clamp(0.0, 1.0)
     return 0.5 * (1 + torch.cos(math.pi * edge))

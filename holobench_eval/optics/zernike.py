@@ -55,7 +55,7 @@ def zernike(index: int, y: Tensor, x: Tensor) -> Tensor:
 
 def wavefront(waves: Mapping[str, float], y: Tensor, x: Tensor) -> Tensor:
     """Sum of named terms, each given by its rms in waves over the unit disc; returns radians."""
-    total = torch.zeros(torch.broadcast_shapes(y.shape, x.shape), dtype=y.dtype, device=y.device)
+    total = torch.zeros_like(y + x)
     for name, amount in waves.items():
         total = total + 2 * math.pi * amount * zernike(NAMES[name], *torch.broadcast_tensors(y, x))
     return total
