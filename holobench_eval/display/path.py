@@ -62,7 +62,7 @@ class OpticalPath:
             light = column_spectra(lines, self.rows, part).add_(self.still[:, part].T)
             return light.mul_(self.transfer[:, part].T)
 
-        dusty = arriving if self.plane is None else self._through(self.plane, arriving)
+        dusty = arriving if self._dust is None else self._through(self._dust, arriving)
         seen = lines.new_empty((height, lines.shape[-1]))
 
         def leaving(part: slice) -> None:
@@ -81,7 +81,7 @@ class OpticalPath:
     def adjoint(self, image: Tensor) -> Tensor:
         """The adjoint of the linear part of ``forward``, ``(finer H, finer W)`` to ``(samples, samples, H, W)``."""
         padded, height = self.transfer.shape, self.shape[0]
-        rows, columns, transfer, plane, last = self._conjugates
+        rows, columns, transfer, dust, last = self._conjugates
         seen = image.new_empty((len(image), padded[1]))
 
         def begin(part: slice) -> None:
@@ -92,7 +92,7 @@ class OpticalPath:
             return spectrum if last is None else spectrum.mul_(last[:, part].T)
 
         in_blocks(begin, image, len(image), self.finer * seen.numel())
-        dusty = returning if plane is None else self._through(plane, returning)
+        dusty = returning if dust is None else self._through(dust, returning)
         lines = image.new_empty((len(rows), height, padded[1]))
 
         def leaving(part: slice) -> None:
@@ -103,38 +103,61 @@ class OpticalPath:
         self._each_column(leaving)
         return row_adjoint(lines, columns, self.shape[1])
 
-    def _through(self, plane: Tensor, light: Callable[[slice], Tensor]) -> Callable[[slice], Tensor]:
+    def _through(self, dust: Dust, light: Callable[[slice], Tensor]) -> Callable[[slice], Tensor]:
         """The spectrum of a light behind the dust, or before it on the way back: a block of columns ``(block, rows)``.
 
-        What the dust changes is added to the light, so that only the dust's own window is transformed back and forth.
+        What the dust changes is added to the light, so that only rows with dust are transformed back and forth.
         """
-        (height, width), (padded, columns) = self.shape, self.transfer.shape
-        spectrum, window, dust = plane.new_empty((columns, padded)), plane.new_empty((height, columns)), plane - 1
+        padded, columns = self.transfer.shape
+        spectrum = dust.change.new_empty((columns, padded))
+        lines = dust.change.new_empty((len(dust.rows), columns))
 
         def back(part: slice) -> None:
             spectrum[part] = light(part)
-            window[:, part] = torch.fft.ifft(spectrum[part])[:, :height].T
+            lines[:, part] = torch.fft.ifft(spectrum[part])[:, dust.rows].T
 
-        def scatter(rows: slice) -> None:
-            window[rows] = torch.fft.fft(torch.fft.ifft(window[rows])[:, :width].mul_(dust[rows]), n=columns)
+        def scatter(some: slice) -> None:
+            seen = torch.fft.ifft(lines[some])[:, : self.shape[1]]
+            lines[some] = torch.fft.fft(seen.mul_(dust.change[some]), n=columns)
+
+        def ahead(part: slice) -> Tensor:
+            changed = torch.zeros_like(spectrum[part])
+            changed[:, dust.rows] = lines[:, part].T
+            return spectrum[part].add_(torch.fft.fft(changed))
 
         self._each_column(back)
-        in_blocks(scatter, window, height, window.numel())
-        return lambda part: spectrum[part].add_(torch.fft.fft(window[:, part].T, n=padded))
+        in_blocks(scatter, lines, len(lines), lines.numel())
+        return ahead
 
     def _each_column(self, work: Callable[[slice], None]) -> None:
         in_blocks(work, self.transfer, self.transfer.shape[1], self.finer * self.transfer.numel())
 
     @cached_property
-    def _conjugates(self) -> tuple[Tensor, Tensor, Tensor, Tensor | None, Tensor | None]:
+    def _dust(self) -> Dust | None:
+        if self.plane is None:
+            return None
+        rows = (self.plane != 1).any(1).nonzero().flatten()
+        return Dust(rows, self.plane[rows] - 1)
+
+    @cached_property
+    def _conjugates(self) -> tuple[Tensor, Tensor, Tensor, Dust | None, Tensor | None]:
         """Formed once: a lazy conjugate is formed in every product."""
         return (
             conjugate(self.rows),
             conjugate(self.columns),
             conjugate(self.transfer),
-            None if self.plane is None else conjugate(self.plane),
+            None if self._dust is None else Dust(self._dust.rows, conjugate(self._dust.change)),
             None if self.last is None else conjugate(self.last),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Dust:
+    """What specks on a plane change. rows: of the panel, those with any ``(n,)``; change: transmission - 1 there
+    ``(n, W)``."""
+
+    rows: Tensor
+    change: Tensor
 
 
 class _Seen(torch.autograd.Function):

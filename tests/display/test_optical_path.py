@@ -1,5 +1,7 @@
 """The linear part of a bench: its adjoint is the adjoint, and it samples a field as finely as it says."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -30,6 +32,21 @@ def test_the_adjoint_passes_the_dot_product_test(samples, finer, dust):
     image = random(finer * SHAPE[0], finer * SHAPE[1])
     linear = one.forward(field) - one.forward(torch.zeros_like(field))
     assert torch.allclose((image.conj() * linear).sum(), (one.adjoint(image).conj() * field).sum())
+
+
+@pytest.mark.parametrize("dusty", [[], [4], [0, 3, 9], list(range(10))])
+def test_light_passes_the_dust_as_if_every_row_were_transformed(dusty):
+    torch.manual_seed(3)
+    one, field = path(1, 1, dust=True), random(1, 1, *SHAPE)
+    plane = torch.ones(SHAPE, dtype=torch.complex128)
+    plane[dusty, 2:5] = random(len(dusty), 3)
+    beyond = torch.ones(PADDED, dtype=torch.complex128)
+    beyond[: SHAPE[0], : SHAPE[1]] = plane
+    light = torch.fft.fft2(field[0, 0], s=PADDED) * one.rows[0][:, None] * one.columns[0][None, :] + one.still
+    behind = torch.fft.fft2(torch.fft.ifft2(light * one.transfer) * beyond) * one.last
+    assert torch.allclose(
+        replace(one, plane=plane).forward(field), torch.fft.ifft2(behind)[: SHAPE[0], : SHAPE[1]], atol=1e-12
+    )
 
 
 def test_the_gradient_is_the_numerical_one():
