@@ -51,7 +51,8 @@ class _LeastSquares(torch.autograd.Function):
 
 def _dot(a: Tensor, b: Tensor) -> Tensor:
     """Sum of products per image, ``(B, h, w)`` twice to ``(B,)``."""
-    return torch.bmm(a.flatten(1)[:, None, :], b.flatten(1)[:, :, None]).flatten()  # several times as fast as vecdot
+    total: Tensor = torch.linalg.vecdot(a.flatten(1), b.flatten(1))
+    return total
 
 
 def intensity_l2(intensity: Tensor, target: Tensor) -> Tensor:

@@ -14,6 +14,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..optics import AngularSpectrum
+from ..optics.convolution import convolve
 from .common import Bench, Offset, nominal_model, per_channel, with_offset
 from .descent import Best, cosine_decay
 from .initial_phase import InitialPhase, initial_phase
@@ -107,7 +108,10 @@ class Wirtinger:
 
 @dataclass(frozen=True)
 class Objective:
-    """A loss of the intensity in the region as a function of the phase; model, target ``(B, h, w)``, loss fixed."""
+    """A loss of the intensity in the region as a function of the phase; model, target ``(B, h, w)``, loss fixed.
+
+    All have the model's precision.
+    """
 
     model: AngularSpectrum
     region: Region
@@ -120,15 +124,18 @@ class Objective:
         For E = P(exp(i phi)) and I = |E|^2, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
         and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)). dL/dI alone is left to autograd.
         """
-        field = self.model.blank(len(phase))
-        at_panel = _panel(field, phase)
+        height, width = self.model.shape
+        if tuple(phase.shape[-2:]) != (height, width):
+            raise ValueError(f"phase is {tuple(phase.shape[-2:])}, the propagator was made for {self.model.shape}")
+        field = self.model.blank(*phase.shape[:-2])  # padded from the start, if it has to be padded at all
+        at_panel = field[..., :height, :width]
         torch.complex(phase.cos(), phase.sin(), out=at_panel)
-        image = self.model.forward(field)
+        image = convolve(field, self.model.transfer)
         at_image = self.region.crop(image)
         loss, slope = self._slope(at_image)
         at_image.mul_(slope)  # in the place of the field: a new array costs as much as the product
         del slope  # the adjoint takes the most memory
-        returned = _panel(self.model.adjoint(self.region.clear_around(image)), phase)
+        returned = convolve(self.region.clear_around(image), self.model.conjugate)[..., :height, :width]
         return loss, (at_panel.real * returned.imag).addcmul_(at_panel.imag, returned.real, value=-1)
 
     def _slope(self, at_image: Tensor) -> tuple[Tensor, Tensor]:
@@ -137,8 +144,3 @@ class Objective:
         loss = self.loss(intensity, self.target)
         (slope,) = torch.autograd.grad(2 * loss.sum(), intensity)
         return loss.detach(), slope
-
-
-def _panel(field: Tensor, phase: Tensor) -> Tensor:
-    """The part of a field like ``blank`` that is the panel; a view."""
-    return field[..., : phase.shape[-2], : phase.shape[-1]]

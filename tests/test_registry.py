@@ -1,5 +1,7 @@
 """Methods from files."""
 
+import gc
+import weakref
 from pathlib import Path
 
 from holobench_eval import registry
@@ -37,3 +39,10 @@ def test_equal_files_in_two_folders_are_two_modules(tmp_path: Path) -> None:
         (tmp_path / name / "mine.py").write_text(METHOD.format(number=1))
     first, second = (registry.find("methods", "mine.py:Mine", tmp_path / name) for name in ("a", "b"))
     assert first is not second
+
+
+def test_classes_of_files_are_not_kept(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(METHOD.format(number=1))
+    built = [weakref.ref(type(registry.build("methods", "mine.py:Mine", {}, tmp_path))) for _ in range(4)]
+    gc.collect()
+    assert [one() is None for one in built[:-1]] == [True] * 3  # the last is that of the module in use

@@ -15,7 +15,7 @@ from ..optics.phase import blaze
 from ..optics.phasor import phasor, squared_modulus
 from ..seeds import generator
 from .contract import Capture, DisplaySpec
-from .path import OpticalPath, panel_spectrum
+from .path import Dust, OpticalPath, panel_spectrum
 from .profile import Profile
 from .stages import Geometry, Relay
 from .stages.eye import eye_phase
@@ -123,7 +123,7 @@ class SimulatedBench:
                 columns=self.weights[1],
                 still=by_columns(panel_spectrum(self.unmodulated * incident, *self.weights)),
                 transfer=by_columns(transfer),
-                plane=None if plane is None else plane.to(transfer.dtype),
+                dust=None if plane is None else Dust.of(plane.to(transfer.dtype)),
                 last=None if last is None else by_columns(last),
                 finer=self.image_samples,
             ),

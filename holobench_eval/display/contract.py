@@ -34,7 +34,7 @@ class Region:
         return image[..., self.top : self.top + self.height, self.left : self.left + self.width]
 
     def clear_around(self, image: Tensor) -> Tensor:
-        """An image of panel size ``(..., H, W)``, set to zero outside the window, in place."""
+        """An image of panel size or larger, ``(..., H, W)``, set to zero outside the window, in place."""
         bottom, right = self.top + self.height, self.left + self.width
         for outside in (image[..., : self.top, :], image[..., bottom:, :], image[..., : self.left], image[..., right:]):
             outside.zero_()

@@ -15,13 +15,28 @@ from ..optics.blocks import in_blocks
 
 
 @dataclass(frozen=True, eq=False)
+class Dust:
+    """What specks on a plane change. rows: those of the panel that have any ``(n,)``; change: transmission less one
+    ``(n, W)``; it is zero all around."""
+
+    rows: Tensor
+    change: Tensor
+
+    @classmethod
+    def of(cls, plane: Tensor) -> Dust:
+        """From the plane's transmission ``(H, W)``."""
+        rows = (plane != 1).any(1).nonzero().flatten()
+        return cls(rows, plane[rows] - 1)
+
+
+@dataclass(frozen=True, eq=False)
 class OpticalPath:
     """Panel, iris, dust plane and image plane of one colour, on the padded grid.
 
     shape: of the panel; rows, columns: weights ``(samples, padded)`` that add the spectra of the sub-samples, see
     ``stages.propagation.sample_weights``; still: spectrum of the light that no phase changes; transfer: to the dust
-    plane, or all the way where there is none; plane: its transmission ``(H, W)``, one around it; last: transfer
-    function from there to the image; finer: samples a pixel and axis of the image. Work is done a block of rows or
+    plane, or all the way where there is none; dust: what it changes there; last: transfer function from there to the
+    image; finer: samples a pixel and axis of the image. Work is done a block of rows or
     columns at a time, see ``optics.convolution``: transfer functions are best stored column by column.
 
     The adjoint is written out: autograd would keep every factor's input and clear a new array for every crop.
@@ -32,7 +47,7 @@ class OpticalPath:
     columns: Tensor
     still: Tensor
     transfer: Tensor
-    plane: Tensor | None
+    dust: Dust | None
     last: Tensor | None
     finer: int
 
@@ -44,7 +59,7 @@ class OpticalPath:
             columns=self.columns.to(device),
             still=self.still.to(device),
             transfer=self.transfer.to(device),
-            plane=None if self.plane is None else self.plane.to(device),
+            dust=None if self.dust is None else Dust(self.dust.rows.to(device), self.dust.change.to(device)),
             last=None if self.last is None else self.last.to(device),
         )
 
@@ -62,7 +77,7 @@ class OpticalPath:
             light = column_spectra(lines, self.rows, part).add_(self.still[:, part].T)
             return light.mul_(self.transfer[:, part].T)
 
-        dusty = arriving if self._dust is None else self._through(self._dust, arriving)
+        dusty = arriving if self.dust is None else self._through(self.dust, arriving)
         seen = lines.new_empty((height, lines.shape[-1]))
 
         def leaving(part: slice) -> None:
@@ -133,31 +148,15 @@ class OpticalPath:
         in_blocks(work, self.transfer, self.transfer.shape[1], self.finer * self.transfer.numel())
 
     @cached_property
-    def _dust(self) -> Dust | None:
-        if self.plane is None:
-            return None
-        rows = (self.plane != 1).any(1).nonzero().flatten()
-        return Dust(rows, self.plane[rows] - 1)
-
-    @cached_property
     def _conjugates(self) -> tuple[Tensor, Tensor, Tensor, Dust | None, Tensor | None]:
         """Formed once: a lazy conjugate is formed in every product."""
         return (
             conjugate(self.rows),
             conjugate(self.columns),
             conjugate(self.transfer),
-            None if self._dust is None else Dust(self._dust.rows, conjugate(self._dust.change)),
+            None if self.dust is None else Dust(self.dust.rows, conjugate(self.dust.change)),
             None if self.last is None else conjugate(self.last),
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Dust:
-    """What specks on a plane change. rows: of the panel, those with any ``(n,)``; change: transmission - 1 there
-    ``(n, W)``."""
-
-    rows: Tensor
-    change: Tensor
 
 
 class _Seen(torch.autograd.Function):

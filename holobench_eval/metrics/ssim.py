@@ -80,7 +80,7 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
 
 
 def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-    """``LocalStatistics.means`` without a gradient, on a CPU: strip by strip, in ``torch.get_num_threads`` threads."""
+    """``LocalStatistics.means`` without a gradient, on a CPU: strip by strip, in threads where that pays."""
     batch, channels, height, width = image.shape
     planes = [side.detach().reshape(-1, height, width).numpy() for side in (image, target)]
     inner = height - 2 * RADIUS

@@ -43,16 +43,12 @@ class Convolution:
         return self.transfer.shape[-2], self.transfer.shape[-1]
 
     def blank(self, *batch: int) -> Tensor:
-        """A dark field ``(*batch, H, W)`` to write light into, or one that is padded already where that saves a copy.
-
-        ``forward`` and ``adjoint`` take and give it as it is: whatever they find outside ``(H, W)`` must be zero, and
-        what they leave there means nothing.
-        """
+        """A dark field for ``convolve``, ``(*batch, H, W)``, or padded where ``convolve`` would pad it."""
         shape = self.shape if is_large(self.transfer) else self.padded_shape
         return self.transfer.new_zeros((*batch, *shape))
 
     def forward(self, field: Tensor) -> Tensor:
-        """Propagate ``(..., H, W)`` complex to ``(..., H, W)``; differentiable. Or a field like ``blank``."""
+        """Propagate ``(..., H, W)`` complex to ``(..., H, W)``; differentiable."""
         return self._convolve(field, conjugated=False)
 
     def adjoint(self, field: Tensor) -> Tensor:
@@ -67,7 +63,7 @@ class Convolution:
         return conjugate if is_large(conjugate) else conjugate.resolve_conj()
 
     def _convolve(self, field: Tensor, conjugated: bool) -> Tensor:
-        if tuple(field.shape[-2:]) not in (self.shape, self.padded_shape):
+        if tuple(field.shape[-2:]) != self.shape:
             raise ValueError(f"field is {tuple(field.shape[-2:])}, the propagator was made for {self.shape}")
         field = field.to(torch.promote_types(field.dtype, self.transfer.dtype))
         convolved: Tensor = _Convolved.apply(field, self, conjugated)  # type: ignore[no-untyped-call]
@@ -89,7 +85,10 @@ class _Convolved(torch.autograd.Function):
 
 
 def convolve(field: Tensor, transfer: Tensor) -> Tensor:
-    """The first (H, W) samples of the circular convolution of a field ``(..., H, W)``, padded with zeros."""
+    """The first (H, W) samples of the circular convolution of a field ``(..., H, W)``, padded with zeros.
+
+    A field that is padded already stays so: of what is returned, only the panel's part is free of wrapped light.
+    """
     height, width = field.shape[-2:]
     padded = transfer.shape
     if not is_large(transfer):
@@ -154,7 +153,7 @@ def iris(fy: Tensor, fx: Tensor, pitch: float, pupil: float | None) -> Tensor:
     that only several times the padding removes, and an iris a little out of the Fourier plane is not hard.
     """
     if pupil is None:
-        return torch.ones_like(fy + fx)
+        return torch.ones_like(fy + fx, dtype=torch.float64)
     radius = torch.sqrt(fy**2 + fx**2) * (2 * pitch / pupil)
     edge = ((radius - (1 - IRIS_EDGE)) / (2 * IRIS_EDGE)).clamp(0.0, 1.0)
     return 0.5 * (1 + torch.cos(math.pi * edge))

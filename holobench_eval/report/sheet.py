@@ -134,8 +134,9 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     _picture(axes[0], light.abs(), "illumination amplitude, green", "relative amplitude")
     _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
     _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
-    plane = torch.ones(bench.spec.shape) if maps.path.plane is None else maps.path.plane.real
-    _picture(axes[3], plane, "dust on the plane before the image", "amplitude")
+    plane = profile.coherent_noise.plane(maps.geometry)
+    clean = torch.ones(bench.spec.shape)
+    _picture(axes[3], clean if plane is None else plane.real, "dust on the plane before the image", "amplitude")
     f = torch.linspace(-0.5, 0.5, 201, dtype=torch.float64) / bench.spec.pitch
     fy, fx = f[:, None], f[None, :]
     wave = profile.propagation.pupil_phase(fy, fx, maps.geometry, profile.panel.pupil) / (2 * torch.pi)

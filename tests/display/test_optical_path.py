@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from holobench_eval.display.path import OpticalPath, finer_line
+from holobench_eval.display.path import Dust, OpticalPath, finer_line
 from holobench_eval.display.stages.propagation import sample_weights
 
 SHAPE, PADDED = (10, 13), (18, 21)
@@ -15,19 +15,22 @@ def random(*shape):
     return torch.randn(shape, dtype=torch.complex128)
 
 
-def path(samples, finer, dust):
+def path(samples, finer, dust, clean=()):
+    plane = random(*SHAPE)
+    plane[list(clean)] = 1
     rows, columns = (weights.to(torch.complex128) for weights in sample_weights(PADDED, samples, (0.1, 0.2), True))
     last = random(*PADDED) if dust else None
     return OpticalPath(
-        SHAPE, rows, columns, random(*PADDED), random(*PADDED), random(*SHAPE) if dust else None, last, finer
+        SHAPE, rows, columns, random(*PADDED), random(*PADDED), Dust.of(plane) if dust else None, last, finer
     )
 
 
 @pytest.mark.parametrize("dust", [False, True])
+@pytest.mark.parametrize("clean", [[], [0, 4, 5]])
 @pytest.mark.parametrize(("samples", "finer"), [(1, 1), (3, 2), (2, 1)])
-def test_the_adjoint_passes_the_dot_product_test(samples, finer, dust):
+def test_the_adjoint_passes_the_dot_product_test(samples, finer, dust, clean):
     torch.manual_seed(0)
-    one = path(samples, finer, dust)
+    one = path(samples, finer, dust, clean)
     field = random(samples, samples, *SHAPE)
     image = random(finer * SHAPE[0], finer * SHAPE[1])
     linear = one.forward(field) - one.forward(torch.zeros_like(field))
@@ -45,7 +48,7 @@ def test_light_passes_the_dust_as_if_every_row_were_transformed(dusty):
     light = torch.fft.fft2(field[0, 0], s=PADDED) * one.rows[0][:, None] * one.columns[0][None, :] + one.still
     behind = torch.fft.fft2(torch.fft.ifft2(light * one.transfer) * beyond) * one.last
     assert torch.allclose(
-        replace(one, plane=plane).forward(field), torch.fft.ifft2(behind)[: SHAPE[0], : SHAPE[1]], atol=1e-12
+        replace(one, dust=Dust.of(plane)).forward(field), torch.fft.ifft2(behind)[: SHAPE[0], : SHAPE[1]], atol=1e-12
     )
 
 

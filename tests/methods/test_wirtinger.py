@@ -48,6 +48,20 @@ def test_the_gradient_equals_finite_differences(loss, make_bench, scene):
     assert float((ahead - behind) / (2 * h)) == pytest.approx(float(slope), rel=1e-4)
 
 
+def test_a_phase_of_another_size_is_refused(make_bench, scene):
+    problem, phase = pair(make_bench, scene, "intensity_l2")
+    for wrong in (phase[..., :-1], phase[..., :1], torch.zeros(1, *problem.model.padded_shape).double()):
+        with pytest.raises(ValueError, match="made for"):
+            problem.evaluate(wrong)
+
+
+def test_single_precision_is_enough_for_the_sums_of_a_batch_of_large_images():
+    draw = torch.Generator().manual_seed(4)
+    image, target = torch.rand(2, 2, 1080, 1920, generator=draw)
+    exact = LOSSES["intensity_l2"](image.double(), target.double())
+    assert torch.allclose(LOSSES["intensity_l2"](image, target).double(), exact, rtol=1e-5)
+
+
 @pytest.mark.parametrize("loss", list(LOSSES))
 @pytest.mark.parametrize("factor", [0.01, 100.0])
 def test_a_loss_does_not_depend_on_the_light_at_the_image(loss, factor, scene):
