@@ -98,9 +98,9 @@ def _check_nested(who: str, cls: type[Any], params: dict[str, Any], place: str) 
 
 
 @cache
-def _kept_adapter(cls: type[Any]) -> TypeAdapter[Any]:
+def _kept_adapter(kind: Kind, name: str) -> TypeAdapter[Any]:
     """Of an installed class: a file's is made anew with each import, and would be kept for ever."""
-    return TypeAdapter(cls)
+    return TypeAdapter(find(kind, name))
 
 
 def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = None) -> Any:
@@ -112,7 +112,7 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
             raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, known)}")
     _check_nested(f"{kind[:-1]} '{name}'", cls, params, "")
     try:
-        adapter: TypeAdapter[Any] = TypeAdapter(cls) if _is_file(name) else _kept_adapter(cls)
+        adapter: TypeAdapter[Any] = TypeAdapter(cls) if _is_file(name) else _kept_adapter(kind, name)
         return adapter.validate_json(json.dumps(params), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
