@@ -11,10 +11,15 @@ import typer
 
 from .cli_output import console
 
+WHOLE, PART = Path("reports/performance"), Path(".benchmarks/part")
+"""Folders of reports; a part never takes the place of the whole."""
+
 
 def bench(
     only: Annotated[str | None, typer.Option(help="Benchmarks whose names hold this text.")] = None,
-    output: Annotated[Path, typer.Option(help="Where to write the report.")] = Path("reports/performance"),
+    output: Annotated[
+        Path | None, typer.Option(help="Folder of the report, reports/performance; with --only, .benchmarks/part.")
+    ] = None,
     against: Annotated[str | None, typer.Option(help="Compare the working tree with this git revision.")] = None,
 ) -> None:
     """Time propagations, gradient steps, captures, metrics and cells beside others' code, or against a revision."""
@@ -30,7 +35,8 @@ def bench(
     before = machine.describe(load)
     compared = report.beside_others(timings)
     timings = [replace(one, memory=suite.peak_memory(one)) if one.group in compared else one for one in timings]
-    print(report.write(output, timings, before))
+    folder = WHOLE if only is None else PART
+    print(report.write(output or folder, timings, before))
     if not complete:
         print("not all could be timed; what pytest printed says why")
         raise typer.Exit(1)

@@ -53,6 +53,14 @@ def test_the_report_is_written_and_holds_when_it_is_checked(measured, tmp_path):
     assert "does not follow from timings.csv" in checked.output
 
 
+def test_a_part_does_not_take_the_place_of_the_whole(measured, tmp_path, monkeypatch):
+    measured()
+    monkeypatch.chdir(tmp_path)
+    for arguments, place in (([], "reports/performance"), (["--only", "psnr"], ".benchmarks/part")):
+        done = CliRunner().invoke(app, ["bench", *arguments])
+        assert done.stdout.split()[-1] == f"{place}/report.md"
+
+
 def test_what_could_not_be_timed_is_told_by_the_exit_code(measured, tmp_path):
     measured(complete=False)
     done = CliRunner().invoke(app, ["bench", "--output", str(tmp_path)])
