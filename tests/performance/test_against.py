@@ -24,6 +24,16 @@ def test_a_verdict_needs_certainty_and_size(logarithms, verdict):
     assert found.lower < found.ratio < found.upper
 
 
+def test_each_version_is_started_first_as_often_as_the_other(monkeypatch):
+    first = {"a": [], "b": []}
+    monkeypatch.setattr(against, "_lay_out", lambda *_: None)
+    monkeypatch.setattr(against, "_extract", lambda *_: None)
+    monkeypatch.setattr(against, "_start", lambda case, *rest: first[case].append(rest[2]) or len(first[case]) / 100)
+    assert [one.case for one in against.against("HEAD", list(first), lambda *_: None)] == ["a", "b"]
+    for starts in first.values():
+        assert sum(starts) == len(starts) / 2 == against.STARTS / 2
+
+
 def test_more_cases_widen_every_interval():
     logarithms = [0.1, 0.12, 0.08, 0.11, 0.09, 0.1, 0.1]
     one, many = (against.judge("case", logarithms, cases) for cases in (1, 50))
