@@ -65,7 +65,7 @@ class Photographs:
 
     def digest(self, item: str) -> str:
         """SHA-256 of the file inside scikit-image."""
-        return hashlib.sha256(_content(known("photograph", item, self.items()))).hexdigest()
+        return _content_digest(known("photograph", item, self.items()))
 
 
 def _content(name: str) -> bytes:
@@ -74,6 +74,11 @@ def _content(name: str) -> bytes:
     if not source.is_file():
         raise UserError(f"photograph '{name}' is not in the installed scikit-image; install scikit-image>=0.25")
     return source.read_bytes()
+
+
+@cache
+def _content_digest(name: str) -> str:
+    return hashlib.sha256(_content(name)).hexdigest()
 
 
 @cache

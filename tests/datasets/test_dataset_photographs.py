@@ -55,6 +55,7 @@ def test_every_file_ships_with_scikit_image_and_nothing_asks_for_a_download(monk
 
     monkeypatch.setattr("skimage.data._fetchers._fetch", refuse)
     photographs._decoded.cache_clear()
+    photographs._content_digest.cache_clear()
     dataset = Photographs(count=None)
     assert len({dataset.digest(item) for item in dataset.items()}) == len(FILES)
     assert np.isfinite(dataset.load("grass", (16, 16)).numpy()).all()
@@ -62,6 +63,7 @@ def test_every_file_ships_with_scikit_image_and_nothing_asks_for_a_download(monk
 
 def test_a_file_missing_from_scikit_image_is_one_line(monkeypatch):
     monkeypatch.setitem(FILES, "brick", "no-such-file.png")
+    photographs._content_digest.cache_clear()
     with pytest.raises(UserError, match="'brick' is not in the installed scikit-image"):
         Photographs().digest("brick")
 
