@@ -119,29 +119,42 @@ def run(
             device=device,
         )
         if missing:  # else no worker need be started
-            untrained = _untrained(plan, missing, setting)
-            if untrained:
-                watch.training([(needed.name, Artifacts(artifacts).place(needed)) for needed in untrained])
-            unlearned = {needed.id for needed in untrained}
-            trainings = [TrainingJob(needed, artifacts, threads, device) for needed in untrained]
-            at_work: list[Step] = []
-            single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
-            jobs = _jobs(plan, missing, missing if single else timed, setting)
-            steps = queue(trainings, jobs, unlearned, at_work)
-            results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, at_work, watch))
-            for one, made in results:
-                at_work.remove(one)
-                if isinstance(one, TrainingJob):
-                    reason = made if isinstance(made, str) else Artifacts(artifacts).fail(one.needed, _error(made))
-                    unlearned.discard(one.needed.id)
-                    watch.trained(one.needed.name, reason)
-                else:
-                    records = made if isinstance(made, list) else _lost(one, _error(made), store)
-                    _refuse_unseen(records, store)
-                    watch.finished(records)
+            _compute(plan, missing, timed, setting, executor, watch)
         if described.get("ended") is None:
             described = provenance.end(output, described)
         return Outcome(store.load(plan), described, len(missing))
+
+
+def _compute(
+    plan: Plan,
+    missing: frozenset[str],
+    timed: frozenset[str],
+    setting: Setting,
+    executor: Executor,
+    watch: Watch,
+) -> None:
+    """Train what missing cells need and is not there, then compute them, those of ``timed`` alone."""
+    artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
+    untrained = _untrained(plan, missing, setting)
+    if untrained:
+        watch.training([(needed.name, artifacts.place(needed)) for needed in untrained])
+    unlearned = {needed.id for needed in untrained}
+    trainings = [TrainingJob(needed, setting.artifacts, setting.threads, setting.device) for needed in untrained]
+    at_work: list[Step] = []
+    single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
+    jobs = _jobs(plan, missing, missing if single else timed, setting)
+    steps = queue(trainings, jobs, unlearned, at_work)
+    results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, at_work, watch))
+    for one, made in results:
+        at_work.remove(one)
+        if isinstance(one, TrainingJob):
+            reason = made if isinstance(made, str) else artifacts.fail(one.needed, _error(made))
+            unlearned.discard(one.needed.id)
+            watch.trained(one.needed.name, reason)
+        else:
+            records = made if isinstance(made, list) else _lost(one, _error(made), store)
+            _refuse_unseen(records, store)
+            watch.finished(records)
 
 
 def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
