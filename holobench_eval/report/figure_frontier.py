@@ -28,6 +28,8 @@ ZERO_GAP = 0.14
 """Width, relative to that of the logarithmic part, between the place of zero and the smallest cost."""
 SPREAD = 0.02
 """The same, between marks without any cost, which stand side by side so that none hides another."""
+NAMED_EACH = 2
+"""Up to so many marks of a method each get a name; more are a curve, and the method's name stands at its end."""
 
 
 @dataclass(frozen=True)
@@ -250,7 +252,7 @@ def _name_all(axes: Axes, panel: Frontier, costs: Costs) -> None:
         names.along(line.label, line.quality)
     for marks in sorted(joined, key=len, reverse=True):
         last = marks[-1]
-        if last.cost > marks[0].cost:
+        if len(marks) > NAMED_EACH and last.cost > marks[0].cost:
             names.beside(last.group.rpartition(":")[2], costs.position(last), last.quality)
             continue
         for mark in marks:

@@ -53,7 +53,7 @@ def test_no_two_names_overlap_and_none_leaves_its_panel(found, tmp_path, drawn):
     assert [path.name for path, _ in files] == ["quality-captures.png", "quality-time.png"]
     for axes in {axes for *_, axes in drawn}:
         names = [(text, box) for text, box, where in drawn if where is axes]
-        assert len(names) == 9 + 2  # eleven rows of nine methods, floor and ceiling
+        assert len(names) == 11 + 2  # eleven rows, floor and ceiling
         assert overlaps(names) == []
         assert all(axes.bbox.x0 <= box.x0 and box.x1 <= axes.bbox.x1 for _, box in names)
     for path, _ in files:
@@ -68,12 +68,19 @@ def test_rows_of_one_method_are_joined_by_their_captures_and_named_once(tmp_path
     monkeypatch.setattr(
         matplotlib.axes.Axes, "plot", lambda self, *given, **k: lines.append(given) or plot(self, *given, **k)
     )
-    marks = (mark("many", 100, 22, group="m.py:Same"), mark("few", 10, 20, group="m.py:Same"), mark("other", 10, 21))
+    same = [mark(str(cost), cost, quality, group="m.py:Same") for cost, quality in ((100, 22), (10, 20), (30, 21))]
+    marks = (*same, mark("other", 10, 21))
     draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "captures")
     assert [text for text, *_ in drawn] == ["Same", "other"]
-    joined = [given for given in lines if list(given[1]) == [20, 22]]
+    joined = [given for given in lines if list(given[1]) == [20, 21, 22]]
     assert len(joined) == 1
-    assert joined[0][0] == pytest.approx([1, 2])
+    assert joined[0][0] == pytest.approx([1, 1.4771, 2], rel=1e-4)
+
+
+def test_two_rows_of_one_method_are_each_named(tmp_path, drawn):
+    marks = (mark("wirtinger", 3, 17, group="w"), mark("wirtinger, no offset", 2.9, 19, group="w"))
+    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "seconds")
+    assert sorted(text for text, *_ in drawn) == ["wirtinger", "wirtinger, no offset"]
 
 
 def test_rows_of_one_method_that_cost_the_same_are_each_named(tmp_path, drawn):
