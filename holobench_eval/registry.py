@@ -84,11 +84,12 @@ def _checked(kind: Kind, name: str, found: Any) -> type[Any]:
 
 def _check_nested(who: str, cls: type[Any], params: dict[str, Any], place: str) -> None:
     """Refuse keys of nested parameters that are no fields of the dataclass they are for; pydantic would drop them."""
-    hints = get_type_hints(cls)
-    for key, value in params.items():
+    mappings = {key: value for key, value in params.items() if isinstance(value, dict)}
+    hints = get_type_hints(cls) if mappings else {}  # a tenth of a millisecond, for every cell
+    for key, value in mappings.items():
         nested = [part for part in (hints.get(key), *get_args(hints.get(key))) if isinstance(part, type)]
         inner = next((part for part in nested if is_dataclass(part)), None)
-        if not isinstance(value, dict) or inner is None:
+        if inner is None:
             continue
         allowed = [item.name for item in fields(inner)]
         for name in value:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import torch
@@ -188,10 +188,8 @@ def row_spectra(field: Tensor, columns: Tensor) -> Tensor:
 
     def join(rows: slice) -> None:
         for line, samples in zip(lines, field, strict=True):
-            joined = torch.zeros(())
-            for sample, weights in zip(samples, columns, strict=True):
-                joined = torch.fft.fft(sample[rows], n=len(weights)).mul_(weights).add_(joined)
-            line[rows] = joined
+            each = zip(samples, columns, strict=True)
+            line[rows] = _sum(torch.fft.fft(sample[rows], n=len(weights)).mul_(weights) for sample, weights in each)
 
     in_blocks(join, field, field.shape[2], lines.numel() * field.shape[1])
     return lines
@@ -199,10 +197,13 @@ def row_spectra(field: Tensor, columns: Tensor) -> Tensor:
 
 def column_spectra(lines: Tensor, rows: Tensor, part: slice) -> Tensor:
     """Spectrum ``(block, padded)`` of a block of columns of the panel, from the spectra of its rows."""
-    total = torch.zeros(())
-    for line, weights in zip(lines, rows, strict=True):
-        total = torch.fft.fft(line[:, part].T, n=len(weights)).mul_(weights).add_(total)
-    return total
+    each = zip(lines, rows, strict=True)
+    return _sum(torch.fft.fft(line[:, part].T, n=len(weights)).mul_(weights) for line, weights in each)
+
+
+def _sum(terms: Iterator[Tensor]) -> Tensor:
+    """Of at least one term, in the first one's place."""
+    return reduce(Tensor.add_, terms)
 
 
 def row_adjoint(lines: Tensor, columns: Tensor, width: int) -> Tensor:
