@@ -210,7 +210,11 @@ def report(config: Config, output: Output = None) -> None:
     store = Store(folder)
     if not store.folder.is_dir():
         raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
-    write_report(console_for_people(), study, store.load(planning.plan(study)), folder, provenance.read(folder))
+    records = store.load(planning.plan(study))
+    if all(record["state"] == "missing" for record in records):
+        changed = "the study, the code or the metrics that this machine can compute have changed"
+        raise UserError(f"{folder}: no cell of this study has a record here ({changed}); holoeval run {config}")
+    write_report(console_for_people(), study, records, folder, provenance.read(folder))
 
 
 @app.command("list")

@@ -27,7 +27,7 @@ def check_metrics(study: Study, document: Document) -> None:
             raise document.error(("protocol", "metrics", index), message)
     if study.measure == "focus" and study.headline in SCORES:
         return
-    columns = {f"{metric.name}_{domain}": metric for metric in known.values() for domain in metric.domains}
+    columns = {column: metric for metric in known.values() for column in metric.columns}
     if study.headline not in columns:
         choice = [*columns, *(SCORES if study.measure == "focus" else ())]
         raise document.error(("headline",), f"unknown metric '{study.headline}'; {suggest(study.headline, choice)}")

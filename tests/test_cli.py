@@ -91,6 +91,12 @@ def test_a_study_from_run_to_check(
     assert holoeval(monkeypatch, "report", config) == 0
     assert [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
 
+    another = config.with_name("another.yaml")
+    another.write_text(f"{config.read_text()}\nseed: 99\n")
+    assert holoeval(monkeypatch, "report", another, "--output", "reports/toy") == 2
+    assert "no cell of this study has a record here" in capsys.readouterr().err
+    assert [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
+
     assert holoeval(monkeypatch, "check") == 0
     Path("reports/toy/table.csv").write_text("changed")
     assert holoeval(monkeypatch, "check") == 1

@@ -54,6 +54,11 @@ class Metric:
     differentiable: bool = True
     available: Callable[[], str | None] = always
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of its scores of a capture, one a domain."""
+        return tuple(f"{self.name}_{domain}" for domain in self.domains)
+
 
 def paired(image: Tensor, target: Tensor, smallest: int = 1) -> tuple[Tensor, Tensor]:
     """Both images as (B, C, H, W), checked.

@@ -119,8 +119,9 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
     busy = "" if load is None else f"; load before: {load}"
     parts = [
         "# Speed",
-        f"Medians of repeated calls in one run, after a warm-up, on {machine['threads']} threads of "
-        f"{machine['cpu']} ({machine['platform']}), {machine['date']}; revision {machine['revision']}{dirty}; Python "
+        "Medians of repeated calls in one run, after a warm-up, with arrays at new places in memory for each, on "
+        f"{machine['threads']} threads of {machine['cpu']} ({machine['platform']}), {machine['date']}; revision "
+        f"{machine['revision']}{dirty}; Python "
         f"{machine['python']}, {packages}{busy}. Memory copies {bandwidth / 1e9:.1f} GB/s (read and written). "
         "Compare ratios, not seconds; another machine has others. `holoeval bench` makes this report.",
     ]
@@ -220,6 +221,7 @@ def chart(timings: Sequence[Timing], path: Path) -> None:
     """Bars: the time of every version of a step over this package's, a panel a distance; nothing without rivals."""
     compared = [rows for rows in beside_others(timings).values() if _ours(rows)]
     if not compared:
+        path.unlink(missing_ok=True)  # of benchmarks that were timed before
         return
     with style():
         figure = new_figure(900, 60 + 34 * sum(len(rows) + 1 for rows in compared))

@@ -102,10 +102,13 @@ def peak_memory(timing: Timing) -> float | None:
     return json.loads(done.stdout) if done.returncode == 0 else None
 
 
-def worker(place: Path) -> subprocess.Popen[str]:
-    """A process that times benchmarks on request, with the package from the folder ``place`` and nowhere else."""
+def worker(place: Path, layouts: int = 0) -> subprocess.Popen[str]:
+    """A process that times benchmarks on request, with the package from the folder ``place`` and nowhere else.
+
+    layouts: seed of where arrays lie in memory, which is drawn anew for each answer.
+    """
     return subprocess.Popen(
-        [sys.executable, str(suite() / "worker.py"), "--from", str(place)],
+        [sys.executable, str(suite() / "worker.py"), "--from", str(place), str(layouts)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

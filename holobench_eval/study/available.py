@@ -38,8 +38,7 @@ def refuse_unscored(study: Study) -> None:
 
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics or ()
     for metric in catalogue(None if weights is None else Path(weights)):
-        heads = study.headline in (f"{metric.name}_{domain}" for domain in metric.domains)
-        if (metric.name in wanted or heads) and (reason := metric.available()):
+        if (metric.name in wanted or study.headline in metric.columns) and (reason := metric.available()):
             raise UserError(f"metric '{metric.name}' cannot be computed here: {reason}")
 
 

@@ -95,7 +95,8 @@ def _code(file: Path, _modified: int) -> tuple[str, frozenset[Path]]:
 def harness_digest() -> str:
     """SHA-256 of the code between a phase and its score: a record of another simulator is another record.
 
-    Comments and docstrings do not count; nor do drivers and the exchange of files with a real bench.
+    Comments and docstrings of modules, classes and functions do not count; nor do drivers and the exchange of files
+    with a real bench.
     """
     package = Path(__file__).parents[1]
     folders = [package / name for name in ("optics", "display", "metrics")]

@@ -327,14 +327,17 @@ def _ids(*needed: Preparation | None) -> tuple[str, ...]:
 
 
 def _metrics(study: Study) -> tuple[str, ...]:
-    """Name and version of every wanted metric that can be computed here: LPIPS needs weights that may come later."""
+    """Name and version of the metrics that the study names, wherever it is planned; else of all that can be computed
+    here, and the headline's: LPIPS needs weights that may come later."""
     from ..metrics import catalogue
 
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics
     known = catalogue(None if weights is None else Path(weights))
-    computed = [metric for metric in known if metric.available() is None and (wanted is None or metric.name in wanted)]
+    if wanted is None:
+        wanted = tuple(one.name for one in known if one.available() is None or study.headline in one.columns)
+    computed = [metric for metric in known if metric.name in wanted]
     names = [f"{metric.name} {metric.version}" for metric in computed]
-    names += ["speckle_contrast"] if wanted is not None and "speckle_contrast" in wanted else []
+    names += ["speckle_contrast"] if "speckle_contrast" in wanted else []
     return (*names, IN_FOCUS) if study.measure == "focus" else tuple(names)
 
 

@@ -1,7 +1,8 @@
 """Times cases on request, so that two processes with two versions of the package can take turns.
 
-``worker.py --from FOLDER``, the package being taken from there, reads lines from standard input: a case's name and how
-often to call it. Answers each with a line of JSON: seconds, or why there is none. ``worker.py --names`` lists all;
+``worker.py --from FOLDER SEED``, the package being taken from there, reads lines from standard input: a case's name and
+how often to call it. Answers each with a line of JSON: seconds, or why there is none; the seed decides where arrays lie
+in each, see ``layout``. ``worker.py --names`` lists all;
 ``worker.py --memory NAME`` prints the most memory that a case holds while it is called, in bytes, beyond what its
 process had before it was prepared.
 """
@@ -13,9 +14,13 @@ from contextlib import suppress
 from importlib.machinery import PathFinder
 
 import torch
+from layout import Layout
 
 PACKAGE = "holobench_eval"
 THREADS = 2
+SETTLED = 0.03
+"""Seconds until the idle threads of another process, which took the turn before, have stopped watching for work: they
+keep a core busy for up to 20 ms."""
 
 
 class OnlyFrom:
@@ -36,8 +41,9 @@ class OnlyFrom:
 def main():
     option, *rest = sys.argv[1:]
     if option == "--from":
-        sys.meta_path.insert(0, OnlyFrom(*rest))
-        serve()
+        folder, seed = rest
+        sys.meta_path.insert(0, OnlyFrom(folder))
+        serve(Layout(seed))
     elif option == "--memory":
         print(json.dumps(memory(known()[rest[0]])))
     elif option == "--names":
@@ -56,13 +62,17 @@ def known():
     return {case.name: case for case in CASES}
 
 
-def serve():
+def serve(layout):
     ready = {}
     for line in sys.stdin:
         name, _, calls = line.rstrip("\n").rpartition("\t")
         try:
             if name not in ready:
                 ready = {name: known()[name].work().call}
+                ready[name]()
+            layout.redraw()
+            time.sleep(SETTLED)
+            if int(calls) > 1:  # a single call is a long one, beside which the pages of new places are nothing
                 ready[name]()
             started = time.perf_counter()
             for _ in range(int(calls)):

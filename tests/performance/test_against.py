@@ -1,7 +1,13 @@
 """One revision against another: what the verdict says, and that two processes really take turns with two packages."""
 
+import math
 import re
 import subprocess
+from collections import Counter
+from contextlib import contextmanager
+from pathlib import Path
+from random import Random
+from types import SimpleNamespace
 
 import pytest
 
@@ -32,6 +38,42 @@ def test_each_version_is_started_first_as_often_as_the_other(monkeypatch):
     assert [one.case for one in against.against("HEAD", list(first), lambda *_: None)] == ["a", "b"]
     for starts in first.values():
         assert sum(starts) == len(starts) / 2 == against.STARTS / 2
+
+
+HERE, THERE = Path("here"), Path("there")
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """Processes that take 0.3 s a call here and 0.2 s there; the places and seeds they were started with."""
+    begun = []
+
+    @contextmanager
+    def worker(place, layouts):
+        begun.append((place, layouts))
+        yield SimpleNamespace(place=place, kill=lambda: None)
+
+    monkeypatch.setattr(against, "worker", worker)
+    monkeypatch.setattr(against, "_timed", lambda one, *_: 0.3 if one.place == HERE else 0.2)
+    return begun
+
+
+@pytest.mark.parametrize("here_first", [True, False])
+def test_a_slower_working_tree_has_a_ratio_above_one_whichever_is_started_first(started, here_first):
+    assert math.exp(against._start("case", HERE, THERE, here_first, Random(1))) == pytest.approx(1.5)
+    assert [place for place, _ in started] == ([HERE, THERE] if here_first else [THERE, HERE])
+    assert len({layouts for _, layouts in started}) == 2
+
+
+def test_disturbed_turns_do_not_count(started, monkeypatch):
+    turns = Counter()
+
+    def timed(one, *_):
+        turns[one.place] += 1
+        return 5.0 if one.place == HERE and turns[HERE] in (4, 9) else 0.2
+
+    monkeypatch.setattr(against, "_timed", timed)
+    assert against._start("case", HERE, THERE, True, Random(1)) == 0
 
 
 def test_more_cases_widen_every_interval():
@@ -65,6 +107,12 @@ def test_an_unknown_revision_is_one_line_and_never_an_option(repository, tmp_pat
 def test_whatever_names_a_commit_is_a_revision(repository, tmp_path, revision):
     extracted = against._extract(revision, tmp_path / "extracted")
     assert (extracted / "file").read_text() == "text\n"
+
+
+def test_a_revision_without_its_packages_is_one_line(tmp_path):
+    (tmp_path / "pyproject.toml").write_text('[tool.setuptools.package-dir]\nholobench_eval = "holobench_eval"\n')
+    with pytest.raises(UserError, match="has no folder holobench_eval, which its pyproject"):
+        against._lay_out(tmp_path, tmp_path / "out")
 
 
 def test_without_git_there_is_nothing_to_compare_with(tmp_path, monkeypatch):

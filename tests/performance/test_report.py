@@ -50,7 +50,8 @@ def test_a_report_follows_from_its_timings(tmp_path):
     assert "does not follow" in report.problems(tmp_path)[0]
 
 
-def test_without_others_there_is_no_chart(tmp_path):
+def test_without_others_there_is_no_chart_nor_an_earlier_one(tmp_path):
+    report.write(tmp_path, TIMINGS, MACHINE)
     report.write(tmp_path, TIMINGS[-1:], MACHINE)
     assert not (tmp_path / "ratios.png").exists()
     assert "ratios.png" not in (tmp_path / "report.md").read_text()
