@@ -213,7 +213,8 @@ def report(config: Config, output: Output = None) -> None:
     records = store.load(planning.plan(study))
     if all(record["state"] == "missing" for record in records):
         changed = "the study, the code or the metrics that this machine can compute have changed"
-        raise UserError(f"{folder}: no cell of this study has a record here ({changed}); holoeval run {config}")
+        again = f"holoeval run {config} --output {folder}"
+        raise UserError(f"{folder}: no cell of this study has a record here ({changed}); {again} computes them")
     write_report(console_for_people(), study, records, folder, provenance.read(folder))
 
 

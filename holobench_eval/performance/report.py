@@ -130,7 +130,7 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
             "## One gradient step beside others",
             "Loss and gradient of the squared intensity error, from a random phase, which fills the band: the hardest "
             "case. *error*: relative rms error of the field at the image plane against the reference setting (four "
-            "times padded, complex128). *slower*: its median over that of this package. *memory*: the most that a "
+            "times padded, complex128). *over ours*: its median over that of this package. *memory*: the most that a "
             "process of its own holds beyond what it had before. odak's frequencies lie half a sample off, so its "
             "picture is displaced; every package's documented way is timed, whatever more it computes.",
             f"![Times over that of holobench_eval, for each version and distance]({CHART})",
@@ -189,7 +189,7 @@ def _compared(rows: Sequence[Timing]) -> str:
                 one.rounds,
             )
         )
-    headings = ("version", "median [ms]", "quartiles [ms]", "slower", "padded", "error", "memory [MiB]", "calls")
+    headings = ("version", "median [ms]", "quartiles [ms]", "over ours", "padded", "error", "memory [MiB]", "calls")
     return table(headings, lines)
 
 
