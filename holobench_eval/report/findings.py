@@ -88,7 +88,7 @@ def _leading(results: Results, condition: str, ranking: Sequence[str], among: st
     else:
         compared, intro = [best], f"; against the baseline {baseline}, which has"
     for test in results.against_baseline:
-        if test.condition == condition and test.second in compared:
+        if test.condition == condition and test.second in compared and test.complete:
             if best == baseline:
                 return [f"{sentence}{intro} {test.second}, differs by {_margin(score, test)}."]
             other = score.with_unit(results.row(test.first, condition)[score.key])

@@ -67,6 +67,14 @@ def test_a_method_with_a_hole_is_not_ranked_and_said_so():
     assert "Not ranked, since they lack targets: lucky (7 of 8)" in text
 
 
+def test_a_baseline_without_a_score_is_not_compared_with():
+    text = sentences(results_of({"old": {"psnr_linear": np.full(8, np.nan)}, "new": psnr(18.0)}))["bench"]
+    assert "new, PSNR 18.05" in text
+    assert "against the baseline" not in text.partition(". ")[0]
+    assert "–" not in text
+    assert "Not ranked, since they lack targets: old (0 of 8)" in text
+
+
 def test_a_ranking_that_blur_flips_is_reported_with_the_width():
     sharp = {"psnr_linear": 18 + NOISE, "psnr_linear_blur0.5": 19 + NOISE, "psnr_linear_blur1": 20 + NOISE}
     noisy = {"psnr_linear": 17 + NOISE, "psnr_linear_blur0.5": 18 + NOISE, "psnr_linear_blur1": 22 + NOISE}
