@@ -8,8 +8,10 @@ import json
 import sys
 from dataclasses import fields, is_dataclass
 from functools import cache, lru_cache
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import CodeType
 from typing import Any, Literal, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
@@ -51,6 +53,17 @@ def _is_file(name: str) -> bool:
     return ".py:" in name
 
 
+class _FromSource(SourceFileLoader):
+    """Compiles a file anew for every import.
+
+    Cached bytecode is valid for a source of the same size and the same second, so a file that is rewritten within a
+    second would run as it was before.
+    """
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
 def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     file, _, attribute = name.rpartition(":")
     candidates = [Path(file)] if folder is None else [folder / file, Path(file)]
@@ -59,7 +72,8 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
         raise UserError(f"{kind[:-1]} '{name}': no such file: {candidates[0]}")
     # the name differs from path to path, and the module is registered since dataclasses look their module up
     unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
-    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}_{unique}", path)
+    unique = f"holobench_user_{path.stem}_{unique}"
+    spec = importlib.util.spec_from_file_location(unique, path, loader=_FromSource(unique, str(path)))
     if spec is None or spec.loader is None:
         raise UserError(f"{kind[:-1]} '{name}': {path} is no Python file")
     module = importlib.util.module_from_spec(spec)  # anew each time: no cell may depend on those computed before it

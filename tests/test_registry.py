@@ -1,8 +1,12 @@
 """Methods from files."""
 
 import gc
+import os
+import sys
 import weakref
 from pathlib import Path
+
+import pytest
 
 from holobench_eval import registry
 
@@ -46,3 +50,14 @@ def test_classes_of_files_are_not_kept(tmp_path: Path) -> None:
     built = [weakref.ref(type(registry.build("methods", "mine.py:Mine", {}, tmp_path))) for _ in range(4)]
     gc.collect()
     assert [one() is None for one in built[:-1]] == [True] * 3  # the last is that of the module in use
+
+
+def test_a_file_is_never_run_from_bytecode_of_an_earlier_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    file = tmp_path / "mine.py"
+    for number in (1, 2):  # equal size and equal time, which is all that bytecode is checked by
+        file.write_text(METHOD.format(number=number))
+        os.utime(file, (1e9, 1e9))
+        assert registry.build("methods", "mine.py:Mine", {}, tmp_path).number == number
