@@ -153,12 +153,13 @@ def _sheets(console: Console, study: Study, output: Path, threads: int) -> None:
     from .display import load_profile
     from .report.sheet import drawn_from, save_sheet
     from .study.bench import condition, simulated
-    from .study.identity import digest, harness_digest
+    from .study.identity import digest
+    from .study.versions import HARNESS
 
     for source in study.display.profiles:  # learned and real displays have no stages
         place = condition(source, study.display.panel, study.folder)
         path = output / "figures" / f"stages-{place.name}.png"
-        wanted = digest([place.digest, list(place.spec.shape), study.seed, harness_digest()])
+        wanted = digest([place.digest, list(place.spec.shape), study.seed, HARNESS])
         if drawn_from(path) != wanted:
             console.print(f"drawing the stages of {place.name}", markup=False)
             torch.set_num_threads(threads)

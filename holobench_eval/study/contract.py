@@ -10,7 +10,8 @@ from torch import Tensor
 
 from ..display import MeteredBench, Workbench, load_profile, open_bench
 from ..seeds import generator
-from .identity import canonical, code_digest, params_of
+from .identity import canonical, params_of
+from .versions import method_version
 
 PLAIN_PANEL, CAMERA_PANEL = (64, 64), (128, 128)
 """A display that is photographed needs a region large enough to register its camera."""
@@ -56,7 +57,7 @@ def _check_parameters(cls: type[Any], instance: Any) -> None:
         assert isinstance(getattr(cls, flag, False), bool), f"{name}.{flag} must be True or False"
         assert flag not in {item.name for item in fields(cls)}, f"{name}.{flag} must be a ClassVar, not a parameter"
     canonical(params_of(instance))
-    assert code_digest(cls) == code_digest(cls), f"the code of {name} cannot be identified"
+    assert method_version(cls) == method_version(cls), f"the code of {name} cannot be identified"
     assert callable(getattr(instance, "solve", None)), f"{name} has no method 'solve'"
     assert replace(instance) == instance, f"{name} is not equal to its own copy; remove eq=False"
 

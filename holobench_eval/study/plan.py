@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from .. import registry
 from ..errors import UserError
 from .bench import LEARNED, Condition, Rig, condition, real_condition
-from .identity import code_digest, digest, harness_digest
+from .identity import digest
 from .preparation import Preparation, check_unseen, preparation
 from .stacks import VERSION as IN_FOCUS
 from .stacks import Showing, Target, planes_a_scene, planes_of, showings
+from .versions import HARNESS, method_version
 
 if TYPE_CHECKING:
     from ..config import MethodEntry, Study
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 REFERENCE = "reference"
 """The condition of the floor cells."""
 Made = tuple[str, str, Mapping[str, Any]]
-"""Method, digest of its code, parameters."""
+"""Method, its version, parameters."""
 FLOORS = (
     "floor_constant",
     "floor_black",
@@ -38,11 +39,11 @@ FLOORS = (
 class Cell:
     """One number of every table: the plain description that is hashed to name its record.
 
-    method: registered name or ``file.py:Class``; method_sha256: its code (``identity.code_digest``); params:
+    method: registered name or ``file.py:Class``; method_sha256: its version (``versions.method_version``); params:
     all of them; target_sha256: digest of the source image; profile_version, profile_sha256: of the display;
     panel: rows and columns in pixels; condition: name of the display, or ``reference`` for the floor;
-    repeat, seed: names of the noise; harness_sha256: code of optics, bench, registration and metrics
-    (``identity.harness_digest``); metrics: name and version of every metric that can be computed here; measure: what
+    repeat, seed: names of the noise; harness_sha256: version of optics, bench, registration and metrics
+    (``versions.HARNESS``); metrics: name and version of every metric that can be computed here; measure: what
     is scored, ``picture``, ``prediction`` or ``focus``; holograms: whose captures are predicted (empty for pictures);
     prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the
     most that the display allows while the target is solved (None: no limit); change: kind and value of what has changed
@@ -230,13 +231,8 @@ class _Ground:
 
     @cached_property
     def probe_sha256(self) -> str:
-        """The code of the method whose captures are predicted."""
-        return code_digest(registry.find("methods", self.study.holograms.name, self.study.folder))
-
-    @cached_property
-    def harness_sha256(self) -> str:
-        """The code between a phase and its score."""
-        return harness_digest()
+        """The version of the method whose captures are predicted."""
+        return method_version(registry.find("methods", self.study.holograms.name, self.study.folder))
 
     def cell(
         self,
@@ -250,12 +246,12 @@ class _Ground:
     ) -> Cell:
         """A cell; ``target`` is a name and its digest, ``made`` says by what the picture is made."""
         study = self.study
-        method, code, params = made
+        method, version, params = made
         holograms = study.holograms
         probe = {"name": holograms.name, "params": holograms.params, "sha256": self.probe_sha256}
         return Cell(
             method=method,
-            method_sha256=code,
+            method_sha256=version,
             params=params,
             dataset=study.targets.dataset,
             dataset_params=study.targets.params,
@@ -269,7 +265,7 @@ class _Ground:
             repeat=repeat,
             seed=study.seed,
             protocol=study.protocol.version,
-            harness_sha256=self.harness_sha256,
+            harness_sha256=HARNESS,
             metrics=self.metrics,
             exposure=study.display.exposure,
             measure=study.measure,
@@ -283,7 +279,7 @@ class _Ground:
     def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
         cls = registry.find("methods", entry.name, self.study.folder)
-        made = (entry.name, code_digest(cls), entry.params)
+        made = (entry.name, method_version(cls), entry.params)
         for showing in self._showings(cls, shown, targets):
             places = tuple(place for _, place in showing)
             own = preparation(self.study, entry.name, entry.params, places[0].nominal)

@@ -23,12 +23,12 @@ from ..report.results import Results
 from ..report.tables import records_frame
 from ..report.wording import FILES
 from . import provenance
-from .identity import harness_digest
 from .installed import installed
 from .picture_folders import Folders, read_folders
 from .progress import SECONDS_BETWEEN_LINES
-from .scored_pictures import CONDITION, Said, Scoring, geometry_digest
+from .scored_pictures import CONDITION, Said, Scoring
 from .store import Store
+from .versions import ALIGNMENT, HARNESS
 
 VALUES = ("stored", "srgb", "linear")
 """How files are read: as they are; captures and targets as sRGB; captures as linear light and targets as sRGB."""
@@ -93,7 +93,7 @@ def _provenance(folders: Folders, values: str) -> dict[str, Any]:
     files |= {f"targets/{name}": one.sha256 for name, one in folders.targets.items()}
     return {
         "package": __version__,
-        "code_sha256": {"metrics": harness_digest(), "alignment": geometry_digest()},
+        "code_sha256": {"metrics": HARNESS, "alignment": ALIGNMENT},
         "files": files,
         "values": values,
         "python": platform.python_version(),

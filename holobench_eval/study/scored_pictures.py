@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..capture import align as aligning
-from ..capture import features, likeness, second_opinion, shared_pose, warp
 from ..capture.align import Alignment, align, confirmed, gray
 from ..capture.second_opinion import disagreement, second_warp
 from ..capture.shared_pose import sampled, shared
@@ -26,11 +23,12 @@ from ..metrics.protocol import VERSION
 from ..optics.colour import srgb_decode, srgb_encode
 from ..report.figure_alignment import alignment_name, draw_alignment
 from ..report.wording import FILES
-from .identity import digest, harness_digest
+from .identity import digest
 from .images import write_thumbnail
 from .picture_folders import Folders, Picture, Values
 from .plan import FLOORS, REFERENCE
 from .store import Record, Store, write_atomically
+from .versions import ALIGNMENT, HARNESS
 
 CONDITION = "photographed display"
 
@@ -40,12 +38,6 @@ Found = dict[Key, Alignment | str]
 """Alignments, or the reasons why there are none."""
 Said = Callable[[str], None]
 """Told the name of each step."""
-
-
-@lru_cache(maxsize=1)
-def geometry_digest() -> str:
-    """sha256 of the code that puts a capture on the pixels of its target; see ``identity.harness_digest``."""
-    return digest([inspect.getsource(one) for one in (aligning, features, likeness, second_opinion, shared_pose, warp)])
 
 
 @dataclass(frozen=True)
@@ -95,7 +87,7 @@ class Scoring:
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
             target = self.folders.targets[key[1]]
-            identity = digest([picture.sha256, target.sha256, self.values == "linear", geometry_digest()])
+            identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT])
             path = self.store.folder / f"alignment-{identity}.json"
             known = _read(path)
             if known is None:
@@ -253,8 +245,8 @@ class Scoring:
             "geometry": geometry,
             "protocol": VERSION,
             "metrics": self.metrics,
-            "harness_sha256": harness_digest(),
-            "code_sha256": geometry_digest(),
+            "harness_sha256": HARNESS,
+            "code_sha256": ALIGNMENT,
         }
 
 

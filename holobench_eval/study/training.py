@@ -20,10 +20,10 @@ from ..display.workbench import Workbench
 from ..errors import CellError, LostDeviceError, Pending
 from .artifacts import Artifacts
 from .bench import workbench
-from .identity import code_digest, harness_digest
 from .job import repeatable
 from .preparation import Preparation
 from .provenance import now
+from .versions import HARNESS, method_version
 
 WAITS = "waits for photographs"
 """In the place of a reason why a training failed."""
@@ -82,8 +82,8 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torc
         **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),
         "package": __version__,
-        "method_sha256": code_digest(type(method)),
-        "harness_sha256": harness_digest(),
+        "method_sha256": method_version(type(method)),
+        "harness_sha256": HARNESS,
         "made": now(),
     }
     artifacts.write(needed, state, facts | diagnosis(method, state, place))

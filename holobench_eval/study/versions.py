@@ -1,0 +1,103 @@
+"""Which version of the code a number comes from: declared for what ships with the package, a hash for users' files.
+
+A declared version does not depend on where code lies or how it is written. ``tests/golden`` computes a small case of
+everything that is declared here and fails where its numbers have changed and its version has not.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from .identity import digest
+
+HARNESS = "c99cd6e04659e254efe370a1208c1a90b4a08e6b2ebefb766794ba61e0e9d914"
+"""Everything between a phase and its score: optics, simulated bench, registration, metrics. A new version is any new
+text; it has every cell computed again."""
+ALIGNMENT = "bf6ba199e08d4095b8e39ad30dae6362d6e0fc515bce398ded0ee8949f3d5df6"
+"""What puts a photograph on the pixels of its target without a fiducial (``holoeval score``)."""
+
+RECORDED = {
+    "DoublePhase 1": "43150a62afdb18a7a813171a6289847a0866ad081d8bcb2e08cf5b82ef738669",
+    "AntiAliasedDoublePhase 1": "43150a62afdb18a7a813171a6289847a0866ad081d8bcb2e08cf5b82ef738669",
+    "BandLimitedDoublePhase 1": "43150a62afdb18a7a813171a6289847a0866ad081d8bcb2e08cf5b82ef738669",
+    "GerchbergSaxton 1": "25e6845b8a561c13c23dfbd8133bd22872608892f1bcc101eebda2731f1e606d",
+    "HybridInputOutput 1": "f995abe16843276787325d9f0fb9cd79a1d0de580a236b2093bb1fb546ef9689",
+    "Wirtinger 1": "ff9985aba9a67073893cebe3126f64efc98cce850790e272124a331884c8f1e1",
+    "AmplitudeSGD 1": "8ee8643d0aa6b897f2f0f1cb09a5483ac327de9ba520a3b6ff700c67051a4008",
+    "MultiPlane 1": "c422c5bf8ad62b0564280e8eb5875103c3e0cadb645f5120a70f492f78f062dc",
+    "Oracle 1": "c8a086d04e747630c90eac2b5c3ca10008068aa42b1d3f33e47b18c3dcd6ec70",
+    "HIL 2": "26238578761f97a476e14e378a31daf9e8bc92cee2a6689efe80fb18de9609a3",
+    "HILNH3D 1": "f95fb07e31f05120ccd6c68978ef0b2f0c2e10e77ac9d5b0a865dac72ce0eeba",
+    "HILPlus 3": "3904c58b547b1ad0d2116a54999d1787a7849c1f431d28131e056371b8f20579",
+    "OnlineCamera 1": "bb3d667e0e445c61584f1d419d2bf4630f5626baa110a2c3a58bb1703c57912a",
+    "OnlineCameraNetwork 1": "bce152c23936f80c4c37fe77c9a8c6a0810f2e25f61dc994e082e573667997f5",
+    "ParametricModel 1": "6976d6d96816cc000aedb34105b1f222162393bd0855deee13d7e7991995a24b",
+    "LearnedKernel 1": "0b46156bf363f901097688d0fd868c8aadc8173eec26a0f7a28a8a7a3fa9cd8f",
+    "CNNPropCNN 1": "069a72ff4e9f850d1f7f66f8ad5c8cd897f658c0ac171dae4afd4d9cd2217101",
+    "HybridModel 1": "1b42395bb185ba0e28fcca8b26b693a51a129ac6b65513f03f98d78fcc3cba07",
+    "OdakSGD 1": "2d9d2d697aed0c8479e93e71bb82ad99955bb6c28539a24e5d58259090a249a9",
+    "TorchOpticsAdam 1": "0d28d9a38415f3f296c42991f0f668f26524a6822e603554025f1b1e5d936fa5",
+}
+"""How records name the versions that are older than declared ones; a method that is not here is named by its own."""
+
+
+def method_version(cls: type[Any]) -> str:
+    """What names a method's code in a cell: declared if it ships with the package, else ``code_digest``.
+
+    A shipped method declares ``version: ClassVar[int]``, 1 if it says nothing. It is raised when the method gives
+    other phases, or learns something else: cells that use it are then computed, and artifacts learned, again.
+    """
+    if not _ships(cls):
+        return code_digest(cls)
+    declared = f"{cls.__qualname__} {getattr(cls, 'version', 1)}"
+    return RECORDED.get(declared, declared)
+
+
+def code_digest(cls: type[Any]) -> str:
+    """sha256 of the code that defines a user's class, without comments and docstrings.
+
+    It covers the files of the class and its bases, and the modules of their own folders that they import relatively
+    (``from .losses import ...``); other imports are not followed. As part of a cell's identity it has cells computed
+    again after a change of the method, but not after a change of its documentation. Bases that ship with the package
+    count by their declared versions.
+    """
+    shipped = [method_version(base) for base in cls.__mro__ if _ships(base)]
+    return digest([*sorted(code_of(cls).values()), *shipped])
+
+
+def code_of(cls: type[Any]) -> dict[Path, str]:
+    """The files that define a class, as ``code_digest`` covers them, each in one normal form."""
+    members = [member for base in cls.__mro__ if not _ships(base) for member in vars(base).values()]
+    functions = [inspect.unwrap(member) for member in members if inspect.isfunction(member)]
+    files = {Path(function.__code__.co_filename).resolve() for function in functions}
+    waiting = {(file, file.parent) for file in files}
+    code: dict[Path, str] = {}
+    while waiting:
+        file, folder = waiting.pop()
+        if file not in code and file.is_file():
+            code[file], imported = _code(file, file.read_text(encoding="utf-8"))
+            waiting |= {(other, folder) for other in imported if other.is_relative_to(folder)}
+    return code
+
+
+def _ships(cls: type[Any]) -> bool:
+    return cls.__module__.startswith("holobench_eval.")
+
+
+@lru_cache(maxsize=256)
+def _code(file: Path, text: str) -> tuple[str, frozenset[Path]]:
+    """The code of a file in one normal form, and the files it may import relatively."""
+    tree = ast.parse(text)
+    imported: set[Path] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            node.body = node.body[1:] or [ast.Pass()]
+        if isinstance(node, ast.ImportFrom) and 0 < node.level <= len(file.parents):
+            place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            for module in (place, *(place / alias.name for alias in node.names)):
+                imported |= {module.parent / f"{module.name}.py", module / "__init__.py"}
+    return ast.unparse(tree), frozenset(imported)
