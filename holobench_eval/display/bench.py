@@ -200,10 +200,10 @@ class BenchSession:
         """Nominal optics, public."""
         return self.bench.spec
 
-    @torch.no_grad()
     def announce(self, phases: Sequence[Tensor]) -> None:
         """Nothing: a simulated camera is always ready."""
 
+    @torch.no_grad()
     def capture(self, phase: Tensor) -> Capture:
         """Show ``phase`` ``(C, H, W)`` [rad] and photograph the image plane."""
         profile = self.bench.profile

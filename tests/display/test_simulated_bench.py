@@ -8,7 +8,7 @@ import torch
 from holobench_eval.display import load_profile, open_bench
 from holobench_eval.display.bench import SimulatedBench
 from holobench_eval.display.profile import names
-from holobench_eval.display.stages import CoherentNoise, Crosstalk, Drift, PixelAperture, Propagation, ZeroOrder
+from holobench_eval.display.stages import CoherentNoise, Crosstalk, Drift, PixelAperture, Propagation, Sensor, ZeroOrder
 from holobench_eval.optics import quantise
 
 PANEL = (96, 128)
@@ -120,6 +120,15 @@ def test_noise_depends_on_names_and_frame_not_on_what_is_shown(phase):
     assert torch.equal(first[1], again[1])
     assert not torch.equal(first[0], first[1])
     assert not torch.equal(first[0], other[0])
+
+
+@pytest.mark.parametrize("noise", [True, False])
+def test_a_capture_carries_no_gradient(with_stage, phase, noise):
+    bench = SimulatedBench(with_stage(sensor=Sensor(noise=noise)))
+    shown = phase.clone().requires_grad_()
+    capture = bench.session("names", exposure=(100.0,) * 3).capture(shown)
+    assert not capture.frame.requires_grad
+    assert bench.image(shown).requires_grad  # what the oracle alone may differentiate
 
 
 def test_days_change_the_bench_and_zero_days_do_not(phase):
