@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
-from ..errors import UserError, suggest
+from ..core.errors import UserError, suggest
 from ..optics import srgb_decode
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)

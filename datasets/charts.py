@@ -10,7 +10,7 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
-from ..errors import UserError
+from ..core.errors import UserError
 from ..optics import srgb_decode
 from .base import chosen, known, named_digest, with_channels
 

@@ -12,8 +12,8 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ..core.seeds import generator
 from ..optics import srgb_decode
-from ..seeds import generator
 from .base import known, named_digest, planes, with_channels
 
 VERSION = 1

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
-from ..errors import UserError, suggest
+from ..core.errors import UserError, suggest
 from . import still_life
 from .base import fit, from_srgb, known, named_digest, with_channels
 from .defocus import defocus

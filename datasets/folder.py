@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar, NamedTuple
 from annotated_types import Interval, MinLen
 from torch import Tensor
 
-from ..errors import UserError, suggest
+from ..core.errors import UserError, suggest
 from .base import fit, with_channels
 from .images import SUFFIXES, SixteenBit, decode, read
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 from torch import Tensor
 
-from ..errors import UserError
+from ..core.errors import UserError
 from .base import from_srgb, planes
 
 SixteenBit = Literal["refuse", "srgb", "linear"]

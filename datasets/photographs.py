@@ -14,7 +14,7 @@ from annotated_types import Interval
 from PIL import Image
 from torch import Tensor
 
-from ..errors import UserError
+from ..core.errors import UserError
 from .base import chosen, fit, from_srgb, known, with_channels
 
 FILES = {

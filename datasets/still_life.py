@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from ..core.seeds import generator
 from ..optics import srgb_decode
-from ..seeds import generator
 
 VERSION = 1
 """Part of every digest: raise it when the scene is drawn differently."""

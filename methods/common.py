@@ -13,7 +13,7 @@ from ..optics.phase import TAU, wrap
 from ..optics.phasor import phasor
 
 if TYPE_CHECKING:
-    from ..display.contract import DisplaySpec
+    from ..display.api import DisplaySpec
 
 Offset = Literal["none", "centre"]
 

@@ -19,7 +19,7 @@ from ..optics.phasor import phasor, squared_modulus
 from ..optics.zernike import NAMES, zernike
 
 if TYPE_CHECKING:
-    from ..display.contract import DisplaySpec
+    from ..display.api import DisplaySpec
 
 KNOTS = 17
 """Of the look-up table: levels where its deviation is learned; linear between them."""
@@ -33,9 +33,9 @@ MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "sphe
 """Zernike polynomials of the aberration, see ``optics.zernike``."""
 FIRST_CROSSTALK = 0.3
 FORM = frozenset({"look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES})
-"""Effects (``display.effects``) that the model has a term for. All others of a bench lie outside its form: fringes, of
-which ``SOURCE_GRID`` follows the coarser ones alone, and the light from between the pixels as far as it is not simply
-unmodulated, are among them."""
+"""Effects (``display.simulated.effects``) that the model has a term for. All others of a bench lie outside its form:
+fringes, of which ``SOURCE_GRID`` follows the coarser ones alone, and the light from between the pixels as far as it is
+not simply unmodulated, are among them."""
 
 
 class DisplayModel(nn.Module):

@@ -17,7 +17,7 @@ from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_
 from .initial_phase import InitialPhase, initial_phase
 
 if TYPE_CHECKING:
-    from ..display.contract import Region
+    from ..display.api import Region
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from .common import Bench
 from .double_phase import DoublePhase
 
 if TYPE_CHECKING:
-    from ..display.contract import DisplaySpec
+    from ..display.api import DisplaySpec
 
 InitialPhase = Literal["random", "narrow", "constant", "quadratic", "dpe"]
 

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ..errors import UserError
+from ..core.errors import UserError
 from ..metrics.ms_ssim import SMALLEST, ms_ssim
 from .common import intensity_scale, safe_amplitude
 

@@ -21,8 +21,8 @@ from .descent import cosine_decay
 from .hil.retrieval import matched
 
 if TYPE_CHECKING:
-    from ..display.contract import DisplaySpec
-    from ..display.workbench import MeteredBench
+    from ..display.api import DisplaySpec
+    from ..display.calibrated import MeteredBench
 
 MOMENTS = (0.6, 0.99)
 """Adam's decay rates. Little momentum: the gradient is that of another display."""

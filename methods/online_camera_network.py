@@ -23,7 +23,7 @@ from .hil.objective import Objective
 from .hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
-    from ..display.workbench import MeteredBench
+    from ..display.calibrated import MeteredBench
 
 SMOOTHING = 0.7
 """Width [px] of the Gaussian that what the network misses of the captures is filtered with."""

@@ -14,7 +14,7 @@ from .losses import intensity_l2
 from .wirtinger import Wirtinger
 
 if TYPE_CHECKING:
-    from ..display.workbench import MeteredBench
+    from ..display.calibrated import MeteredBench
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from .initial_phase import InitialPhase, initial_phase
 from .losses import LOSSES, Loss, LossName
 
 if TYPE_CHECKING:
-    from ..display.contract import Region
+    from ..display.api import Region
 
 
 @dataclass(frozen=True)

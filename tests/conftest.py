@@ -1,8 +1,31 @@
 """Settings for every test: one thread, the same examples on every run, no deadlines on a shared machine."""
 
+from pathlib import Path
+
+import matplotlib
+import pytest
 import torch
 from hypothesis import settings
+
+from tests.support import fake_study
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 torch.set_num_threads(1)
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Timings of tests stay out of the user's cache."""
+    folder = tmp_path_factory.mktemp("cache")
+    monkeypatch.setenv("MPLCONFIGDIR", matplotlib.get_cachedir())  # else every test would look for the fonts anew
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    return folder
+
+
+@pytest.fixture
+def no_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tasks meet the fake display and the fake score."""
+    for module, name, _ in fake_study.FAKES:
+        monkeypatch.setattr(module, name, getattr(module, name))  # put back after the test
+    fake_study.install()

@@ -1,8 +1,8 @@
 """Displays: what a method may touch, and the simulated bench."""
 
-from .contract import Capture, Display, DisplaySpec, Region
-from .profile import Profile, load_profile
-from .workbench import MeteredBench, Shot, Workbench, open_bench
+from .api import Capture, Display, DisplaySpec, Region
+from .calibrated import MeteredBench, Shot, Workbench, open_bench
+from .simulated.profile import Profile, load_profile
 
 __all__ = [
     "Capture",

@@ -9,11 +9,11 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
-from ..device import CPU
-from ..errors import CellError
-from .bench import BenchSession
-from .contract import Capture, DisplaySpec
-from .workbench import DARKEST_MEAN, Exposure, MeteredBench, Shot, Shows, Simulation, check_phase, concentration
+from ..core.device import CPU
+from ..core.errors import CellError
+from .api import Capture, DisplaySpec
+from .calibrated import DARKEST_MEAN, Exposure, MeteredBench, Shot, Shows, Simulation, check_phase, concentration
+from .simulated.pipeline import BenchSession
 
 
 class Predictor(Protocol):

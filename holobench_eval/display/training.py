@@ -11,11 +11,11 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
-from ..device import CPU, moved
-from ..errors import BudgetError
-from ..seeds import generator
-from .contract import DisplaySpec
-from .workbench import Session, Source, check_phase, concentration
+from ..core.device import CPU, moved
+from ..core.errors import BudgetError
+from ..core.seeds import generator
+from .api import DisplaySpec
+from .calibrated import Session, Source, check_phase, concentration
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ..shifts import correlate, mirrored
+from ..imaging.shifts import correlate, mirrored
 
 Domain = Literal["linear", "amplitude", "srgb", "stored"]
 """Encodings of the images; ``stored``: values as pictures store them, whose relation to light is not known."""

@@ -18,7 +18,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
-from ..shifts import mirrored
+from ..imaging.shifts import mirrored
 from .base import Metric, gaussian_blur, mix, paired, remembered
 
 SCALES = 4

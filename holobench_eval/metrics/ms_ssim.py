@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ..shifts import mirrored
+from ..imaging.shifts import mirrored
 from .base import Metric, paired
 from .ssim import RADIUS, LocalStatistics
 

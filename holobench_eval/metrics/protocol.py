@@ -14,8 +14,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ..capture.refine import refine as align
-from ..errors import UserError, suggest
+from ..core.errors import UserError, suggest
+from ..imaging.refine import refine as align
 from ..optics.colour import srgb_encode
 from .base import Domain, Metric, gaussian_blur
 from .catalogue import catalogue

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from ..seeds import generator
+from ..core.seeds import generator
 
 
 def constant(target: Tensor) -> Tensor:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
-from ..allocator import LARGEST_KEPT
+from ..core.allocator import LARGEST_KEPT
 from .blocks import in_blocks
 from .padding import IRIS_EDGE
 

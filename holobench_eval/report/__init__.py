@@ -1,10 +1,10 @@
 """Reports: statistics over targets, tables, figures and report.md, all computed from the records of a study."""
 
 from .build import build_report, recompute_table, results_of, write_report
-from .layout import Layout, layout_of
-from .results import Results
-from .sections import headline_rows
-from .tables import csv_text, read_records, records_frame, table_from_records
+from .data.layout import Layout, layout_of
+from .data.results import Results
+from .data.tables import csv_text, read_records, records_frame, table_from_records
+from .sections.tables import headline_rows
 
 __all__ = [
     "Layout",

@@ -8,32 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from ..study.store import write_atomically
-from . import (
-    leaderboard,
-    section_alignment,
-    section_diagnosis,
-    section_focus,
-    section_ranks,
-    section_sweeps,
-    section_training,
-    sections,
-)
-from .description import Description, counts, describe, environment, method_parameters, rules, setup
-from .figures import Figures, draw_figures
-from .findings import blur_keys, findings
-from .layout import Layout, layout_of
+from ..core.io import write_atomically
+from .charts.figures import Figures, draw_figures
+from .data.layout import Layout, layout_of
+from .data.ranks import ranks
+from .data.results import Results
+from .data.statistics import RESAMPLES
+from .data.sweeps import sweeps
+from .data.tables import MEMORY_COLUMN, csv_text, read_records, records_frame
+from .data.text import FILES
 from .markdown import render
-from .ranks import ranks
-from .results import Results
-from .section_training import Trained
-from .statistics import RESAMPLES
-from .sweeps import sweeps
-from .tables import MEMORY_COLUMN, csv_text, read_records, records_frame
-from .wording import FILES
+from .sections import alignment as section_alignment
+from .sections import diagnosis as section_diagnosis
+from .sections import focus as section_focus
+from .sections import leaderboard
+from .sections import ranks as section_ranks
+from .sections import sweeps as section_sweeps
+from .sections import tables as sections
+from .sections import training as section_training
+from .sections.description import Description, counts, describe, environment, method_parameters, rules, setup
+from .sections.findings import blur_keys, findings
+from .sections.training import Trained
 
 if TYPE_CHECKING:
-    from ..config import Study
+    from ..study.config import Study
 
 TEMPLATE = "report.md.j2"
 

@@ -18,9 +18,9 @@ from typing import Any
 
 import torch
 
-from ..errors import UserError
+from ..core.errors import UserError
+from ..core.io import TEMPORARY, file_name, write_atomically
 from .preparation import Preparation
-from .store import TEMPORARY, file_name, write_atomically
 
 STATE, PROVENANCE, LOG, FAILURE = "learned.pt", "provenance.json", "training.csv", "failure.log"
 UNFINISHED = "unfinished"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import registry
-from ..errors import UserError
-from .identity import canonical
+from ..core import plugins
+from ..core.errors import UserError
+from ..core.hashing import canonical
 
 if TYPE_CHECKING:
-    from ..config import Study
+    from .config import Study
     from .plan import Cell, Plan
 
 
@@ -49,7 +49,7 @@ def _used(cell: Cell) -> list[tuple[str, dict[str, Any]]]:
 
 
 def _reason(name: str, params: dict[str, Any], folder: Path) -> str | None:
-    method: Any = registry.build("methods", name, params, folder)
+    method: Any = plugins.build("methods", name, params, folder)
     ask = getattr(method, "available", None)
     if not callable(ask):
         return None

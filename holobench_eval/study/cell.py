@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import traceback
 
-from ..errors import CellError, LostDeviceError, Pending
+from ..core.errors import CellError, LostDeviceError, Pending
+from ..core.io import write_atomically
 from . import focus
-from .bench import Condition
+from .displays import Condition
 from .job import Job, repeatable
-from .measures import Measure, floor, picture, prediction
 from .plan import Cell
-from .store import Record, Store, write_atomically
+from .scoring import Measure, floor, picture, prediction
+from .store import Record, Store
 
 MEASURES = {"picture": picture, "prediction": prediction, "focus": focus.focus}
 FLOORS = {"picture": floor, "prediction": floor, "focus": focus.floor}

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch import Tensor
 
-from .. import registry
-from ..errors import CellError
+from ..core import plugins
+from ..core.errors import CellError
 from ..metrics import match
 from ..metrics.psnr import psnr
 from ..metrics.ssim import RADIUS, LocalStatistics
-from . import measures
+from . import scoring
+from .focal_stacks import SCORES, offset
 from .job import Job, target_of
-from .measures import Measure, captured, plain, solution
 from .plan import Cell
-from .stacks import SCORES, offset
+from .scoring import Measure, captured, plain, solution
 
 if TYPE_CHECKING:
-    from ..display.workbench import MeteredBench
+    from ..display.calibrated import MeteredBench
 
 
 def focus(job: Job) -> Measure:
@@ -41,12 +41,12 @@ def focus(job: Job) -> Measure:
 
 def floor(job: Job) -> Measure:
     """What images that no display made score on the task's target."""
-    return measures.floor(job, scored)
+    return scoring.floor(job, scored)
 
 
 def scored(job: Job, cell: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
     """The scores of the whole picture, and those of what is in focus."""
-    dataset = registry.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
+    dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
     mask = dataset.mask(cell.target, tuple(wanted.shape[-2:]))
     return plain(job, cell, image, wanted) | in_focus(image, wanted, mask)
 

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch import Tensor
 
-from .. import registry
-from ..allocator import keep_freed_memory
-from ..config import Save
-from ..device import CPU, find, gpu_name, moved
-from ..errors import CellError, Pending
-from ..seeds import seed
+from ..core import plugins
+from ..core.allocator import keep_freed_memory
+from ..core.device import CPU, find, gpu_name, moved
+from ..core.errors import CellError, Pending
+from ..core.hashing import canonical
+from ..core.seeds import seed
 from . import timings
 from .artifacts import Artifact, Artifacts
-from .bench import Condition, workbench
-from .identity import canonical
+from .config import Save
+from .displays import Condition, workbench
 from .plan import Cell, Task
 from .preparation import Preparation
 from .store import Record
@@ -30,7 +30,7 @@ from .store import Record
 if TYPE_CHECKING:
     from ..display import Workbench
     from ..display.learned import LearnedBench
-    from ..display.real import RealBench
+    from ..lab.real import RealBench
 
 
 @dataclass(frozen=True)
@@ -109,13 +109,13 @@ class Job:
         from ..display.learned import LearnedBench
 
         needed = place.learned
-        method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
+        method = plugins.build("methods", needed.method, dict(needed.params), needed.folder)
         return LearnedBench(place.spec, method, moved(learned.state, self.device), cell.seed, self.device)
 
 
 def target_of(cell: Cell, place: Condition, folder: Path) -> Tensor:
     """The target at the size of the scored region, ``(C, h, w)`` linear light in [0, 1]."""
-    dataset = registry.build("datasets", cell.dataset, dict(cell.dataset_params), folder)
+    dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), folder)
     if dataset.digest(cell.target) != cell.target_sha256:
         raise CellError(f"target '{cell.target}' has changed since the study was planned; start the run again")
     made = canonical([cell.dataset, dict(cell.dataset_params), str(folder), cell.target, cell.target_sha256])

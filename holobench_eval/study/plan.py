@@ -8,17 +8,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from .. import registry
-from ..errors import UserError
-from .bench import LEARNED, Condition, Rig, condition, real_condition
-from .identity import digest
+from ..core import plugins
+from ..core.errors import UserError
+from ..core.hashing import digest
+from .displays import LEARNED, Condition, Rig, condition, real_condition
+from .focal_stacks import VERSION as IN_FOCUS
+from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
 from .preparation import Preparation, check_unseen, preparation
-from .stacks import VERSION as IN_FOCUS
-from .stacks import Showing, Target, planes_a_scene, planes_of, showings
 from .versions import HARNESS, method_version
 
 if TYPE_CHECKING:
-    from ..config import MethodEntry, Study
+    from .config import MethodEntry, Study
 
 REFERENCE = "reference"
 """The condition of the floor cells."""
@@ -142,7 +142,7 @@ class Plan:
 def scored_dataset(study: Study) -> Any:
     """The dataset whose images are scored. UserError for one that methods may train on."""
     targets = study.targets
-    dataset = registry.build("datasets", targets.dataset, dict(targets.params), study.folder)
+    dataset = plugins.build("datasets", targets.dataset, dict(targets.params), study.folder)
     try:
         dataset.items()
     except UserError:
@@ -194,7 +194,7 @@ def _real(study: Study, place: Condition) -> Condition:
     folder = study.display.session
     if folder is None:
         return place
-    from ..capture.session import read_manifest
+    from ..lab.session import read_manifest
 
     return replace(place, real=replace(place.real or Rig(), folder=folder, session=read_manifest(folder).session))
 
@@ -202,7 +202,7 @@ def _real(study: Study, place: Condition) -> Condition:
 def changed(study: Study, source: str, place: Condition) -> list[Condition]:
     """A display as methods were prepared for it, and after every change that the study's sweeps make to it."""
     from ..display import load_profile
-    from ..display.conditions import KINDS, altered
+    from ..display.simulated.changes import KINDS, altered
 
     changes = [
         (sweep.condition, value)
@@ -232,7 +232,7 @@ class _Ground:
     @cached_property
     def probe_sha256(self) -> str:
         """The version of the method whose captures are predicted."""
-        return method_version(registry.find("methods", self.study.holograms.name, self.study.folder))
+        return method_version(plugins.find("methods", self.study.holograms.name, self.study.folder))
 
     def cell(
         self,
@@ -278,7 +278,7 @@ class _Ground:
 
     def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
-        cls = registry.find("methods", entry.name, self.study.folder)
+        cls = plugins.find("methods", entry.name, self.study.folder)
         made = (entry.name, method_version(cls), entry.params)
         for showing in self._showings(cls, shown, targets):
             places = tuple(place for _, place in showing)

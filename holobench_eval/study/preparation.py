@@ -8,13 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import registry
-from ..errors import UserError
-from .bench import Condition
-from .identity import digest
+from ..core import plugins
+from ..core.errors import UserError
+from ..core.hashing import digest
+from .displays import Condition
 
 if TYPE_CHECKING:
-    from ..config import Study
+    from .config import Study
 
 
 @dataclass(frozen=True)
@@ -80,11 +80,11 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], place: Con
 
     On a learned display a method is trained on the display that this one was learned from.
     """
-    cls = registry.find("methods", method, study.folder)
+    cls = plugins.find("methods", method, study.folder)
     if not getattr(cls, "trains", False):
         return None
     training = study.training
-    dataset = registry.build("datasets", training.dataset, dict(training.params), study.folder)
+    dataset = plugins.build("datasets", training.dataset, dict(training.params), study.folder)
     return Preparation(
         method=method,
         version=int(getattr(cls, "version", 1)),

@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..errors import UserError
-from .installed import installed
+from ..core.errors import UserError
+from ..core.installed import installed
+from ..core.io import write_atomically
 from .plan import Plan
-from .store import write_atomically
 from .timings import cpu_model
 
 if TYPE_CHECKING:
-    from ..config import Study
+    from .config import Study
 
 PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "scikit-image", "kornia", "torchmetrics")
 FILE = "provenance.json"

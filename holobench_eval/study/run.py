@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..device import find, gpu_name
-from ..errors import UserError
+from ..core.device import find, gpu_name
+from ..core.errors import UserError
 from . import provenance, timings
 from .artifacts import Artifacts
 from .available import refuse_unavailable, refuse_unscored
@@ -23,7 +23,7 @@ from .store import Record, Store
 from .training import TrainingJob
 
 if TYPE_CHECKING:
-    from ..config import Study
+    from .config import Study
 
 
 LATE = 10.0

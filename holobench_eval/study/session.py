@@ -8,24 +8,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..capture.convention import Convention
-from ..capture.session import Manifest, Pattern, read_manifest, write_manifest
-from ..capture.session.manifest import refuse_links_out
-from ..display.bench_file import load_bench_file
-from ..errors import Pending, UserError, suggest
-from ..yaml_source import load
-from .bench import condition, forget_sessions, real_condition, workbench
+from ..core.errors import Pending, UserError, suggest
+from ..core.hashing import digest
+from ..core.io import write_atomically
+from ..core.yaml_source import load
+from ..imaging.convention import Convention
+from ..lab.bench_file import load_bench_file
+from ..lab.opening import session_photographer
+from ..lab.session import Manifest, Pattern, read_manifest, write_manifest
+from ..lab.session.geometry import look
+from ..lab.session.manifest import refuse_links_out
+from .displays import condition, forget_sessions, real_condition, workbench
 from .executors import Serial
-from .identity import digest
 from .plan import displays, plan
-from .real_bench import session_photographer
 from .run import Outcome, Watch, run
-from .session_checks import look
-from .store import write_atomically
 
 if TYPE_CHECKING:
-    from ..config import Study
-    from ..display.real import RealBench
+    from ..lab.real import RealBench
+    from .config import Study
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
@@ -63,7 +63,7 @@ def export(
     """
     if folder.exists() and any(folder.iterdir()):
         raise UserError(f"{folder}: not empty; give a new folder, or go on there with holoeval session import {folder}")
-    from ..config import load_study
+    from .config import load_study
 
     study = load_study(config)
     chosen = _on_one_display(study, bench, display)
@@ -143,7 +143,7 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
     A session folder comes from somewhere else, so its copy of the config is used only where it names nothing but what
     is installed: code in files, datasets in folders and weights need the user's own config.
     """
-    from ..config import load_study
+    from .config import load_study
 
     path = folder / STUDY if config is None else config
     if not path.is_file() or (config is None and path.is_symlink()):
@@ -207,7 +207,7 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
         grid = study.display
     else:
         grid = replace(study.display, profiles=(_profile(study, display),))
-    from ..registry import find
+    from ..core.plugins import find
 
     source = grid.sources[0]
     methods = tuple(
@@ -240,7 +240,7 @@ def _profile(study: Study, display: str | None) -> str:
 
 
 def _bench(study: Study) -> RealBench:
-    from ..display.real import RealBench
+    from ..lab.real import RealBench
 
     bench = workbench(next(iter(displays(study).values())), study.seed)
     assert isinstance(bench, RealBench)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
+from ..core.io import write_atomically
 from .artifacts import Artifact, read_tensors
-from .effort import Effort
-from .store import write_atomically
+from .cost import Effort
 
 if TYPE_CHECKING:
     from .job import Job

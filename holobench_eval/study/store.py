@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import fcntl
 import json
-import os
-import re
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from ..errors import UserError
-from .identity import digest
+from ..core.errors import UserError
+from ..core.hashing import digest
+from ..core.io import TEMPORARY, file_name, write_atomically
 from .plan import Cell, Plan
 
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
@@ -23,9 +21,6 @@ State = Literal["done", "failed", "skipped", "unavailable", "missing"]
 
 ADDED = frozenset({"alone", "memory_mib", "stopped"})
 """What records of earlier versions lack."""
-
-TEMPORARY = ".writing-"
-"""How the name of a file begins that is not whole yet."""
 
 
 @dataclass(frozen=True)
@@ -60,32 +55,6 @@ class Record:
     def id(self) -> str:
         """The name of the record: the hash of its cell."""
         return digest(self.cell)
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name in the same folder, then rename it: readers see all of it or nothing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=TEMPORARY, dir=path.parent)
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
-def file_name(text: str) -> str:
-    """A label or item as a file name in any folder; different texts get different names.
-
-    Anything but letters, digits, dot, dash and underscore becomes ``_``, and a changed name gets a part of its hash.
-    """
-    name = re.sub(r"[^A-Za-z0-9._-]", "_", text).lstrip(".")[:100]
-    return name if name and name == text else f"{name}-{digest(text)[:8]}"
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from .effort import Effort
-from .identity import digest
+from ..core.hashing import digest
+from ..core.io import write_atomically
+from .cost import Effort
 from .plan import Plan, Task
-from .store import write_atomically
 
 if TYPE_CHECKING:
-    from ..config import Study
+    from .config import Study
 
 
 def folder() -> Path:

@@ -9,17 +9,18 @@ from typing import Any
 
 import torch
 
-from .. import __version__, registry
-from ..device import CPU, find, gpu_name, moved
-from ..display.effects import effects
+from .. import __version__
+from ..core import plugins
+from ..core.device import CPU, find, gpu_name, moved
+from ..core.errors import CellError, LostDeviceError, Pending
+from ..display.calibrated import Workbench
 from ..display.estimates import joined
-from ..display.real import RealBench
+from ..display.simulated.effects import effects
+from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
-from ..display.truth import truth
-from ..display.workbench import Workbench
-from ..errors import CellError, LostDeviceError, Pending
+from ..lab.real import RealBench
 from .artifacts import Artifacts
-from .bench import workbench
+from .displays import workbench
 from .job import repeatable
 from .preparation import Preparation
 from .provenance import now
@@ -58,7 +59,7 @@ def train(job: TrainingJob) -> str:
 
 
 def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torch.device) -> None:
-    method = registry.build("methods", needed.method, dict(needed.params), needed.folder)
+    method = plugins.build("methods", needed.method, dict(needed.params), needed.folder)
     images = _images(needed, device)
     split = len(images) - needed.held_out
     place = workbench(needed.place, needed.seed, device)
@@ -111,7 +112,7 @@ def diagnosis(method: object, state: Mapping[str, Any], place: Workbench | RealB
 
 def _images(needed: Preparation, device: torch.device) -> list[TrainingImage]:
     """The training images at the size of the scored region, on a device."""
-    dataset = registry.build("datasets", needed.dataset, dict(needed.dataset_params), needed.folder)
+    dataset = plugins.build("datasets", needed.dataset, dict(needed.dataset_params), needed.folder)
     spec, images = needed.place.spec, []
     for item, sha256 in needed.images:
         if dataset.digest(item) != sha256:

@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from .identity import digest
+from ..core.hashing import digest
 
 HARNESS = "c99cd6e04659e254efe370a1208c1a90b4a08e6b2ebefb766794ba61e0e9d914"
 """Everything between a phase and its score: optics, simulated bench, registration, metrics. A new version is any new

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ...errors import UserError
+from ...core.errors import UserError
 from ...optics.phasor import squared_modulus
 from ..descent import cosine_decay
 from ..hil.loop import Sample

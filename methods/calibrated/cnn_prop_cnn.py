@@ -13,7 +13,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ... import seeds
+from ...core import seeds
 from ...optics.phasor import squared_modulus
 from ..common import safe_amplitude, unit_field
 from ..hil.loop import Steps
@@ -22,7 +22,7 @@ from .method import Calibrated, Schedule
 from .networks import ColourByColour
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
 
 
 class TwoNetworks(nn.Module):

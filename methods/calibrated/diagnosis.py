@@ -9,22 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import torch
 from torch import Tensor
 
-from ...display.estimates import (
-    Estimate,
-    disc,
-    estimate,
-    focusing,
-    reach,
-    stroke,
-    undiffracted,
-    zernike_waves,
-)
+from ...display.estimates import Estimate, disc, estimate, focusing, reach, stroke, undiffracted, zernike_waves
 from ...optics.phase import TAU
 from ...optics.zernike import NAMES, zernike
 from ..display_model import FORM, KNOTS, MODES, DisplayModel, enlarged
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
 
 
 class Diagnosed:

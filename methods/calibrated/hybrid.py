@@ -10,7 +10,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ... import seeds
+from ...core import seeds
 from ...optics.phasor import phasor
 from ..display_model import FORM, DisplayModel
 from .approximator import ModelApproximator, Rates
@@ -19,7 +19,7 @@ from .method import Calibrated
 from .networks import ColourByColour
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
     from ...display.estimates import Estimate
 
 

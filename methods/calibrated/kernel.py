@@ -18,7 +18,7 @@ from .approximator import ModelApproximator, Rates
 from .method import Calibrated, Schedule
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
 
 
 class Kernels(nn.Module):

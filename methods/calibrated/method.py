@@ -18,9 +18,9 @@ from ..wirtinger import Wirtinger
 from .patterns import pattern_samples
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
+    from ...display.calibrated import MeteredBench
     from ...display.training import TrainingBench, TrainingImage
-    from ...display.workbench import MeteredBench
     from .approximator import ModelApproximator
 
 

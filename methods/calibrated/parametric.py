@@ -11,7 +11,7 @@ from .diagnosis import Diagnosed
 from .method import Calibrated
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
 
 
 @dataclass(frozen=True)

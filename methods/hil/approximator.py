@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 import torch
 from torch import Tensor
 
-from ...errors import UserError
+from ...core.errors import UserError
 from ..common import unit_field
 from .judge import Judge
 from .loop import Sample
@@ -17,7 +17,7 @@ from .objective import Objective, trainer
 from .retrieval import Image, matched
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
 
 
 class NetworkApproximator:

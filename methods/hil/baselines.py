@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ...shifts import mirrored
+from ...imaging.shifts import mirrored
 from .generator import Generator, crop_to, instance_norm, pad_to_multiple
 
 # Networks that end in a tanh work on [-1, 1]; intensities of [0, 2] are moved there, which leaves room for captures

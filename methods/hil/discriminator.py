@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ...errors import UserError
+from ...core.errors import UserError
 from .generator import SLOPE, instance_norm
 
 KERNEL = 4

@@ -23,8 +23,8 @@ from .retrieval import Image, Retrieval, check_region, retrieve
 from .start import SmoothStart
 
 if TYPE_CHECKING:
+    from ...display.calibrated import MeteredBench
     from ...display.training import TrainingBench, TrainingImage
-    from ...display.workbench import MeteredBench
 
 
 @dataclass(frozen=True)

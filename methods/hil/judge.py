@@ -7,7 +7,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from ... import seeds
+from ...core import seeds
 from .discriminator import PatchDiscriminator
 from .networks import PIX2PIX_DEVIATION, Network, draw_weights
 from .objective import BETAS, LEARNING_RATE, adversarial_loss, load_moments

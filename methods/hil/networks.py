@@ -10,7 +10,7 @@ import torch
 from annotated_types import Interval
 from torch import nn
 
-from ...errors import UserError
+from ...core.errors import UserError
 from .baselines import Identity, Pix2Pix, Pix2PixHD, UNet
 from .discriminator import MultiScaleDiscriminator, PatchDiscriminator
 from .generator import Generator

@@ -21,9 +21,9 @@ from .networks import Network
 from .retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
+    from ...display.calibrated import MeteredBench
     from ...display.training import TrainingBench, TrainingImage
-    from ...display.workbench import MeteredBench
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from annotated_types import Interval
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ... import seeds
-from ...errors import UserError
+from ...core import seeds
+from ...core.errors import UserError
 from .networks import Discriminator, Network
 from .perceptual import find_weights, perceptual_loss
 

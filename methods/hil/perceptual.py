@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ...errors import UserError
+from ...core.errors import UserError
 from ...metrics.base import as_rgb, gaussian_blur
 from ...metrics.feature_distance import _opponent as opponent
 from ...metrics.feature_distance import _responses as oriented_responses

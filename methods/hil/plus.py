@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, ClassVar
 import torch
 from torch import nn
 
-from ... import seeds
-from ...errors import UserError
+from ...core import seeds
+from ...core.errors import UserError
 from ..calibrated.approximator import ModelApproximator, Rates, start_at_zero
 from ..calibrated.diagnosis import Diagnosed
 from ..calibrated.method import ThroughModel
@@ -22,7 +22,7 @@ from ..display_model import DisplayModel
 from .networks import Network
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
 
 RATES = Rates(model=1e-2, network=3e-4)
 

@@ -14,7 +14,7 @@ from annotated_types import Interval
 from torch import Tensor
 from torch.nn import functional
 
-from ...errors import UserError
+from ...core.errors import UserError
 from ...metrics.feature_distance import SMALLEST as SMALLEST_PERCEPTUAL
 from ...metrics.feature_distance import FixedMofd
 from ...metrics.lpips import available, lpips

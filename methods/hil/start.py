@@ -9,7 +9,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ...errors import UserError
+from ...core.errors import UserError
 from ..common import Bench
 from ..wirtinger import Wirtinger
 

@@ -13,7 +13,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ...errors import UserError
+from ...core.errors import UserError
 from ..common import Bench, per_channel
 from ..descent import Best
 from ..initial_phase import InitialPhase, initial_phase
@@ -21,7 +21,7 @@ from ..losses import LOSSES, LossName
 from .loading import load
 
 if TYPE_CHECKING:
-    from ...display.contract import DisplaySpec
+    from ...display.api import DisplaySpec
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ import steps
 import torch
 from scene import Scene
 
-from holobench_eval.config import load_study
 from holobench_eval.display import load_profile
-from holobench_eval.display.bench import SimulatedBench
+from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.methods.common import unit_field
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.metrics.catalogue import catalogue
 from holobench_eval.study import plan
+from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.progress import watching
 from holobench_eval.study.run import run

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from holobench_eval.allocator import keep_freed_memory
+from holobench_eval.core.allocator import keep_freed_memory
 
 sys.path.insert(0, str(Path(__file__).parent))
 

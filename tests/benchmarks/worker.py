@@ -56,7 +56,7 @@ def known():
 
     torch.set_num_threads(THREADS)
     with suppress(ModuleNotFoundError):  # of a version that is older than this
-        from holobench_eval.allocator import keep_freed_memory
+        from holobench_eval.core.allocator import keep_freed_memory
 
         keep_freed_memory()  # as a study does
     return {case.name: case for case in CASES}
@@ -85,13 +85,13 @@ def serve(layout):
 
 def memory(case):
     """Bytes; None where the system does not tell."""
-    from holobench_eval.study import effort
+    from holobench_eval.study import cost
 
     case.shrunk().work().call()  # libraries load more of themselves when they are first used
-    before = effort.start().before
+    before = cost.start().before
     work = case.work()
     work.call()
-    watch = effort.start()  # what only the preparation needed is given back
+    watch = cost.start()  # what only the preparation needed is given back
     work.call()
     most = watch.stop().memory_mib
     return None if before is None or most is None else 1024 * (watch.before - before) + 2**20 * most

@@ -6,11 +6,11 @@ import pytest
 import torch
 from torch import Tensor
 
+from holobench_eval.core.errors import UserError
 from holobench_eval.datasets import focal_stacks
 from holobench_eval.datasets.defocus import blurred, defocus
 from holobench_eval.datasets.focal_stacks import BLUR, FocalStacks
 from holobench_eval.display import load_profile
-from holobench_eval.errors import UserError
 
 SHAPE = (96, 96)
 

@@ -10,15 +10,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval import registry
-from holobench_eval.device import CPU
+from holobench_eval.core import plugins
+from holobench_eval.core.device import CPU
 from holobench_eval.display import Workbench, load_profile, open_bench
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.retrieval import Retrieval, retrieve
 from holobench_eval.optics import AngularSpectrum
-from holobench_eval.study import effort
+from holobench_eval.study import cost
 from holobench_eval.study.job import repeatable
 
 pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
@@ -67,7 +67,7 @@ def test_propagation_within_1e_5(direction: str) -> None:
 
 
 def test_twenty_iterations_of_wirtinger_within_a_twentieth_of_a_decibel(benches: dict[Any, Workbench]) -> None:
-    method = registry.build("methods", "wirtinger", {"iterations": 20}, Path())
+    method = plugins.build("methods", "wirtinger", {"iterations": 20}, Path())
     target, found = smooth((3, *benches[CPU].spec.region.shape)), []
     for device in DEVICES:
         with repeatable(1, device):
@@ -119,7 +119,7 @@ def test_a_gpu_repeats_itself() -> None:
 
     def losses(name: str, params: dict[str, Any]) -> list[float]:
         with repeatable(1, CUDA):
-            approximator = registry.build("methods", name, params, Path()).approximator(spec).to(CUDA)
+            approximator = plugins.build("methods", name, params, Path()).approximator(spec).to(CUDA)
             sample = Sample(phase, 0.5 * target, target, torch.ones(3, device=CUDA))
             return [approximator.step(sample, step / 4)["l1"] for step in range(4)]
 
@@ -128,7 +128,7 @@ def test_a_gpu_repeats_itself() -> None:
 
 
 def test_memory_is_that_of_the_gpu() -> None:
-    watch = effort.start(CUDA)
+    watch = cost.start(CUDA)
     held = torch.ones(48 * 2**18, device=CUDA)
     taken = watch.stop()
     assert held.any()

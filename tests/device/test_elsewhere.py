@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from elsewhere import ELSEWHERE, Elsewhere
 
-from holobench_eval import registry
-from holobench_eval.device import CPU, moved
+from holobench_eval.core import plugins
+from holobench_eval.core.device import CPU, moved
 from holobench_eval.display import Workbench, load_profile
-from holobench_eval.display.bench import SimulatedBench
 from holobench_eval.display.learned import LearnedBench
+from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.methods.calibrated.method import ThroughModel
 from holobench_eval.methods.hil.approximator import NetworkApproximator
@@ -26,6 +25,7 @@ from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
 from holobench_eval.optics import AngularSpectrum
+from tests.support.elsewhere import ELSEWHERE, Elsewhere
 
 PANEL = (208, 208)  # the least whose region MS-SSIM is defined on
 SMALL = {"levels": 3, "width": 4}
@@ -142,7 +142,7 @@ METHODS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", METHODS)
 def test_a_method_solves_where_its_target_is(ideal: Workbench, name: str) -> None:
-    method = registry.build("methods", name, METHODS[name], Path())
+    method = plugins.build("methods", name, METHODS[name], Path())
     with Elsewhere():
         target = picture(ideal)
         phase = method.solve(target[None], ideal.for_method(method, name, target, "t", 0))
@@ -182,7 +182,7 @@ def test_a_method_learns_resumes_and_solves_where_its_images_are(
     ideal: Workbench, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ThroughModel, "NOMINAL", Wirtinger(iterations=1))
-    method, memory = registry.build("methods", name, TRAINED[name], Path()), Memory()
+    method, memory = plugins.build("methods", name, TRAINED[name], Path()), Memory()
     with Elsewhere():
         images = [TrainingImage(f"image {number}", picture(ideal)) for number in range(2)]
         for _ in range(2):

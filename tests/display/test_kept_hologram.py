@@ -3,9 +3,9 @@ from types import SimpleNamespace
 import pytest
 import torch
 
+from holobench_eval.core.errors import CellError
 from holobench_eval.display import load_profile
-from holobench_eval.display.workbench import MeteredBench
-from holobench_eval.errors import CellError
+from holobench_eval.display.calibrated import MeteredBench
 
 PANEL = (96, 128)
 

@@ -5,8 +5,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval import seeds
-from holobench_eval.display.contract import DisplaySpec, Region
+from holobench_eval.core import seeds
+from holobench_eval.display.api import DisplaySpec, Region
 
 
 @pytest.fixture(autouse=True, scope="package")

@@ -11,10 +11,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.bench import SimulatedBench
-from holobench_eval.display.contract import DisplaySpec, Region
-from holobench_eval.display.stages import LookUpTable, ZeroOrder
-from holobench_eval.display.workbench import concentration
+from holobench_eval.display.api import DisplaySpec, Region
+from holobench_eval.display.calibrated import concentration
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.stages import LookUpTable, ZeroOrder
 from holobench_eval.methods.display_model import KNOTS, MODES, DisplayModel
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.plus import PlusApproximator

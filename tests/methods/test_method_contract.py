@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 import torch
 
-from holobench_eval import registry
-from holobench_eval.errors import UserError
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import UserError
 
 NAMES = [
     "double_phase",
@@ -23,7 +23,7 @@ ITERATIVE = NAMES[3:]
 
 def quick(name: str, **params: Any) -> Any:
     short = {"iterations": 6} if name in ITERATIVE else {}
-    return registry.build("methods", name, {**short, **params})
+    return plugins.build("methods", name, {**short, **params})
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -77,22 +77,22 @@ def test_another_cell_starts_from_another_random_phase(name, bench, scene):
 @pytest.mark.parametrize("name", ["gerchberg_saxton", "hio", "wirtinger", "sgd"])
 def test_iterating_beats_double_phase_where_no_iris_helps_it(name, bench, scene, linear_psnr):
     target = scene(channels=3)
-    direct = registry.build("methods", "double_phase", {}).solve(target, bench)
-    iterated = registry.build("methods", name, {"iterations": 100}).solve(target, bench)
+    direct = plugins.build("methods", "double_phase", {}).solve(target, bench)
+    iterated = plugins.build("methods", name, {"iterations": 100}).solve(target, bench)
     assert linear_psnr(iterated, target, bench) > linear_psnr(direct, target, bench) + 3
 
 
 @pytest.mark.parametrize("name", ["wirtinger", "sgd"])
 def test_gradient_methods_beat_double_phase_behind_its_iris(name, make_bench, scene, linear_psnr):
     bench, target = make_bench(pupil=0.8), scene(channels=3)
-    direct = registry.build("methods", "double_phase", {}).solve(target, bench)
-    iterated = registry.build("methods", name, {}).solve(target, bench)
+    direct = plugins.build("methods", "double_phase", {}).solve(target, bench)
+    iterated = plugins.build("methods", name, {}).solve(target, bench)
     assert linear_psnr(iterated, target, bench) > linear_psnr(direct, target, bench) + 3
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_only_the_oracle_is_privileged_and_none_has_a_camera(name):
-    cls = registry.find("methods", name)
+    cls = plugins.find("methods", name)
     assert cls.privileged == (name == "oracle")
     assert not cls.camera
 
@@ -116,7 +116,7 @@ def test_only_the_oracle_is_privileged_and_none_has_a_camera(name):
 )
 def test_a_wrong_parameter_is_one_line_that_names_it(name, params, words):
     with pytest.raises(UserError) as caught:
-        registry.build("methods", name, params)
+        plugins.build("methods", name, params)
     message = str(caught.value)
     assert words in message
     assert name in message

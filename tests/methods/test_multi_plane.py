@@ -3,7 +3,7 @@ import torch
 
 from holobench_eval.methods.multi_plane import MultiPlane
 from holobench_eval.methods.wirtinger import Wirtinger
-from holobench_eval.study.contract import check_method
+from holobench_eval.testing.contract import check_method
 
 OFFSETS = [-4e-4, 0.0, 4e-4]
 

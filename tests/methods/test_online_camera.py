@@ -2,13 +2,13 @@ from itertools import pairwise
 
 import pytest
 import torch
-from toy_camera import SPEC, Plug, ToyDisplay, picture
 
 from holobench_eval.methods.camera_start import Camera, CameraStart, captured_error
 from holobench_eval.methods.losses import intensity_l2
 from holobench_eval.methods.online_camera import OnlineCamera
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
-from holobench_eval.study.contract import check_method
+from holobench_eval.testing.contract import check_method
+from tests.support.toy_camera import SPEC, Plug, ToyDisplay, picture
 
 FAULTY = {"aberration": 0.6, "unmodulated": 0.3}
 QUICK = CameraStart(converged=Wirtinger(iterations=60))

@@ -1,13 +1,13 @@
 import pytest
 import torch
-from toy_camera import Plug, ToyDisplay, picture
 
 from holobench_eval.methods.camera_start import CameraStart
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.online_camera_network import FromIdentity, OnlineCameraNetwork, ShortRetrieval, corrected
 from holobench_eval.methods.wirtinger import Wirtinger
-from holobench_eval.study.contract import check_method
+from holobench_eval.testing.contract import check_method
+from tests.support.toy_camera import Plug, ToyDisplay, picture
 
 FAULTY = {"aberration": 0.6, "unmodulated": 0.3}
 QUICK = CameraStart(converged=Wirtinger(iterations=60))

@@ -2,7 +2,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.methods.common import nominal_model
 from holobench_eval.methods.descent import Best, cosine_decay
 from holobench_eval.methods.losses import LOSSES

@@ -8,17 +8,18 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-import synthetic_study as made
 from skimage.io import imread
 
-from holobench_eval.config import load_study
 from holobench_eval.display import load_profile
-from holobench_eval.display.conditions import draws
-from holobench_eval.report import Layout, Results, layout_of, records_frame, section_ranks, write_report
-from holobench_eval.report.description import Description
-from holobench_eval.report.figure_ranks import draw
-from holobench_eval.report.layout import Swept
-from holobench_eval.report.ranks import ranks, share
+from holobench_eval.display.simulated.changes import draws
+from holobench_eval.report import Layout, Results, layout_of, records_frame, write_report
+from holobench_eval.report.charts.ranks import draw
+from holobench_eval.report.data.layout import Swept
+from holobench_eval.report.data.ranks import ranks, share
+from holobench_eval.report.sections import ranks as section_ranks
+from holobench_eval.report.sections.description import Description
+from holobench_eval.study.config import load_study
+from tests.support import synthetic_study as made
 
 Quality = Callable[[Mapping[str, float]], float]
 
@@ -259,7 +260,7 @@ def test_a_layout_knows_what_was_drawn_whether_the_profile_has_a_name_or_a_path(
     drawn, other = swept_of(tmp_path, "leto-aged")
     assert drawn.drawn == tuple(draws.values(PROFILE, index) for index in (1, 2, 3))
     assert other.drawn == ()
-    path = files("holobench_eval.display") / "profiles" / "leto-aged.yaml"
+    path = files("holobench_eval.display.simulated") / "profiles" / "leto-aged.yaml"
     (tmp_path / "own.yaml").write_text(path.read_text())
     assert swept_of(tmp_path, "own.yaml")[0] == drawn
 

@@ -10,10 +10,19 @@ from typing import Any
 
 import pytest
 import torch
-from trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write, write_profile
 
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory
+from tests.support.trained_study import (
+    artifact_of,
+    assert_refused,
+    compute,
+    holoeval,
+    needs,
+    rounds,
+    write,
+    write_profile,
+)
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

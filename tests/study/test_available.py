@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 import torch
-from fake_study import solves, write_config
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
+from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import run
+from tests.support.fake_study import solves, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_study import write_config
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.study import timings
+from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import run
 from holobench_eval.study.store import Store
+from tests.support.fake_study import write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
@@ -81,7 +81,7 @@ class Lying:
     camera: ClassVar[bool] = True
 
     def solve(self, target, bench):
-        from holobench_eval.errors import BudgetError
+        from holobench_eval.core.errors import BudgetError
 
         bench.keep(torch.zeros(target.shape[1], *bench.spec.shape))
         raise BudgetError("the best of all methods")

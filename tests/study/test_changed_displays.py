@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fake_study import write_config
 
-from holobench_eval.config import Study, load_study
-from holobench_eval.errors import UserError
-from holobench_eval.study.bench import condition, workbench
+from holobench_eval.core.errors import UserError
+from holobench_eval.study.config import Study, load_study
+from holobench_eval.study.displays import condition, workbench
 from holobench_eval.study.plan import Task, plan
+from tests.support.fake_study import write_config
 
 SWEEPS = """sweeps:
   - {condition: drift, values: [0, 30]}

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_study import fake_work, write_config
-from test_executors import compute, untimed
 
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.study import clusters
 from holobench_eval.study import run as running
 from holobench_eval.study.clusters import Address, Local, Slurm
 from holobench_eval.study.executors import Serial, executor
+from tests.study.test_executors import compute, untimed
+from tests.support.fake_study import fake_work, write_config
 
 SBATCH = """\
 #!{python}
@@ -43,7 +43,7 @@ for job in sys.argv[1:]:
 @pytest.fixture
 def importable(monkeypatch: pytest.MonkeyPatch) -> None:
     """Worker processes find the fake study."""
-    here = str(Path(__file__).parent)
+    here = str(Path(__file__).parents[2])
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([here, os.environ.get("PYTHONPATH", "")]))
 
 

@@ -4,14 +4,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_study import lose_a_worker, noted_work, solves, write_config
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.study import run as running
+from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Local, Serial, executor
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
+from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 
 
 def compute(config: Path, output: Path, chosen: Executor) -> list[dict[str, Any]]:

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 import torch
-from trained_study import compute
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import CellError, UserError
+from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.metrics import score
+from holobench_eval.study.config import load_study
 from holobench_eval.study.focus import in_focus
 from holobench_eval.study.plan import REFERENCE, Task, plan
+from tests.support.trained_study import compute
 
 CONFIG = """\
 title: "Depth"

@@ -7,16 +7,16 @@ import sys
 import time
 from pathlib import Path
 
-import fake_study
 import pytest
-from fake_study import solves, write_config
 
-from holobench_eval.config import load_study
 from holobench_eval.report import build_report
+from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import run
+from tests.support import fake_study
+from tests.support.fake_study import solves, write_config
 
 TARGETS = 5
 

@@ -4,11 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
-from trained_study import compute, needs, rounds, write
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
+from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import displays, plan
+from tests.support.trained_study import compute, needs, rounds, write
 
 LEARNED = ("profiles: [ideal]", 'learned: {method: "trained.py:Gain", profile: ideal, params: {rounds: 3}}')
 FAST = "{name: wirtinger, params: {iterations: 3}}"

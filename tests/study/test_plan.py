@@ -3,12 +3,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fake_study import write_config
-from test_run import add_other_profile
 
-from holobench_eval.config import Study, load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
+from holobench_eval.study.config import Study, load_study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
+from tests.study.test_run import add_other_profile
+from tests.support.fake_study import write_config
 
 
 def study_in(folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), **options: object) -> Study:

@@ -4,14 +4,14 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import fake_trained
 import pytest
-from trained_study import CONFIG, compute, write
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.study import timings
+from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
+from tests.support import fake_trained
+from tests.support.trained_study import CONFIG, compute, write
 
 PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 3}}")
 METHODS = ('["trained.py:Gain"]', '["trained.py:Gain", "trained.py:Even"]')

@@ -4,12 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
-from trained_study import needs, write, write_profile
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.study.artifacts import Artifacts
+from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
+from tests.support.trained_study import needs, write, write_profile
 
 METHODS = 'methods: ["trained.py:Gain"]'
 TRAINING = 'training: {dataset: "trained.py:Unseen", held_out: 1}'

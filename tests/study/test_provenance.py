@@ -4,14 +4,14 @@ import hashlib
 from pathlib import Path
 
 import pytest
-from fake_study import write_config
-from test_run import compute
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
 from holobench_eval.study import provenance
+from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from holobench_eval.study.store import Store
+from tests.study.test_run import compute
+from tests.support.fake_study import write_config
 
 
 @pytest.mark.usefixtures("no_physics")

@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_study import write_config
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holobench_eval.config import load_study
-from holobench_eval.errors import UserError
+from holobench_eval.core.errors import UserError
+from holobench_eval.core.io import file_name, write_atomically
+from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Plan, plan
-from holobench_eval.study.store import Record, Store, file_name, write_atomically
+from holobench_eval.study.store import Record, Store
+from tests.support.fake_study import write_config
 
 
 @pytest.fixture

@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_study import write_config
 
-from holobench_eval.config import load_study
 from holobench_eval.study import timings
-from holobench_eval.study.effort import Effort
+from holobench_eval.study.config import load_study
+from holobench_eval.study.cost import Effort
 from holobench_eval.study.plan import Task, plan
+from tests.support.fake_study import write_config
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_without_a_folder_to_write_to_what_was_measured_is_reported(
 
 
 def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repeat(tmp_path: Path) -> None:
-    from test_run import add_other_profile
+    from tests.study.test_run import add_other_profile
 
     add_other_profile(tmp_path)
     config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"), profiles="ideal, other.yaml")

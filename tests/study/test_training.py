@@ -10,19 +10,19 @@ import time
 from pathlib import Path
 from typing import Any
 
-import fake_study
 import pytest
 import torch
-from trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write
 
-from holobench_eval.config import load_study
+from holobench_eval.core.io import TEMPORARY
 from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory
+from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Follower, Lines
 from holobench_eval.study.run import run
-from holobench_eval.study.store import TEMPORARY
 from holobench_eval.study.training import TrainingJob
+from tests.support import fake_study
+from tests.support.trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

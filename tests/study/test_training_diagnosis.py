@@ -6,15 +6,15 @@ import json
 from pathlib import Path
 from typing import Any
 
-import fake_study
 import pytest
-from trained_study import artifact_of, compute, write
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.bench import SimulatedBench
-from holobench_eval.display.truth import truth
+from holobench_eval.display.simulated.ground_truth import truth
+from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.study import training
 from holobench_eval.study.artifacts import PROVENANCE
+from tests.support import fake_study
+from tests.support.trained_study import artifact_of, compute, write
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

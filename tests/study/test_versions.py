@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from holobench_eval import registry
+from holobench_eval.core import plugins
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study.versions import RECORDED, code_digest, code_of, method_version
 
@@ -27,7 +27,7 @@ class Method:
 def code(folder: Path, doc: str = "A method.", value: str = "1", comment: str = "why", imports: str = "") -> str:
     file = folder / "method.py"
     file.write_text(METHOD.format(doc=doc, value=value, comment=comment, imports=imports))
-    return code_digest(registry.find("methods", f"{file}:Method"))
+    return code_digest(plugins.find("methods", f"{file}:Method"))
 
 
 def test_a_method_is_the_same_after_a_change_of_its_words(tmp_path: Path) -> None:
@@ -100,13 +100,13 @@ def test_a_shipped_method_is_named_by_its_declared_version(monkeypatch: pytest.M
 
 
 def test_every_recorded_version_is_that_of_a_method_or_older() -> None:
-    shipped = {cls.__qualname__: getattr(cls, "version", 1) for cls in map(found, registry.names("methods"))}
+    shipped = {cls.__qualname__: getattr(cls, "version", 1) for cls in map(found, plugins.names("methods"))}
     recorded = [name.split() for name in RECORDED]
     assert all(int(number) <= shipped[name] for name, number in recorded)
 
 
 def found(name: str) -> type[Any]:
-    return registry.find("methods", name)
+    return plugins.find("methods", name)
 
 
 MINE = """
@@ -123,7 +123,7 @@ def test_a_users_method_is_another_after_a_new_version_of_its_shipped_base(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "mine.py").write_text(MINE)
-    mine = registry.find("methods", "mine.py:Method", tmp_path)
+    mine = plugins.find("methods", "mine.py:Method", tmp_path)
     before = method_version(mine)
     monkeypatch.setattr(Wirtinger, "version", 2, raising=False)
     assert method_version(mine) != before

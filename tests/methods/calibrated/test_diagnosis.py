@@ -11,11 +11,11 @@ import torch
 from torch import Tensor
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.bench import SimulatedBench
-from holobench_eval.display.contract import DisplaySpec
+from holobench_eval.display.api import DisplaySpec
 from holobench_eval.display.estimates import focusing, joined, reach, zernike_waves
-from holobench_eval.display.stages import Crosstalk, LookUpTable, Propagation, ZeroOrder
-from holobench_eval.display.truth import truth
+from holobench_eval.display.simulated.ground_truth import truth
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.stages import Crosstalk, LookUpTable, Propagation, ZeroOrder
 from holobench_eval.methods.calibrated.diagnosis import diagnose
 from holobench_eval.methods.calibrated.patterns import random_phase
 from holobench_eval.methods.display_model import KNOTS, MODES, SOURCE_GRID, DisplayModel

@@ -8,40 +8,40 @@ import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval import registry
-from holobench_eval.study.contract import check_method
+from holobench_eval.core import plugins
+from holobench_eval.testing.contract import check_method
 
 ODAK, OPTICS = "odak_sgd", "torchoptics_adam"
 PEERS = [
     pytest.param(name, marks=pytest.mark.skipif(reason is not None, reason=str(reason)))
     for name in (ODAK, OPTICS)
-    for reason in [registry.build("methods", name, {}).available()]
+    for reason in [plugins.build("methods", name, {}).available()]
 ]
 odak, optics = (pytest.mark.skipif(param.marks[0].args[0], reason=param.marks[0].kwargs["reason"]) for param in PEERS)
 
 
 @pytest.mark.parametrize("name", PEERS)
 def test_a_peer_keeps_the_contract_of_methods(name):
-    check_method(registry.build("methods", name, {"iterations": 3}))
+    check_method(plugins.build("methods", name, {"iterations": 3}))
 
 
 @pytest.mark.parametrize("name", PEERS)
 def test_an_image_does_not_depend_on_its_batch(name, bench, scene):
-    method, target = registry.build("methods", name, {"iterations": 3}), scene(batch=2)
+    method, target = plugins.build("methods", name, {"iterations": 3}), scene(batch=2)
     apart = torch.cat([method.solve(target[i : i + 1], bench) for i in range(2)])
     assert torch.equal(method.solve(target, bench), apart)
 
 
 @pytest.mark.parametrize("name", PEERS)
 def test_a_black_channel_gives_a_finite_phase(name, bench, scene):
-    assert registry.build("methods", name, {"iterations": 3}).solve(0 * scene(), bench).isfinite().all()
+    assert plugins.build("methods", name, {"iterations": 3}).solve(0 * scene(), bench).isfinite().all()
 
 
 @pytest.mark.parametrize("name", PEERS)
 def test_the_global_random_numbers_are_left_as_they_were(name, bench, scene):
     torch.manual_seed(1)
     before = torch.get_rng_state()
-    registry.build("methods", name, {"iterations": 2}).solve(scene(), bench)
+    plugins.build("methods", name, {"iterations": 2}).solve(scene(), bench)
     assert torch.equal(torch.get_rng_state(), before)
 
 
@@ -49,7 +49,7 @@ def test_the_global_random_numbers_are_left_as_they_were(name, bench, scene):
 def test_odak_improves_the_image_of_this_packages_model(bench, scene, linear_psnr):
     """By little, for its image lies between the pixels, but neither the conjugate phase nor a mirror image has it."""
     target = scene()
-    early, late = (registry.build("methods", ODAK, {"iterations": n}).solve(target, bench) for n in (1, 60))
+    early, late = (plugins.build("methods", ODAK, {"iterations": n}).solve(target, bench) for n in (1, 60))
     reached = linear_psnr(late, target, bench)
     assert reached > linear_psnr(early, target, bench) + 2
     assert reached > linear_psnr(-late, target, bench) + 2
@@ -71,7 +71,7 @@ def test_odak_propagates_as_this_package_does_but_for_half_a_sample_of_frequency
 
 @odak
 def test_another_cell_starts_odak_from_another_random_phase(bench, scene):
-    method, target = registry.build("methods", ODAK, {"iterations": 2}), scene()
+    method, target = plugins.build("methods", ODAK, {"iterations": 2}), scene()
     here = method.solve(target, bench)
     bench.cell = "another cell"
     assert not torch.allclose(here, method.solve(target, bench), atol=0.1)
@@ -85,7 +85,7 @@ def test_odak_leaves_neither_a_file_nor_a_line(bench, scene, tmp_path, monkeypat
     for name in [name for name in sys.modules if name.partition(".")[0] == "odak"]:
         monkeypatch.delitem(sys.modules, name)
     _odak.cache_clear()  # it is imported anew
-    registry.build("methods", ODAK, {"iterations": 2}).solve(scene(), bench)
+    plugins.build("methods", ODAK, {"iterations": 2}).solve(scene(), bench)
     assert list(tmp_path.iterdir()) == []
     assert Path.cwd() == tmp_path
     assert "".join(capfd.readouterr()) == ""
@@ -96,8 +96,8 @@ def test_odak_leaves_neither_a_file_nor_a_line(bench, scene, tmp_path, monkeypat
 def test_torchoptics_finds_the_phase_of_wirtinger(bench, scene, linear_psnr):
     """The same loss, start and step: only the propagation differs, by less than the images can show."""
     target = scene()
-    theirs = registry.build("methods", OPTICS, {"iterations": 40}).solve(target, bench)
-    ours = registry.build("methods", "wirtinger", {"iterations": 40, "offset": "none"}).solve(target, bench)
+    theirs = plugins.build("methods", OPTICS, {"iterations": 40}).solve(target, bench)
+    ours = plugins.build("methods", "wirtinger", {"iterations": 40, "offset": "none"}).solve(target, bench)
     assert linear_psnr(theirs, target, bench) == pytest.approx(linear_psnr(ours, target, bench), abs=0.5)
     agreement = torch.exp(1j * (theirs - ours).double()).mean().abs()
     assert agreement > 0.99

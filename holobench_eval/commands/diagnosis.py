@@ -1,0 +1,266 @@
+"""What is installed here, which displays and cameras answer, and what to do about each thing that is missing.
+
+What runs other people's native code, imports and drivers, is asked in a process of its own with a time limit: a library
+that crashes or hangs is a finding.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import requires, version
+from pathlib import Path
+from typing import Any, Literal
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from ..core.installed import installed
+
+State = Literal["ok", "missing", "warning"]
+
+IMPORTING, ASKING = 180.0, 120.0  # seconds that imports and drivers may take
+LEAST_DISK = 2e9  # bytes; a full-panel study with its captures
+STYLES = {"ok": "green", "missing": "yellow", "warning": "bold yellow", "broken": "bold red"}
+MODULES = {"scikit-image": "skimage", "pillow": "PIL", "pyyaml": "yaml", "opencv-python-headless": "cv2"}
+
+LIBRARIES = """
+import importlib, json, sys
+found = {"errors": {}}
+for name in sys.argv[1:]:
+    try:
+        importlib.import_module(name)
+    except BaseException as error:
+        found["errors"][name] = f"{type(error).__name__}: {error}"[:200]
+if "torch" in sys.modules:
+    import torch
+    found["threads"] = torch.get_num_threads()
+    cuda = torch.cuda.is_available()
+    found["gpus"] = [torch.cuda.get_device_name(i) for i in range(torch.cuda.device_count())] if cuda else []
+print("\\n" + json.dumps(found))
+"""
+
+
+DRIVERS = """
+import dataclasses, json
+from holobench_eval.lab.drivers.catalogue import found
+print("\\n" + json.dumps([dataclasses.asdict(one) for one in found()]), flush=True)
+import os
+os._exit(0)  # without waiting for what a driver left running
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    what: its name; state: ok, missing (something here does without it) or warning; found: what there is, or why it is
+    not; remedy: what to do, one command where one is enough; core: nothing works without it.
+    """
+
+    what: str
+    state: State
+    found: str
+    remedy: str = ""
+    core: bool = False
+
+    @property
+    def broken(self) -> bool:
+        """Is this something that the core needs and does not have?"""
+        return self.core and self.state == "missing"
+
+
+def doctor() -> list[Finding]:
+    """Look at everything; raises nothing, and comes back within a few minutes whatever hangs."""
+    checks: tuple[tuple[str, Callable[[], Iterator[Finding]]], ...] = (
+        ("Python", _python),
+        ("packages", _packages),
+        ("OpenCV", _opencv),
+        ("git", _git),
+        ("disk", _disk),
+        ("weights", _weights),
+        ("peers", _peers),
+        ("drivers", _drivers),
+    )
+    findings: list[Finding] = []
+    for name, check in checks:
+        try:
+            findings += check()
+        except Exception as error:  # a check that fails says nothing about what it checks
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+            findings.append(Finding(name, "warning", f"could not be looked at: {reason}"))
+    return findings
+
+
+def main() -> int:
+    """Print the findings, then what to do; 1 if something that the core needs is broken, else 0."""
+    console = Console()
+    console = console if console.is_terminal else Console(width=160)
+    findings = doctor()
+    table = Table(title="holoeval doctor", title_justify="left")
+    for heading in ("", "", "found"):
+        table.add_column(heading, overflow="fold")
+    for finding in findings:
+        state = "broken" if finding.broken else finding.state
+        table.add_row(escape(finding.what), f"[{STYLES[state]}]{state}[/]", escape(finding.found))
+    console.print(table)
+    for finding in findings:
+        if finding.remedy:  # whole lines, which can be copied
+            console.print(f"{finding.what}: {finding.remedy}", soft_wrap=True, highlight=False, markup=False)
+    broken = [finding.what for finding in findings if finding.broken]
+    last = f"broken: {', '.join(broken)}" if broken else "the core is complete; what is missing is optional"
+    console.print(last, soft_wrap=True, highlight=False, markup=False)
+    return 1 if broken else 0
+
+
+def _python() -> Iterator[Finding]:
+    text = f"{platform.python_version()} ({sys.executable}), {platform.system()} {platform.machine()}"
+    recent = sys.version_info >= (3, 11)
+    yield Finding("Python", "ok" if recent else "missing", text, "" if recent else "Python 3.11 or newer", core=True)
+
+
+def _packages() -> Iterator[Finding]:
+    names = _required()
+    modules = {MODULES.get(name, name.replace("-", "_")): name for name in names}
+    seen = _asked(LIBRARIES, IMPORTING, *modules)
+    if isinstance(seen, str):
+        yield Finding(
+            "packages", "missing", f"importing them all {seen}", "pip install -c constraints.txt -e .", core=True
+        )
+        return
+    for module, name in modules.items():
+        wrong = seen["errors"].get(module)
+        if wrong is not None:
+            yield Finding(name, "missing", wrong, _install(name), core=True)
+        elif name in ("torch", "numpy"):
+            yield Finding(name, "ok", version(name), core=True)
+    complete = len(modules) - len(seen["errors"])
+    yield Finding("packages", "ok", f"{complete} of {len(modules)} that the core needs can be imported")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    yield Finding("CPU", "ok", f"{cores} cores for this process, {seen.get('threads', 'no')} torch threads")
+    gpus = seen.get("gpus") or ["none that torch can use; nothing here needs one"]
+    yield Finding("GPU", "ok", ", ".join(gpus))
+
+
+def _required() -> list[str]:
+    """Names of the packages that the core needs, from what was installed."""
+    lines = [line for line in requires("holobench_eval") or () if "extra ==" not in line]
+    return [match[0].lower() for line in lines if (match := re.match(r"[A-Za-z0-9._-]+", line))]
+
+
+def _opencv() -> Iterator[Finding]:
+    """The wheels of OpenCV write into one folder, so that the one installed last is the one that is used."""
+    wheels = ("opencv-python-headless", "opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
+    there = {name: found for name in wheels if (found := installed(name))}
+    text = ", ".join(f"{name} {found}" for name, found in there.items())
+    if list(there) == ["opencv-python-headless"]:
+        yield Finding("OpenCV", "ok", text)
+    elif there:
+        remedy = f"pip uninstall -y {' '.join(there)} && pip install opencv-python-headless"
+        yield Finding(
+            "OpenCV", "warning", f"{text}: not the headless wheel alone, which the results are tested with", remedy
+        )
+
+
+def _git() -> Iterator[Finding]:
+    program = shutil.which("git")
+    if program is None:
+        remedy = "install git (Debian: apt install git); reports then name the revision they were made with"
+        yield Finding("git", "missing", "not on the path", remedy)
+        return
+    done = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=20)
+    yield Finding("git", "ok" if done.returncode == 0 else "warning", done.stdout.strip() or done.stderr.strip()[:200])
+
+
+def _disk() -> Iterator[Finding]:
+    free = shutil.disk_usage(Path()).free
+    enough = free >= LEAST_DISK
+    text = f"{free / 1e9:.1f} GB free in {Path().resolve()}"
+    remedy = (
+        "" if enough else f"free some, or write elsewhere with --output; {LEAST_DISK / 1e9:.0f} GB do for most studies"
+    )
+    yield Finding("disk", "ok" if enough else "warning", text, remedy)
+
+
+def _weights() -> Iterator[Finding]:
+    import torch
+
+    from ..methods.hil.perceptual import URL
+    from ..methods.hil.perceptual import find_weights as vgg19
+    from ..metrics.lpips import _TRUNKS, find_weights
+
+    for name, found, url, without in (
+        ("LPIPS weights (AlexNet)", find_weights("alex"), _TRUNKS["alex"].url, "no column lpips_alex"),
+        ("LPIPS weights (VGG-16)", find_weights("vgg"), _TRUNKS["vgg"].url, "no column lpips_vgg"),
+        ("perceptual loss (VGG-19)", vgg19(), URL, "fixed filters in their place, see docs/learned.md"),
+    ):
+        if found is not None:
+            yield Finding(name, "ok", str(found))
+            continue
+        place = Path(torch.hub.get_dir()) / "checkpoints" / url.rpartition("/")[2]
+        command = f"curl -L --create-dirs -o {shlex.quote(str(place))} {url}"
+        yield Finding(name, "missing", without, command)
+
+
+def _peers() -> Iterator[Finding]:
+    for name in ("odak", "torchoptics"):
+        found = installed(name)
+        remedy = "" if found else _install("holobench_eval[peers]")
+        yield Finding(f"peer {name}", "ok" if found else "missing", found or "not installed", remedy)
+
+
+def _drivers() -> Iterator[Finding]:
+    raw = installed("rawpy")
+    remedy = "" if raw else _install("holobench_eval[raw]")
+    yield Finding(
+        "camera RAW files", "ok" if raw else "missing", f"rawpy {raw}" if raw else "rawpy: not installed", remedy
+    )
+    seen = _asked(DRIVERS, ASKING)
+    if isinstance(seen, str):
+        yield Finding(
+            "drivers", "warning", f"asking panels and cameras {seen}", "unplug devices one by one and try again"
+        )
+        return
+    for each in seen:
+        name = f"{'panels' if each['kind'] == 'slm' else 'cameras'}: {each['driver']}"
+        if each["version"] is None:
+            yield Finding(name, "missing", "not installed", each["why"])
+        elif each["devices"]:
+            yield Finding(name, "ok", f"{each['version']}; {', '.join(each['devices'])}", each["why"])
+        else:
+            yield Finding(name, "missing", f"{each['version']}; no device answers", each["why"])
+
+
+def _asked(code: str, seconds: float, *arguments: str) -> Any:
+    """What Python code prints as its last line, JSON, in a process of its own; a line that says what went wrong."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=seconds,
+        )
+    except subprocess.TimeoutExpired:
+        return f"takes longer than {seconds:g} s"
+    except OSError as error:
+        return f"fails: {error}"
+    try:
+        return json.loads(done.stdout.splitlines()[-1])
+    except (IndexError, ValueError):
+        said = (done.stderr.strip() or "without a word").splitlines()[-1][:200]
+        return f"ends with {done.returncode}: {said}"
+
+
+def _install(package: str) -> str:
+    return f"pip install {shlex.quote(package)}"

@@ -1,0 +1,46 @@
+"""What commands print: a console that fits its reader, and a study's report with its headline tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..report import Results
+    from ..study.config import Study
+
+
+def console() -> Console:
+    """A console as wide as its terminal; wide enough for tables where there is none."""
+    from rich.console import Console
+
+    found = Console()
+    return found if found.is_terminal else Console(width=160)
+
+
+def write_report(
+    console: Console, study: Study, records: list[dict[str, object]], output: Path, known: dict[str, object]
+) -> None:
+    """Write a study's report and print its headline tables."""
+    from ..report import build_report
+
+    written, results = build_report(study, records, output, known)
+    print_headline(console, results)
+    console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
+
+
+def print_headline(console: Console, results: Results) -> None:
+    """Print the headline table of every condition."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from ..report import headline_rows
+
+    for condition in results.conditions:
+        headings, rows = headline_rows(results, condition)
+        table = Table(*map(escape, headings), title=escape(condition), title_justify="left")
+        for row in rows:
+            table.add_row(*map(escape, row))
+        console.print(table)

@@ -1,0 +1,37 @@
+"""Write the first version of a new method: a file that runs, and a test that passes."""
+
+from __future__ import annotations
+
+import importlib.util
+import keyword
+import re
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from ..core.errors import UserError
+
+
+def new_method(name: str, folder: Path) -> tuple[Path, Path, str]:
+    """Write ``NAME.py`` and ``test_NAME.py`` and return their paths and the method as a config names it.
+
+    UserError for a name that is no module name and for files that exist: nothing is ever overwritten.
+    """
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
+        raise UserError(f"'{name}' is no name for a method; use lower-case words such as 'my_method'")
+    if importlib.util.find_spec(name) is not None:
+        raise UserError(f"'{name}' is the name of an installed module, which {name}.py would hide; choose another")
+    cls = "".join(word.capitalize() for word in name.split("_"))
+    paths = folder / f"{name}.py", folder / f"test_{name}.py"
+    for path in paths:
+        if path.exists():
+            raise UserError(f"{path} exists already; choose another name or --folder")
+    words = {"name": name, "cls": cls, "title": name.replace("_", " ").capitalize()}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, template in zip(paths, ("method.txt", "test_method.txt"), strict=True):
+            text = files(__package__).joinpath("templates", template).read_text(encoding="utf-8")
+            path.write_text(Template(text).substitute(words), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written: {error.strerror}; choose another --folder") from error
+    return *paths, f"{paths[0]}:{cls}"

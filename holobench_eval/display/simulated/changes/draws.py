@@ -1,0 +1,137 @@
+"""Other benches of the same kind: a profile's parameters drawn within the ranges that are published for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import torch
+
+from ....core.seeds import generator, seed
+from ....optics.phase import TAU
+from ..profile import Profile
+
+STAGES = (
+    *("seed", "sampling", "lut", "crosstalk", "aperture", "flicker", "illumination", "coherent_noise", "propagation"),
+    "zero_order",
+)
+MODEL = (
+    "every parameter of the table drawn evenly within its range, and every random pattern anew; pose, camera and what "
+    "is public of the panel stay"
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter that is drawn evenly between ``low`` and ``high``.
+
+    put: the profile with a value of it; source: where the range comes from.
+    """
+
+    words: str
+    unit: str
+    low: float
+    high: float
+    source: str
+    put: Callable[[Profile, float], Profile]
+
+
+def _gamma(profile: Profile, value: float) -> Profile:
+    return replace(profile, lut=replace(profile.lut, gamma=(value, value, value), table=()))
+
+
+def _gain(profile: Profile, value: float) -> Profile:
+    return replace(profile, lut=replace(profile.lut, gain=(value, value, value)))
+
+
+def _crosstalk(profile: Profile, value: float) -> Profile:
+    return replace(profile, crosstalk=replace(profile.crosstalk, width=value), sampling=max(3, profile.sampling))
+
+
+def _fill(profile: Profile, value: float) -> Profile:
+    if profile.aperture is None:
+        return profile
+    return replace(profile, aperture=replace(profile.aperture, fill=value))
+
+
+def _flicker(profile: Profile, value: float) -> Profile:
+    return replace(profile, flicker=replace(profile.flicker, rms=value))
+
+
+def _beam(profile: Profile, value: float) -> Profile:
+    return replace(profile, illumination=replace(profile.illumination, beam_sigma=value))
+
+
+def _fringes(profile: Profile, value: float) -> Profile:
+    return replace(profile, illumination=replace(profile.illumination, fringes=value))
+
+
+def _wavefront(profile: Profile, value: float) -> Profile:
+    return replace(profile, illumination=replace(profile.illumination, phase_rms=value))
+
+
+def _distance(profile: Profile, value: float) -> Profile:
+    return replace(profile, propagation=replace(profile.propagation, distance_error=value / 100))
+
+
+def _astigmatism(profile: Profile, value: float) -> Profile:
+    return _aberration(profile, "astigmatism_0", value)
+
+
+def _coma(profile: Profile, value: float) -> Profile:
+    return _aberration(profile, "coma_x", value)
+
+
+def _aberration(profile: Profile, name: str, value: float) -> Profile:
+    way = profile.propagation
+    return replace(profile, propagation=replace(way, aberration={**way.aberration, name: value}))
+
+
+def _zero_order(profile: Profile, value: float) -> Profile:
+    return replace(profile, zero_order=replace(profile.zero_order, fraction=value))
+
+
+def _zero_phase(profile: Profile, value: float) -> Profile:
+    return replace(profile, zero_order=replace(profile.zero_order, phase=value))
+
+
+def _specks(profile: Profile, value: float) -> Profile:
+    return replace(profile, coherent_noise=replace(profile.coherent_noise, specks=round(value)))
+
+
+PARAMETERS: Mapping[str, Parameter] = {
+    "gamma": Parameter("exponent of the look-up table", "", 1.0, 1.28, "1.03-1.25 for an aged LCoS, assumed", _gamma),
+    "gain": Parameter(
+        "stroke of the look-up table", "of 2 pi", 0.88, 1.05, "0.9-1.05 for an aged LCoS, assumed", _gain
+    ),
+    "crosstalk": Parameter("crosstalk", "px", 0.2, 0.5, "0.25 px measured, 0.3-0.5 plausible at 6.4 um", _crosstalk),
+    "fill": Parameter("fill factor", "", 0.87, 0.95, "87 % of one 8 um panel, under 95 % usual", _fill),
+    "flicker": Parameter("flicker", "of the stroke", 0.0, 0.05, "0-5 % of 2 pi reported", _flicker),
+    "beam": Parameter("width of the beam", "panel heights", 0.93, 1.57, "1000-1700 px in use", _beam),
+    "fringes": Parameter("fringes", "of the amplitude", 0.0, 0.1, "5-10 % from an uncoated cover glass", _fringes),
+    "wavefront": Parameter("phase of the beam", "rad rms", 0.0, 0.4, "assumed, up to lambda / 16", _wavefront),
+    "distance": Parameter("error of the distance", "%", -1.0, 1.0, "0.1-1 % when focused by eye", _distance),
+    "astigmatism": Parameter("astigmatism", "waves rms", -0.15, 0.15, "up to a few tenths of a wave", _astigmatism),
+    "coma": Parameter("coma", "waves rms", -0.15, 0.15, "up to a few tenths of a wave", _coma),
+    "zero_order": Parameter("unmodulated light", "of the power", 0.0, 0.35, "20 % usual, 35 % reported", _zero_order),
+    "zero_phase": Parameter("phase of the unmodulated light", "rad", -TAU / 2, TAU / 2, "unknown", _zero_phase),
+    "specks": Parameter("specks of dust on the panel", "", 0.0, 50.0, "assumed", _specks),
+}
+"""What is drawn. Ranges without another source are those of the sources that the profiles name."""
+
+
+def values(profile: Profile, index: int) -> dict[str, float]:
+    """The parameters of a draw, by their names in ``PARAMETERS``; they depend on the profile's name and seed."""
+    drawn = torch.rand(
+        len(PARAMETERS), generator=generator("bench draw", profile.name, profile.seed, index), dtype=torch.float64
+    )
+    pairs = zip(PARAMETERS.items(), drawn.tolist(), strict=True)
+    return {name: one.low + (one.high - one.low) * share for (name, one), share in pairs}
+
+
+def drawn(profile: Profile, index: int) -> Profile:
+    """The bench of a draw: ``values`` in the place of the profile's, and patterns of its own."""
+    made = replace(profile, seed=seed("patterns of a draw", profile.seed, index))
+    for name, value in values(profile, index).items():
+        made = PARAMETERS[name].put(made, value)
+    return made

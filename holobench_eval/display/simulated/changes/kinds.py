@@ -1,0 +1,259 @@
+"""What may change on a bench between its calibration and the day on which it is used, one kind of change at a time.
+
+Each kind changes the parameters of a profile, names the stages that these belong to, and changes no other. Figures that
+are marked "assumed" have no published source; lengths are those of the full panel and scale with it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from ....core.errors import UserError, suggest
+from ..profile import Profile
+from ..stages import AddedLens, Eye
+from . import camera, draws, vision
+
+Value = float | str
+"""How far a condition goes: a number, or the name of one of several."""
+
+USUAL_BITS = 8
+"""Of the panels of which fewer bits are asked."""
+GREEN = 517e-9
+"""Wavelength [m] at which a drift of the laser is told."""
+CLEARING, OPERATING, HALLER = 373.0, 308.0, 0.2
+"""Of the liquid crystal: clearing point and panel temperature [K], assumed for a usual mixture, and the exponent of
+Haller's law, birefringence ~ (1 - T / T_clearing)^0.2 (Haller, Progress in Solid State Chemistry 10, 103, 1975)."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of change.
+
+    words: what changes; unit: of the values, empty for a factor or a name; stages: the parameters of ``Profile`` that
+    may differ; apply: the profile after a change; nominal: the value that changes nothing (None: values are names, or
+    draws, and there is none); low, high: what a number may be; moves: whether the camera's view moves, so that it is
+    registered anew (else it stays as it was before the change); per: the loss is told for so much (0: not at all);
+    counted: whether values are whole numbers from 1 that name one of many; model: what is assumed, for reports.
+    """
+
+    words: str
+    unit: str
+    stages: tuple[str, ...]
+    apply: Callable[[Profile, Value], Profile]
+    model: str
+    nominal: float | None = 0.0
+    low: float = -math.inf
+    high: float = math.inf
+    moves: bool = False
+    per: float = 1.0
+    counted: bool = False
+
+    @property
+    def numeric(self) -> bool:
+        """Whether values are numbers on an axis."""
+        return self.nominal is not None
+
+
+def number(change: Callable[[Profile, float], Profile]) -> Callable[[Profile, Value], Profile]:
+    """A change by a number, which is not asked for names."""
+    return lambda profile, value: change(profile, float(value))
+
+
+def _drift(profile: Profile, days: float) -> Profile:
+    return replace(profile, drift=replace(profile.drift, days=profile.drift.days + days))
+
+
+def _distance(profile: Profile, percent: float) -> Profile:
+    way = profile.propagation
+    return replace(profile, propagation=replace(way, distance_error=way.distance_error + percent / 100))
+
+
+def _wavelength(profile: Profile, nanometres: float) -> Profile:
+    way = profile.propagation
+    moved = way.wavelength_error + nanometres * 1e-9 / GREEN
+    return replace(profile, propagation=replace(way, wavelength_error=moved))
+
+
+def _defocus(profile: Profile, waves: float) -> Profile:
+    way = profile.propagation
+    defocus = way.aberration.get("defocus", 0.0) + waves
+    return replace(profile, propagation=replace(way, aberration={**way.aberration, "defocus": defocus}))
+
+
+def _obstruction(profile: Profile, radius: float) -> Profile:
+    way = profile.propagation
+    return replace(profile, propagation=replace(way, obstruction=max(way.obstruction, radius)))
+
+
+def _power(profile: Profile, factor: float) -> Profile:
+    return replace(profile, illumination=replace(profile.illumination, power=profile.illumination.power * factor))
+
+
+def _temperature(profile: Profile, kelvin: float) -> Profile:
+    stroke = ((CLEARING - OPERATING - kelvin) / (CLEARING - OPERATING)) ** HALLER
+    red, green, blue = (gain * stroke for gain in profile.lut.gain)
+    return replace(profile, lut=replace(profile.lut, gain=(red, green, blue)))
+
+
+def _bits(profile: Profile, bits: float) -> Profile:
+    if profile.panel.bits != USUAL_BITS or profile.lut.table:
+        raise UserError(
+            f"'{profile.name}' is no panel of {USUAL_BITS} bits with a smooth look-up table, of which to take some"
+        )
+    if bits != int(bits):
+        raise UserError(f"a panel has a whole number of bits, got {bits:g}")
+    return replace(profile, panel=replace(profile.panel, bits=int(bits)))
+
+
+def _sibling(profile: Profile, value: Value) -> Profile:
+    return replace(profile, seed=profile.seed + int(value))
+
+
+def _ambient(profile: Profile, level: float) -> Profile:
+    return replace(profile, sensor=replace(profile.sensor, ambient=profile.sensor.ambient + level))
+
+
+def _refocus(profile: Profile, millimetres: float) -> Profile:
+    moved = millimetres * 1e-3 / profile.panel.distance
+    return replace(_distance(profile, 100 * moved), lens=AddedLens((moved, moved, 0.0)))
+
+
+def _other_plane(profile: Profile, millimetres: float) -> Profile:
+    return _distance(profile, 100 * millimetres * 1e-3 / profile.panel.distance)
+
+
+def _eye(profile: Profile, value: Value) -> Profile:
+    return replace(profile, eye=Eye(vision.relative(profile, str(value))))
+
+
+def _corrected_eye(profile: Profile, value: Value) -> Profile:
+    return replace(_eye(profile, value), lens=AddedLens(vision.relative(profile, str(value))))
+
+
+def _known_eye(profile: Profile, value: Value) -> Profile:
+    return replace(profile, eye=Eye(vision.relative(profile, str(value)), known=True))
+
+
+def _draw(profile: Profile, value: Value) -> Profile:
+    return draws.drawn(profile, int(value))
+
+
+KINDS: Mapping[str, Kind] = {
+    "camera_shift_x": Kind(
+        "camera moved sideways", "mm", camera.STAGES, number(camera.moved_sideways), camera.MODEL,
+        low=-40, high=40, moves=True,
+    ),
+    "camera_shift_y": Kind(
+        "camera moved up or down", "mm", camera.STAGES, number(camera.moved_up), camera.MODEL,
+        low=-40, high=40, moves=True,
+    ),
+    "drift": Kind(
+        "drift since calibration", "days", ("drift",), number(_drift),
+        "seeded walks of laser power, tilt of the beam, stroke of the panel and pose at the profile's daily rates, and "
+        "dust that settles at the rate at which the profile's came in a year (assumed)",
+        low=0, high=3650, moves=True, per=30,
+    ),
+    "sensor": Kind(
+        "camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)), camera.SENSOR_MODEL,
+        nominal=None, moves=True,
+    ),
+    "distance": Kind(
+        "error of the propagation distance", "%", ("propagation",), number(_distance),
+        "added to the profile's error", low=-20, high=20, per=0.1,
+    ),
+    "wavelength": Kind(
+        "drift of the lasers' wavelength", "nm", ("propagation",), number(_wavelength),
+        "at 517 nm, the other lasers by the same share; added to the profile's error", low=-20, high=20,
+    ),
+    "defocus": Kind(
+        "defocus", "waves rms", ("propagation",), number(_defocus),
+        "Zernike defocus at 517 nm over the iris, added to the profile's", low=-10, high=10, per=0.1,
+    ),
+    "laser_power": Kind(
+        "laser power", "of the nominal", ("illumination",), number(_power),
+        "the exposure stays, so that less light is noisier and more may saturate", nominal=1.0, low=0.01, high=20,
+        per=0,
+    ),
+    "temperature": Kind(
+        "panel temperature above that of calibration", "K", ("lut",), number(_temperature),
+        "the stroke follows the birefringence by Haller's law, clearing point 100 C, panel at 35 C (assumed)",
+        low=-30, high=50, per=10,
+    ),
+    "obstruction": Kind(
+        "disc in the middle of the pupil", "of its radius", ("propagation",), number(_obstruction),
+        "opaque, with the soft edge of the iris", low=0, high=0.95, per=0.1,
+    ),
+    "bits": Kind(
+        "bit depth of the panel", "bits", ("panel",), number(_bits),
+        "the same look-up table at fewer levels", nominal=float(USUAL_BITS), low=1, high=USUAL_BITS,
+    ),
+    "sibling": Kind(
+        "another panel of the same kind", "", ("seed",), _sibling,
+        "same profile, every random pattern drawn anew", nominal=None, moves=True, counted=True,
+    ),
+    "ambient": Kind(
+        "ambient light", "of a white pixel", ("sensor",), number(_ambient),
+        "even over the sensor, and not in the dark frame", low=0, high=10, per=0.01,
+    ),
+    "refocus": Kind(
+        "image moved by a lens phase, camera at its new place", "mm", ("lens", "propagation"), number(_refocus),
+        "paper 7.1: a lens added to the same hologram; on a smaller panel the way shrinks with the distance. What it "
+        "loses: the lens tilts light towards the panel's edge, where the iris cuts another part of its band, and adds "
+        "wraps, which a panel with crosstalk blurs",
+        low=-50, high=50, moves=True,
+    ),
+    "other_plane": Kind(
+        "camera out of the image plane", "mm", ("propagation",), number(_other_plane),
+        "as refocus, without the lens", low=-50, high=50,
+    ),
+    "eye": Kind(
+        "eye that needs glasses", "", ("eye",), _eye,
+        f"relaxed, behind an eyepiece of {1e3 * vision.EYEPIECE:g} mm (assumed); sphere / cylinder x axis in dioptres "
+        "and degrees",
+        nominal=None,
+    ),
+    "corrected_eye": Kind(
+        "the same eye, corrected by the hologram", "", ("eye", "lens"), _corrected_eye,
+        "paper 4.2: a phase of the prescription's sphere and cylinder added to the same hologram",
+        nominal=None, moves=True,
+    ),
+    "known_eye": Kind(
+        "the same eye, known to the methods", "", ("eye",), _known_eye,
+        "the eye is part of the nominal optics that holograms are computed for",
+        nominal=None,
+    ),
+    "draw": Kind(
+        "random draw of the bench's parameters", "", draws.STAGES, _draw, draws.MODEL, nominal=None, moves=True,
+        counted=True,
+    ),
+}  # fmt: skip
+"""Every kind of condition by its name in a config."""
+
+
+def checked(kind: str, value: Value) -> Value:
+    """A value as its kind has it: a number within its range, a name as text. UserError for anything else."""
+    if kind not in KINDS:
+        raise UserError(f"unknown condition '{kind}'; {suggest(kind, KINDS)}")
+    found = KINDS[kind]
+    if found.counted:
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+        if not re.fullmatch(r"[1-9]\d{0,8}", text):
+            raise UserError(f"{kind} is named by a whole number from 1, got {value!r}")
+        return text
+    if kind.endswith("eye"):
+        return str(vision.Prescription.read(str(value)))
+    if not found.numeric:
+        return str(value)
+    if not isinstance(value, int | float) or isinstance(value, bool) or not found.low <= value <= found.high:
+        raise UserError(f"{kind} is a number from {found.low:g} to {found.high:g}, got {value!r}")
+    return float(value)
+
+
+def altered(profile: Profile, kind: str, value: Value) -> Profile:
+    """The profile, not scaled to a panel yet, after a change; the same object for a kind's nominal value."""
+    if KINDS[kind].numeric and value == KINDS[kind].nominal:
+        return profile
+    return KINDS[kind].apply(profile, value)

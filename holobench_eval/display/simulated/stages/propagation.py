@@ -1,0 +1,87 @@
+"""Stages 8 and 9: from the panel through the iris, with the true distance, wavelength and aberrations (paper Eq. 8)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from ....optics.angular_spectrum import angular_spectrum_phase
+from ....optics.convolution import frequencies, iris
+from ....optics.zernike import wavefront
+from .crosstalk import sample_positions
+from .geometry import Geometry
+
+
+@dataclass(frozen=True)
+class Propagation:
+    """What separates the light's way from the nominal one.
+
+    distance_error, wavelength_error: relative; aberration: rms waves at 517 nm over the iris (or over the band
+    when there is none), by Zernike name (optics/zernike.py); pupil_shift: of the iris (rows, columns), and obstruction:
+    radius of an opaque disc in its middle, both relative to its radius.
+    """
+
+    distance_error: Annotated[float, Interval(ge=-0.5, le=0.5)] = 0.0
+    wavelength_error: Annotated[float, Interval(ge=-0.1, le=0.1)] = 0.0
+    aberration: Mapping[str, float] = field(default_factory=dict)
+    pupil_shift: tuple[float, float] = (0.0, 0.0)
+    obstruction: Annotated[float, Interval(ge=0, lt=1)] = 0.0
+
+    def transfer(
+        self, geometry: Geometry, padded: tuple[int, int], pupil: float | None, fraction: tuple[float, float]
+    ) -> Tensor:
+        """Transfer function on the padded grid, from ``fraction[0]`` to ``fraction[1]`` of the way, complex64.
+
+        The iris and the aberrations act once, on the part of the way that starts at the panel.
+        """
+        fy, fx = frequencies(padded, geometry.pitch)
+        wavelength = geometry.wavelength * (1 + self.wavelength_error)
+        distance = geometry.distance * (1 + self.distance_error) * (fraction[1] - fraction[0])
+        f_squared = fy**2 + fx**2
+        phase = angular_spectrum_phase(f_squared, wavelength, distance)
+        amplitude = (f_squared < 1 / wavelength**2).double()
+        if fraction[0] == 0:
+            amplitude = amplitude * self.iris(fy, fx, geometry, pupil)
+            phase = phase + self.pupil_phase(fy, fx, geometry, pupil)
+        return torch.polar(amplitude, phase).to(torch.complex64)
+
+    def iris(self, fy: Tensor, fx: Tensor, geometry: Geometry, pupil: float | None) -> Tensor:
+        """Amplitude at spatial frequencies [1/m]; the obstruction is told of the whole band where there is no iris."""
+        radius = (pupil or 1.0) / (2 * geometry.pitch)
+        y, x = fy - self.pupil_shift[0] * radius, fx - self.pupil_shift[1] * radius
+        amplitude = iris(y, x, geometry.pitch, pupil)
+        if self.obstruction:
+            amplitude = amplitude * (1 - iris(y, x, geometry.pitch, self.obstruction * (pupil or 1.0)))
+        return amplitude
+
+    def pupil_phase(self, fy: Tensor, fx: Tensor, geometry: Geometry, pupil: float | None) -> Tensor:
+        """Aberration [rad] at spatial frequencies [1/m]; constant beyond the iris, where no light passes."""
+        scale = 2 * geometry.pitch / (pupil or 1.0)
+        y, x = torch.broadcast_tensors(fy * scale, fx * scale)
+        beyond = torch.sqrt(y * y + x * x).clamp_min(1.1) / 1.1
+        return wavefront(self.aberration, y / beyond, x / beyond) * (517e-9 / geometry.wavelength)
+
+
+def sample_weights(
+    padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool
+) -> tuple[Tensor, Tensor]:
+    """Weights that add the spectra of the sub-samples to that of the panel, ``(samples, padded)`` for each axis.
+
+    Each sub-sample sits off its pixel's centre and, with ``hold``, is a small square (a sinc in frequency). The
+    spectra are those of fields whose carrier ``blaze`` [cycles per pixel] has been taken off pixel by pixel, so the
+    light of frequency f left the panel at f + blaze.
+    """
+    axes = []
+    for size, carrier in zip(padded, blaze, strict=True):
+        f = torch.fft.fftfreq(size, dtype=torch.float64) + carrier
+        envelope = torch.sinc(f / samples) if hold else torch.ones_like(f)
+        angle = -2 * math.pi * torch.tensor(sample_positions(samples), dtype=torch.float64)[:, None] * f
+        weights = torch.polar(envelope.expand_as(angle).contiguous(), angle) / samples
+        axes.append(weights.to(torch.complex64))
+    return axes[0], axes[1]

@@ -1,0 +1,106 @@
+"""Stage 11: the relay carries the image to the sensor, magnified, turned and a little distorted (paper 5.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from annotated_types import Interval
+from torch import Tensor
+
+from ....imaging.shifts import correlate
+
+
+@dataclass(frozen=True)
+class Relay:
+    """Pose of the panel's image on the sensor.
+
+    magnification; rotation [degrees]; shift (rows, columns) and perspective: relative to the panel's height;
+    distortion: radial displacement at half a panel height, relative to it.
+    """
+
+    magnification: Annotated[float, Interval(gt=0, le=10)] = 1.0
+    rotation: Annotated[float, Interval(ge=-180, le=180)] = 0.0
+    shift: tuple[float, float] = (0.0, 0.0)
+    perspective: tuple[float, float] = (0.0, 0.0)
+    distortion: Annotated[float, Interval(ge=-0.2, le=0.2)] = 0.0
+
+    def frame_shape(self, window: tuple[int, int], pitch: float, sensor_pitch: float) -> tuple[int, int]:
+        """Sensor read-out (rows, columns) for a window of the panel [px], with a margin of 12 % for the pose."""
+        ratio = self.magnification * pitch / sensor_pitch
+        return math.ceil(window[0] * ratio * 1.12), math.ceil(window[1] * ratio * 1.12)
+
+    def panel_points(
+        self, shape: tuple[int, int], pitch: float, sensor_pitch: float, window: tuple[int, int] | None = None
+    ) -> Tensor:
+        """Panel coordinates (row, column) [px] seen by every sensor pixel, ``(Hs, Ws, 2)`` float64.
+
+        window: the part of the panel, in its middle, that is read out (all of it by default).
+        """
+        rows, columns = self.frame_shape(window or shape, pitch, sensor_pitch)
+        ratio = self.magnification * pitch / sensor_pitch * shape[0]
+        v = ((torch.arange(rows, dtype=torch.float64) - (rows - 1) / 2) / ratio - self.shift[0])[:, None]
+        u = ((torch.arange(columns, dtype=torch.float64) - (columns - 1) / 2) / ratio - self.shift[1])[None, :]
+        turn = math.radians(self.rotation)
+        y = math.cos(turn) * v - math.sin(turn) * u
+        x = math.sin(turn) * v + math.cos(turn) * u
+        depth = 1 + self.perspective[0] * y + self.perspective[1] * x
+        y, x = y / depth, x / depth
+        stretch = 1 + self.distortion * 4 * (y * y + x * x)
+        row = y * stretch * shape[0] + (shape[0] - 1) / 2
+        column = x * stretch * shape[0] + (shape[1] - 1) / 2
+        return torch.stack([row, column], dim=-1)
+
+
+def box_filter(image: Tensor, width: float) -> Tensor:
+    """Mean over a square of ``width`` samples around each sample of ``(..., H, W)``; the sensor's pixel area."""
+    if width <= 1:
+        return image
+    reach = math.ceil((width - 1) / 2)
+    edge = (width - (2 * reach - 1)) / 2
+    taps = [share / width for share in (edge, *[1.0] * (2 * reach - 1), edge)]
+    flat = F.pad(image.reshape(-1, 1, *image.shape[-2:]), (reach, reach, reach, reach), mode="replicate")
+    return correlate(correlate(flat, taps, dim=-2), taps, dim=-1).reshape(image.shape)
+
+
+def sampling_grid(points: Tensor, shape: tuple[int, int]) -> Tensor:
+    """Points ``(Hs, Ws, 2)`` (row, column) in pixels of a panel of ``shape``, as ``grid_sample`` wants them, float32.
+
+    -1 and 1 are the centres of the first and the last pixel.
+    """
+    size = torch.tensor(shape, dtype=torch.float64)
+    return (2 * points / (size - 1) - 1).flip(-1).float()
+
+
+def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
+    """Bilinear values of an image ``(H, W)``, sampled ``per_pixel`` times a pixel, at a ``sampling_grid``.
+
+    The finer samples start at the first pixel's centre and go on past the last one's; the grid is scaled for that.
+    """
+    rows, columns = image.shape
+    pixels = grid.new_tensor([columns / per_pixel - 1, rows / per_pixel - 1])
+    scale = pixels * per_pixel / grid.new_tensor([columns - 1.0, rows - 1.0])
+    fine = grid if per_pixel == 1 else (grid + 1) * scale - 1
+    if image.requires_grad and not image.is_cpu:
+        return gathered(image, fine)
+    return F.grid_sample(image[None, None], fine[None], mode="bilinear", padding_mode="zeros", align_corners=True)[0, 0]
+
+
+def gathered(image: Tensor, grid: Tensor) -> Tensor:
+    """What ``grid_sample`` gives for an image ``(H, W)``, from pixels picked by index.
+
+    Its gradient is deterministic on a GPU, where that of ``grid_sample`` is not.
+    """
+    rows, columns = image.shape
+    x, y = (grid[..., 0] + 1) / 2 * (columns - 1), (grid[..., 1] + 1) / 2 * (rows - 1)
+    left, top = x.floor(), y.floor()
+    total = torch.zeros_like(x)
+    for row, column in ((top, left), (top, left + 1), (top + 1, left), (top + 1, left + 1)):
+        inside = (row >= 0) & (row <= rows - 1) & (column >= 0) & (column <= columns - 1)
+        weight = (1 - (y - row).abs()) * (1 - (x - column).abs()) * inside
+        pixels = image[row.clamp(0, rows - 1).long(), column.clamp(0, columns - 1).long()]
+        total = total + weight * pixels
+    return total

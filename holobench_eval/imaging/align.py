@@ -1,0 +1,222 @@
+"""Alignment from the pictures themselves: where a target lies in a capture, where no fiducial was photographed.
+
+Features or templates propose where the target may lie, the enhanced correlation coefficient (Evangelidis & Psarakis
+2008) refines it from coarse to fine, and the result is refused unless target and capture are alike all over.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import CellError
+from .features import by_features, by_templates
+from .similarity import PARTS, SIDE, Likeness, likeness, reduced, structured, view
+from .warp import Array, Frame, Warp
+
+ALIKE = 0.6  # least correlation of target and capture; pairs of other pictures stay below 0.45
+PART_ALIKE = 0.3  # least correlation of a part
+CLEARLY = 0.02  # in correlation, by which a turned or mirrored target has to fit better or worse
+SAME = 0.98  # correlation of a target with itself turned or mirrored from which on this makes no difference
+STRIPES = 0.02  # of the mean squared slope along one direction: less along the other is none
+HOPEFUL = 0.2  # least correlation of a proposal that is worth refining
+FEWEST_PARTS = 4  # with structure, of nine
+NEARLY = 0.1  # in correlation: what the fine levels may add
+COARSE = (64, 128, 256)  # pixels of the target's longer side at which it is refined
+FINE = (512, 1024)
+BLUR = 5  # pixels, odd: the filter before each step
+ITERATIONS = 60
+STEP = 1e-6
+FURTHEST = 0.15  # of the target's longer side in the capture: how far a corner moves in the refinement
+STEEPEST = 2.5  # between the scales at two corners
+OVERHANG = 2.0  # target pixels that may lie beyond the capture's border
+SCALES = (0.2, 8.0)  # capture pixels a target pixel
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Where a target lies in a capture, and their correlation there, in structures far coarser than speckle."""
+
+    warp: Warp
+    correlation: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain lists and numbers; `from_dict` reads them back exactly."""
+        shape, homography = list(self.warp.shape), self.warp.homography.tolist()
+        return {"shape": shape, "homography": homography, "correlation": self.correlation}
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Alignment:
+        """The alignment that `to_dict` described."""
+        height, width = plain["shape"]
+        return cls(_plane((height, width), np.array(plain["homography"])), float(plain["correlation"]))
+
+
+def align(capture: NDArray[np.floating], target: NDArray[np.floating]) -> Alignment:
+    """Find a target ``(C, h, w)`` in its capture ``(C', Hs, Ws)``, from the two alone.
+
+    Values in [0, 1], as displays are given them (or square roots of light). The target may be mirrored, turned by
+    quarters and by some degrees more, seen in perspective, scaled by 0.3 to 5, and fill a part of the capture; all of
+    it must be there. Raises `CellError` where the target has too little structure, and where it is not found.
+    """
+    frame, reference = gray(capture), gray(target)
+    _refuse_plain(reference)
+    best = -1.0
+    for start in _proposals(frame, reference):
+        if not _sane(start, frame.shape, slack=10.0) or likeness(frame, reference, start).whole < HOPEFUL:
+            continue
+        near = refined(frame, reference, start, COARSE)
+        alike = likeness(frame, reference, near)
+        best = max(best, alike.whole)
+        if alike.whole < ALIKE - NEARLY:
+            continue
+        found = refined(frame, reference, near, FINE)
+        if accepted(likeness(frame, reference, found)) and _sane(found, frame.shape):
+            found = _settled(frame, reference, found)
+            alike = likeness(frame, reference, found)
+            if accepted(alike) and _sane(found, frame.shape):
+                _refuse_overhang(found, frame.shape)
+                return Alignment(found, alike.whole)
+    seen = f"the best correlation is {best:.2f}" if best > 0 else "nothing is alike"
+    raise CellError(
+        f"the target is not found in the capture ({seen}; {ALIKE} and no displaced parts are needed): it shows another "
+        "picture, or is too faint, too speckled or cut off"
+    )
+
+
+def _settled(frame: Frame, reference: Frame, warp: Warp) -> Warp:
+    """The warp, or the same after a turn or a mirror of the target where that fits better.
+
+    Raises `CellError` where one fits as well, unless the target itself looks the same.
+    """
+    here, rivals = likeness(frame, reference, warp).whole, []
+    for symmetry in _symmetries(warp.shape):
+        if likeness(reference, reference, symmetry).whole < SAME:
+            start = _plane(warp.shape, warp.homography @ symmetry.homography)
+            turned = refined(frame, reference, start, COARSE[:-1])
+            rivals.append((likeness(frame, reference, turned).whole, turned))
+    best, other = max(rivals, key=lambda rival: rival[0], default=(-1.0, warp))
+    if abs(best - here) < CLEARLY:
+        raise CellError("the target is found in the capture in two ways, one of them turned or mirrored, equally well")
+    return warp if best < here else refined(frame, reference, other, COARSE + FINE)
+
+
+def _symmetries(shape: tuple[int, int]) -> Iterator[Warp]:
+    """The turns by quarters and the mirrors of a target about its centre, without the one that changes nothing."""
+    centre = np.eye(3)
+    centre[:2, 2] = (shape[1] - 1) / 2, (shape[0] - 1) / 2
+    for across, down, swapped in itertools.product((1.0, -1.0), (1.0, -1.0), (False, True)):
+        linear = np.array([[0, across], [down, 0]]) if swapped else np.diag([across, down])
+        if swapped or (across, down) != (1.0, 1.0):
+            turn = np.eye(3)
+            turn[:2, :2] = linear
+            yield _plane(shape, centre @ turn @ np.linalg.inv(centre))
+
+
+def confirmed(capture: NDArray[np.floating], target: NDArray[np.floating], warp: Warp) -> Alignment | None:
+    """The alignment by a given warp, where capture and target are as alike under it as `align` asks for; else None."""
+    frame, reference = gray(capture), gray(target)
+    found = likeness(frame, reference, warp)
+    enough = len(structured(reference)) >= FEWEST_PARTS and accepted(found)
+    return Alignment(warp, found.whole) if enough and _sane(warp, frame.shape) else None
+
+
+def gray(picture: NDArray[np.floating]) -> Frame:
+    """The mean over the channels of ``(C, h, w)``."""
+    return np.ascontiguousarray(picture.mean(axis=0), dtype=np.float32)
+
+
+def accepted(found: Likeness) -> bool:
+    """Whether two pictures are alike as a whole and in their parts, of which one in six may be odd."""
+    odd = sum(part < PART_ALIKE for part in found.parts) + found.displaced
+    return found.whole >= ALIKE and len(found.parts) >= FEWEST_PARTS and odd <= len(found.parts) // 6
+
+
+def refined(frame: Frame, reference: Frame, start: Warp, levels: tuple[int, ...]) -> Warp:
+    """The warp of highest correlation near ``start``, from coarse to fine.
+
+    A level is kept when the correlation rises there, and all of them when no corner moves too far.
+    """
+    warp = start
+    longest = max(reference.shape)
+    for side in sorted({min(side, longest) for side in levels}):
+        warp = _climbed(frame, reference, warp, side)
+    moved = np.linalg.norm(warp.corners() - start.corners(), axis=1).max()
+    return warp if moved <= FURTHEST * max(reference.shape) * start.scale() else start
+
+
+def _climbed(frame: Frame, reference: Frame, warp: Warp, side: int) -> Warp:
+    seen = view(frame, reference, warp, side)
+    if not seen.inside.any():
+        return warp
+    target, capture = seen.even()
+    stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, ITERATIONS, STEP)
+    inside = seen.inside.astype(np.uint8) * 255
+    start = np.eye(3, dtype=np.float32)
+    try:
+        _, step = cv2.findTransformECC(target, capture, start, cv2.MOTION_HOMOGRAPHY, stop, inside, BLUR)
+    except cv2.error:  # it does not converge
+        return warp
+    homography = warp.homography @ seen.to_target @ np.asarray(step, np.float64) @ np.linalg.inv(seen.to_target)
+    after = _plane(warp.shape, homography)
+    before = _correlation(target, capture, seen.inside)
+    again = view(frame, reference, after, side)
+    return after if _correlation(*again.even(), again.inside & seen.inside) > before else warp
+
+
+def _correlation(target: Frame, capture: Frame, inside: NDArray[np.bool_]) -> float:
+    if inside.sum() < 0.5 * inside.size:
+        return -1.0
+    a, b = (np.asarray(cv2.GaussianBlur(side, (BLUR, BLUR), 0))[inside] for side in (target, capture))
+    return float(np.corrcoef(a, b)[0, 1]) if min(a.std(), b.std()) > 0 else -1.0
+
+
+def _proposals(frame: Frame, reference: Frame) -> Iterator[Warp]:
+    """Where the target may lie, likely places first."""
+    shape = (reference.shape[0], reference.shape[1])
+    yield from (_plane(shape, homography) for homography in by_features(frame, reference))
+    yield from (_plane(shape, homography) for homography in by_templates(frame, reference))
+
+
+def _plane(shape: tuple[int, int], homography: Array) -> Warp:
+    return Warp(shape, homography / homography[2, 2], np.zeros((6, 2)))
+
+
+def _sane(warp: Warp, frame: tuple[int, ...], slack: float = 1.0) -> bool:
+    """Whether a camera may have seen a display so: no fold, no extreme perspective, scale or place."""
+    shape, homography = warp.shape, warp.homography
+    ends = np.array(list(itertools.product((0.0, shape[1] - 1.0), (0.0, shape[0] - 1.0))))
+    depth = np.column_stack([ends, np.ones(4)]) @ homography[2]
+    if not np.isfinite(homography).all() or depth.min() <= 0:
+        return False
+    scales = (np.abs(np.linalg.det(homography)) / depth**3) ** 0.5
+    corners = warp.corners()
+    room = OVERHANG * slack * scales.max() + 0.05 * slack * max(frame)
+    within = np.all(corners > -room) and np.all(corners < np.array(frame[::-1]) + room)
+    return bool(within and scales.max() <= STEEPEST * scales.min() and SCALES[0] <= scales.min() <= SCALES[1])
+
+
+def _refuse_plain(reference: Frame) -> None:
+    """Raise `CellError` for a target that gives too little to be found by: flat, nearly black, or stripes."""
+    parts = structured(reference)
+    rows, columns = ({part[axis].start for part in parts} for axis in (0, 1))
+    if len(parts) < FEWEST_PARTS or min(len(rows), len(columns)) < 2:
+        every = PARTS * PARTS
+        raise CellError(f"the target has structure in {len(parts)} of its {every} parts only, too little to find it by")
+    slope_y, slope_x = np.gradient(reduced(reference, SIDE)[0].astype(np.float64))
+    spread = np.linalg.eigvalsh(np.cov(slope_x.ravel(), slope_y.ravel()))
+    if spread[0] < STRIPES * spread[1]:
+        raise CellError("the target has structure in one direction only, along which its place cannot be found")
+
+
+def _refuse_overhang(warp: Warp, frame: tuple[int, ...]) -> None:
+    corners = warp.corners()
+    beyond = max(float(-corners.min()), float((corners - np.array(frame[::-1]) + 1).max())) / warp.scale()
+    if beyond > OVERHANG:
+        raise CellError(f"the target reaches {beyond:.0f} of its pixels beyond the capture; all of it must be on it")

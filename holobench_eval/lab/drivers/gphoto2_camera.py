@@ -1,0 +1,210 @@
+"""Cameras with lenses, by libgphoto2 (driver ``gphoto2``, extra ``[gphoto2]``): RAW files only, times of the shutter.
+
+A DSLR on Live View or JPEG gives pictures for people: curved, balanced, sharpened. Only its RAW counts light.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ...core.errors import UserError
+from ..devices import Counts, DeviceError
+from ..raw import RawFrame, is_jpeg, read_raw
+from .shutter import exact, nearest, speeds
+from .worker import Worker, line
+
+OPENING = 60.0  # seconds, with a first picture
+CAPTURING = 30.0  # beyond the exposure, which long-exposure noise reduction may double
+
+FORMATS = ("imageformat", "imagequality", "imgquality")  # Canon, Nikon and Sony, others
+FULL_RAW = re.compile(r"\b(raw|nef|dng|arw|orf|raf|pef|rw2)\b", re.IGNORECASE)
+LESS_THAN_RAW = re.compile(r"\+|jpe?g|fine|normal|basic|large|small|medium|craw|[sm]-?raw|s\d", re.IGNORECASE)
+MODES = ("autoexposuremode", "expprogram")
+
+
+@dataclass(frozen=True)
+class Gphoto2Settings:
+    """Which camera, and its sensitivity.
+
+    model: as the camera calls itself (``Canon EOS Rebel T6i``); port: where it is plugged in (``usb:001,004``), for
+    two of the same model; both may be left out where one camera answers. iso: set before the first picture; without
+    it the camera must stand on a fixed one.
+    """
+
+    model: str = ""
+    port: str = ""
+    iso: str = ""
+
+
+class Gphoto2Camera:
+    """A DSLR as a `Camera`: ``(Hs, Ws, 3)`` uint16 at half the sensor's rows and columns (see ``read_raw``)."""
+
+    def __init__(self, settings: Gphoto2Settings) -> None:
+        """Opens it, sets RAW and a fixed exposure, and takes a first picture.
+
+        UserError: the package is missing, no such camera or several, one that gives no RAW or whose shutter cannot be
+        set, automatic exposure or sensitivity. DeviceError: it does not answer.
+        """
+        self.name = settings.model or "the DSLR"
+        self._settings = settings
+        self._camera: Any = None
+        self._gp = _gphoto2()
+        self._worker = Worker(self.name)
+        try:
+            self._worker.call("opening", OPENING, self._open)
+            first, _ = self._picture(nearest(self._shutter, 0.01))
+        except BaseException:
+            self.close()
+            raise
+        self.white = first.white
+
+    @property
+    def exposures(self) -> tuple[float, float]:
+        """Shortest and longest exposure [s] of the shutter by its clock; ``bulb`` is not used."""
+        return min(self._exact.values()), max(self._exact.values())
+
+    def expose(self, seconds: float) -> tuple[Counts, float]:
+        """A picture at the shutter speed nearest to ``seconds``, as a ratio, and the time [s] of that speed."""
+        frame, real = self._picture(min(self._exact, key=lambda time: abs(math.log(self._exact[time] / seconds))))
+        if frame.white != self.white:
+            raise DeviceError(f"{self.name}: the white level went from {self.white:.0f} to {frame.white:.0f}")
+        return frame.counts, real
+
+    def close(self) -> None:
+        """Give the camera back to the desktop."""
+        self._worker.stop(CAPTURING, self._close)
+
+    def _open(self) -> None:
+        gp, settings = self._gp, self._settings
+        found = _found(gp)
+        fitting = [
+            (model, port)
+            for model, port in found
+            if settings.model.lower() in ("", model.lower()) and settings.port in ("", port)
+        ]
+        if len(fitting) != 1:
+            listed = ", ".join(f"{model} at {port}" for model, port in found) or "none; is it on, and not in use?"
+            raise UserError(f"{len(fitting) or 'no'} cameras '{settings.model or 'any'}'; found: {listed}")
+        model, port = fitting[0]
+        camera = gp.Camera()
+        abilities, ports = gp.CameraAbilitiesList(), gp.PortInfoList()
+        abilities.load()
+        ports.load()
+        camera.set_abilities(abilities.get_abilities(abilities.lookup_model(model)))
+        camera.set_port_info(ports.get_info(ports.lookup_path(port)))
+        camera.init()
+        self._camera = camera
+        serial = self._value("serialnumber")
+        self.name = self._worker.name = f"{model} {serial}".strip()
+
+        self._fix_exposure()
+        self._choose_raw()
+        with contextlib.suppress(UserError, DeviceError):  # else its card fills up
+            self._choose("capturetarget", lambda choice: bool(re.search(r"ram", choice, re.IGNORECASE)))
+
+    def _fix_exposure(self) -> None:
+        for mode in MODES:
+            if not (value := self._value(mode) or "M").upper().startswith("M"):
+                raise UserError(f"{self.name} stands on '{value}', which sets exposures by itself; turn its dial to M")
+        if self._settings.iso:
+            self._choose("iso", lambda choice: choice == self._settings.iso)
+        elif "auto" in self._value("iso").lower():
+            raise UserError(f"{self.name} sets its ISO by itself; give one, such as iso: '100'")
+        self._shutter = speeds(self._choices("shutterspeed"))
+        if not self._shutter:
+            raise UserError(f"{self.name} does not let its shutter speed be set over USB; is its dial on M?")
+        self._exact = exact(self._shutter)
+
+    def _choose_raw(self) -> None:
+        for config in FORMATS:
+            if self._choices(config):
+                return self._choose(config, lambda word: bool(FULL_RAW.search(word)) and not LESS_THAN_RAW.search(word))
+
+    def _picture(self, shutter: float) -> tuple[RawFrame, float]:
+        data = self._worker.call("taking a picture", CAPTURING + 3 * shutter, lambda: self._take(shutter))
+        if is_jpeg(data):
+            raise UserError(
+                f"{self.name} gave a JPEG, whose values are not linear in light; set its image quality to RAW alone"
+            )
+        try:
+            return read_raw(data, f"a picture of {self.name}"), self._exact[shutter]
+        except UserError as error:
+            raise DeviceError(str(error)) from error
+
+    def _take(self, shutter: float) -> bytes:
+        gp, camera = self._gp, self._camera
+        wanted = self._shutter[shutter]
+        if self._value("shutterspeed") != wanted:
+            self._choose("shutterspeed", lambda choice: choice == wanted)
+        if (kept := self._value("shutterspeed")) != wanted:
+            raise DeviceError(f"{self.name}: the shutter speed stays at {kept}, not {wanted}")
+        path = camera.capture(gp.GP_CAPTURE_IMAGE)
+        # the file must outlive the look at its memory, which does not keep it
+        file = camera.file_get(path.folder, path.name, gp.GP_FILE_TYPE_NORMAL)
+        data = bytes(file.get_data_and_size())
+        with contextlib.suppress(gp.GPhoto2Error):  # some forget it by themselves
+            camera.file_delete(path.folder, path.name)
+        return data
+
+    def _widget(self, config: str) -> Any:
+        try:
+            return self._camera.get_single_config(config)
+        except self._gp.GPhoto2Error:
+            return None
+
+    def _value(self, config: str) -> str:
+        widget = self._widget(config)
+        return "" if widget is None else str(widget.get_value()).strip()
+
+    def _choices(self, config: str) -> list[str]:
+        widget = self._widget(config)
+        if widget is None or widget.get_type() not in (self._gp.GP_WIDGET_RADIO, self._gp.GP_WIDGET_MENU):
+            return []
+        return [] if widget.get_readonly() else [str(choice) for choice in widget.get_choices()]
+
+    def _choose(self, config: str, fits: Callable[[str], bool]) -> None:
+        choices = self._choices(config)
+        choice = next((choice for choice in choices if fits(choice)), None)
+        if choice is None:
+            raise UserError(f"{self.name}: no fitting '{config}' among: {', '.join(choices) or 'nothing'}")
+        widget = self._widget(config)
+        widget.set_value(choice)
+        self._camera.set_single_config(config, widget)
+
+    def _close(self) -> None:
+        if self._camera is not None:
+            self._camera.exit()
+
+
+def list_cameras() -> list[str]:
+    """``Canon EOS Rebel T6i at usb:001,004`` for every camera that answers; UserError without the package."""
+    gp = _gphoto2()
+    worker = Worker("libgphoto2")
+    try:
+        found = worker.call("looking for cameras", CAPTURING, lambda: _found(gp))
+    finally:
+        worker.stop(0, lambda: None)
+    return [f"{model} at {port}" for model, port in found]
+
+
+def _found(gp: Any) -> list[tuple[str, str]]:
+    answering = gp.Camera.autodetect()
+    return [(answering.get_name(index), answering.get_value(index)) for index in range(answering.count())]
+
+
+def _gphoto2() -> Any:
+    try:
+        import gphoto2
+    except ImportError as error:
+        hint = "pip install 'holobench_eval[gphoto2]'"
+        raise UserError(f"driver 'gphoto2' needs the package gphoto2: {hint} ({line(error)})") from error
+    try:
+        import rawpy  # noqa: F401
+    except ImportError as error:
+        raise UserError("driver 'gphoto2' needs rawpy to read RAW files: pip install 'holobench_eval[raw]'") from error
+    return gphoto2

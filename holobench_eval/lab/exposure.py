@@ -1,0 +1,137 @@
+"""Exposure and what follows from it: frames averaged, dark frames subtracted, brackets combined. All in float."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..imaging.warp import Array
+from .devices import Camera, Counts, DeviceError
+
+FILL, PERCENTILE = 0.7, 99.9  # where auto exposure puts which samples, as a part of the range from dark to white
+ACCEPTED = 0.6, 1.25  # of FILL: wide enough for shutters that know only full stops
+DIMMEST = 0.1  # of the range; less is refused, since the counts are too coarse
+TRIES = 16
+STRONGEST_STEP = 32.0
+
+
+@dataclass(frozen=True, eq=False)
+class Averaged:
+    """The mean of some frames: counts ``(Hs, Ws)`` float64, which samples any of them saturates, seconds of each."""
+
+    counts: Array
+    saturated: NDArray[np.bool_]
+    seconds: float
+
+
+def averaged(camera: Camera, seconds: float, count: int, plane: int) -> Averaged:
+    """Mean of ``count`` frames; plane: the one that is taken of a colour camera's. DeviceError for no good frame."""
+    shortest, longest = camera.exposures
+    total: Array = np.zeros(())
+    saturated: NDArray[np.bool_] = np.zeros((), dtype=bool)
+    took = 0.0
+    for _ in range(count):
+        frame, real = _exposed(camera, min(max(seconds, shortest), longest), plane)
+        if total.ndim and total.shape != frame.shape:
+            raise DeviceError(f"{camera.name}: a frame of {frame.shape} follows one of {total.shape}")
+        total, saturated, took = total + frame, saturated | (frame >= camera.white), took + real
+    return Averaged(total / count, saturated, took / count)
+
+
+def _exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:
+    frame, real = camera.expose(seconds)
+    if frame.ndim == 3:
+        frame = frame[..., plane]
+    if frame.ndim != 2 or not frame.size or not np.isfinite(real) or real <= 0:
+        raise DeviceError(
+            f"{camera.name}: a frame of shape {frame.shape} that was exposed for {real} s is no photograph"
+        )
+    return frame, real
+
+
+def auto_exposure(camera: Camera, plane: int) -> float:
+    """The exposure [s] at which the brightest samples of the present picture fill `FILL` of the camera's range.
+
+    DeviceError, in one line, where no exposure of the camera does that.
+    """
+    shortest, longest = camera.exposures
+    seconds = float(np.sqrt(shortest * longest))
+    for _ in range(TRIES):
+        frame, real = _exposed(camera, seconds, plane)
+        # dark level and background; where it is not dark at all, the steps are only less exact
+        dark, bright = np.percentile(frame, (1, PERCENTILE))
+        fill = float((bright - dark) / max(camera.white - dark, 1))
+        if bright >= camera.white:
+            step = 1 / STRONGEST_STEP if np.mean(frame >= camera.white) > 0.1 else 0.25
+        else:
+            step = min(max(FILL / max(fill, 1e-6), 1 / STRONGEST_STEP), STRONGEST_STEP)
+            if ACCEPTED[0] <= 1 / step <= ACCEPTED[1]:
+                return real
+        if step < 1 and seconds <= shortest:
+            raise DeviceError(
+                f"{camera.name}: too much light even at its shortest exposure of {shortest:.2g} s; "
+                "lower the laser's power or add a filter"
+            )
+        if step > 1 and seconds >= longest:
+            if fill >= DIMMEST:
+                return real
+            raise DeviceError(
+                f"{camera.name}: too little light at its longest exposure of {longest:.2g} s, {fill:.1%} of its range; "
+                "is the laser on, the iris open, the lens cap off?"
+            )
+        seconds = min(max(real * step, shortest), longest)
+    raise DeviceError(
+        f"{camera.name}: no exposure is right after {TRIES} tries; is the light unsteady, or the exposure ignored?"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Dark:
+    """Counts without light: bias and, for every second of exposure, rate; ``(Hs, Ws)``, or numbers for all samples."""
+
+    bias: Array
+    rate: Array
+
+    def at(self, seconds: float) -> Array:
+        """Counts of an exposure of ``seconds``."""
+        return self.bias + self.rate * seconds
+
+
+def dark_level(counts: float) -> Dark:
+    """The same number of counts everywhere, whatever the exposure."""
+    return Dark(np.array(counts), np.array(0.0))
+
+
+def dark_frames(camera: Camera, count: int, seconds: tuple[float, float], plane: int) -> Dark:
+    """Measure the dark counts, the light being off: means of ``count`` frames at a short and a long exposure.
+
+    Two exposures, since dark current and stray light grow with time and photographs differ in it.
+    """
+    short, long = (averaged(camera, each, count, plane) for each in seconds)
+    for each in (short, long):
+        if np.mean(each.counts) > 0.25 * camera.white:
+            raise DeviceError(f"{camera.name}: dark frames are bright; is the laser really off, the room dark?")
+    if long.seconds < 1.5 * short.seconds:
+        return Dark((short.counts + long.counts) / 2, np.zeros_like(long.counts))
+    rate = (long.counts - short.counts) / (long.seconds - short.seconds)
+    return Dark(short.counts - rate * short.seconds, rate)
+
+
+def combined(bracket: Sequence[Averaged], dark: Dark) -> tuple[Array, float]:
+    """Light ``(Hs, Ws)`` [counts / s] of a bracket, and the fraction of samples that all of it saturates.
+
+    Every unsaturated exposure counts with its time, which is best where shot noise prevails: all counts over all
+    seconds. Samples without any get what the shortest exposure has, which is too little.
+    """
+    shortest = min(bracket, key=lambda each: each.seconds)
+    counts, seconds = np.zeros_like(shortest.counts), np.zeros_like(shortest.counts)
+    for each in bracket:
+        good = ~each.saturated
+        counts += np.where(good, each.counts - dark.at(each.seconds), 0.0)
+        seconds += np.where(good, each.seconds, 0.0)
+    lost = seconds == 0
+    least = (shortest.counts - dark.at(shortest.seconds)) / shortest.seconds
+    return np.where(lost, least, counts / np.where(lost, 1.0, seconds)), float(lost.mean())

@@ -1,0 +1,159 @@
+"""Lasers: which colour is on, by a user's command or function, or by asking the user."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Protocol
+
+from annotated_types import Interval
+
+from ..core.errors import UserError
+from .devices import DeviceError
+
+
+@dataclass(frozen=True)
+class LaserSettings:
+    """How the lasers are switched (``laser:`` of a bench file); a bench with one wavelength needs none.
+
+    command: a program and its arguments, without a shell, where ``{channel}`` stands for 0, 1, 2 or ``off``; or
+    callable: ``path/to/file.py:function`` or ``module:function``, called with 0, 1, 2 or None; channels are counted
+    as ``panel.wavelengths`` lists them. Both return when the light is steady. timeout [s]: of the command.
+    """
+
+    command: tuple[str, ...] = ()
+    callable: str = ""
+    timeout: Annotated[float, Interval(gt=0, le=600)] = 10.0
+
+
+class Laser(Protocol):
+    """The light source of a bench."""
+
+    def select(self, channel: int | None) -> None:
+        """Put this channel on and all others off; None: all off. Returns when it is so; DeviceError otherwise."""
+        ...
+
+    def close(self) -> None:
+        """Leave it as a bench without a user should be."""
+        ...
+
+
+def laser(settings: LaserSettings | None, channels: int, folder: Path, ask: Callable[[str], None]) -> Laser:
+    """The laser of a bench.
+
+    folder: where a relative path of ``callable`` starts, and the command runs; ask: says a line to the user and
+    returns when it is done, for a laser that nobody can switch. UserError for settings that cannot work.
+    """
+    if settings is None:
+        if channels > 1:
+            raise UserError(f"laser: {channels} wavelengths need 'command' or 'callable' to switch between them")
+        return SteadyLaser(ask)
+    if bool(settings.command) == bool(settings.callable):
+        raise UserError("laser: give either 'command' or 'callable'")
+    if settings.callable:
+        return FunctionLaser(settings.callable, _function(settings.callable, folder))
+    if not any("{channel}" in part for part in settings.command):
+        raise UserError("laser.command: one argument must hold {channel}, which stands for 0, 1, 2 or off")
+    return CommandLaser(settings.command, settings.timeout, folder)
+
+
+@dataclass
+class SteadyLaser:
+    """One laser that is always on; the user blocks its beam where darkness is needed."""
+
+    ask: Callable[[str], None]
+    blocked: bool = False
+
+    def select(self, channel: int | None) -> None:
+        """Ask for the beam to be blocked or opened, where it is not."""
+        if self.blocked != (channel is None):
+            self.ask("block the laser beam" if channel is None else "open the laser beam again")
+            self.blocked = channel is None
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+@dataclass(frozen=True)
+class CommandLaser:
+    """Runs a program, without a shell, for every change of the channel."""
+
+    command: tuple[str, ...]
+    timeout: float
+    folder: Path
+
+    def select(self, channel: int | None) -> None:
+        """Run the command. DeviceError when it fails, is not there, or takes longer than its time."""
+        word = "off" if channel is None else str(channel)
+        arguments = [part.replace("{channel}", word) for part in self.command]
+        try:
+            done = subprocess.run(
+                arguments,
+                cwd=self.folder,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=self.timeout,
+            )
+        except subprocess.TimeoutExpired:
+            raise DeviceError(f"laser: '{arguments[0]}' takes longer than {self.timeout:g} s") from None
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"laser: '{arguments[0]}' does not run: {error}") from error
+        if done.returncode:
+            said = (done.stderr.strip() or done.stdout.strip() or "without a word").splitlines()[-1]
+            raise DeviceError(f"laser: '{arguments[0]}' ended with {done.returncode} for channel {word}: {said[:200]}")
+
+    def close(self) -> None:
+        """Switch off."""
+        self.select(None)
+
+
+@dataclass(frozen=True)
+class FunctionLaser:
+    """Calls a user's Python function for every change of the channel."""
+
+    name: str
+    function: Callable[[int | None], object]
+
+    def select(self, channel: int | None) -> None:
+        """Call it. DeviceError with whatever it raises."""
+        try:
+            self.function(channel)
+        except Exception as error:
+            raise DeviceError(f"laser: {self.name}({channel}): {type(error).__name__}: {error}") from error
+
+    def close(self) -> None:
+        """Switch off."""
+        self.select(None)
+
+
+def _function(name: str, folder: Path) -> Callable[[int | None], object]:
+    place, _, attribute = name.rpartition(":")
+    if not place:
+        raise UserError(f"laser.callable '{name}' should be path/to/file.py:function or module:function")
+    try:
+        module = _file(folder / place) if place.endswith(".py") else importlib.import_module(place)
+    except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
+        raise UserError(f"laser.callable '{name}' cannot be imported: {type(error).__name__}: {error}") from error
+    found = getattr(module, attribute, None)
+    if not callable(found):
+        raise UserError(f"laser.callable '{name}': there is no function '{attribute}' in {place}")
+    function: Callable[[int | None], object] = found
+    return function
+
+
+def _file(path: Path) -> ModuleType:
+    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
+    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}_{unique}", path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,68 @@
+"""Open the devices of a bench file and check the bench, one line a step, before any study runs on it."""
+
+from __future__ import annotations
+
+import atexit
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import UserError
+from ..methods.wirtinger import Wirtinger
+from .bench_file import BenchFile
+from .devices import Camera, DeviceError, Slm
+from .drivers.catalogue import checked_params, open_camera, open_slm
+from .laser import laser
+from .photograph import Request
+from .real import RealBench
+from .rig import Rig
+from .test_pattern import letter
+
+START = Wirtinger(iterations=30, initial_phase="random")
+"""Of the letter: a smooth phase would leave a ghost of it on the wrong side of the panel."""
+
+
+def open_live(bench: BenchFile, folder: Path, seed: int) -> RealBench:
+    """The bench, checked; its devices are given back when the program ends. UserError in one line for what is wrong.
+
+    folder: where relative paths of the bench file start.
+    """
+    spec = bench.panel.spec(bench.name)
+    lasers = laser(bench.laser, len(spec.wavelengths), folder, _ask)
+    slm, camera = _devices(bench)
+    rig = Rig(slm, camera, bench.phase, bench.capture, spec.wavelengths, lasers)
+    atexit.register(rig.close)
+    print(f"panel: {slm.name}; camera: {camera.name}")
+    real = RealBench(spec, rig, bench.panel.blaze, bench.residual_bound, seed)
+    target = letter(spec.region.shape).float().expand(len(spec.wavelengths), -1, -1)
+    handle = real.for_method(START, "letter", target, "letter", 0)
+    phase = START.solve(target[None], handle)[0]
+    rig.prepare(Request(real.shown(phase), real.relative_exposure(target), "letter", ()), print)
+    return real
+
+
+def _devices(bench: BenchFile) -> tuple[Slm, Camera]:
+    panel, camera = _driver("slm", bench.slm), _driver("camera", bench.camera)
+    checked_params("camera", *camera)  # before a panel is opened for nothing
+    try:
+        slm = open_slm(*panel)
+        try:
+            if slm.shape != bench.panel.shape:
+                shape = list(bench.panel.shape)
+                raise UserError(f"panel.shape is {shape}, but {slm.name} has {list(slm.shape)} pixels")
+            return slm, open_camera(*camera)
+        except BaseException:
+            slm.close()
+            raise
+    except DeviceError as error:
+        raise UserError(f"bench '{bench.name}': {error}") from error
+
+
+def _driver(key: str, given: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    if "driver" not in given:
+        raise UserError(f"{key}: names no driver; a live study needs one, an exchange of files (holoeval session) none")
+    return str(given["driver"]), {name: value for name, value in given.items() if name != "driver"}
+
+
+def _ask(line: str) -> None:
+    input(f"{line}; then press Enter ")

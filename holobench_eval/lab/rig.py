@@ -1,0 +1,210 @@
+"""A live bench as a photographer: panel, camera, lasers and the procedure, one photograph after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..core.errors import CellError, LostDeviceError, UserError
+from ..imaging.convention import Convention
+from .devices import Camera, DeviceError, Slm
+from .exposure import Dark, auto_exposure, averaged, combined, dark_frames, dark_level
+from .laser import Laser
+from .photograph import Photograph, Request, plane_of
+from .preflight import Gate, full_turn, linearity, phase_sign
+from .settings import Procedure
+from .settle import PATIENCE, Toggle, settle_time
+
+DARK_SPAN = 1 / 8, 2.0  # of the exposures in use: between these, dark counts are measured, beyond extrapolated
+TRIES = 2  # of every photograph, since drivers drop a frame now and then
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What `Rig.prepare` measured.
+
+    exposures [s], which a request's are relative to, and counts without light: per channel; settle [s]; gates: passed.
+    """
+
+    exposures: tuple[float, ...]
+    darks: tuple[Dark, ...]
+    settle: float
+    gates: tuple[Gate, ...]
+
+
+class Rig:
+    """A `Photographer` that owns its devices.
+
+    wavelengths [m]: one for each colour channel, in the order of the phases. Of a colour camera's three planes each
+    channel takes the one that its wavelength is for (blue below 490 nm, red above 580), and the others are not
+    looked at. wait: how to pass seconds.
+    """
+
+    def __init__(
+        self,
+        slm: Slm,
+        camera: Camera,
+        convention: Convention,
+        procedure: Procedure,
+        wavelengths: Sequence[float],
+        laser: Laser,
+        wait: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.slm, self.camera, self.convention, self.procedure = slm, camera, convention, procedure
+        self.laser, self.wait = laser, wait
+        self.planes = tuple(plane_of(wavelength) for wavelength in wavelengths)
+        self.prepared: Prepared | None = None
+        self._failures = 0
+        procedure.exposures(len(self.planes))  # a wrong number is told before a device moves
+
+    def announce(self, requests: Sequence[Request]) -> None:
+        """Nothing: every phase is shown when its photograph is asked for."""
+
+    def photograph(self, request: Request) -> Photograph:
+        """Show a phase and photograph it, channel by channel; see `Photographer`.
+
+        The camera's limits cut exposures off, which changes noise and saturation but not the light, in counts per
+        second. CellError for a phase that the panel cannot show, and where a device fails twice; `LostDeviceError`
+        where that happens to two photographs in a row.
+        """
+        ready = self._ready()
+        self._check(request.phase)
+        try:
+            taken = _patiently(lambda: self._take(request, self.convention, ready, self.procedure))
+        except DeviceError as error:
+            self._failures += 1
+            if self._failures >= 2:
+                raise LostDeviceError(f"the bench does not answer any more: {error}; mend it and resume") from error
+            raise CellError(f"no photograph: {error}") from error
+        self._failures = 0
+        return taken
+
+    def prepare(self, letter: Request, say: Callable[[str], None]) -> Prepared:
+        """Exposure, settling time, dark frames, linearity, phase convention, in this order, one line each.
+
+        letter: the hologram that `gates.phase_sign` wants. Its relative exposure fixes what exposures are relative to:
+        those that are right for it, divided by that. Raises UserError, in one line, for a device that fails and for a
+        gate that is not passed.
+        """
+        self._check(letter.phase)
+        try:
+            return self._prepare(letter, say)
+        except DeviceError as error:
+            raise UserError(f"the bench is not ready: {error}") from error
+
+    def close(self) -> None:
+        """Lasers off, devices given back."""
+        with suppress(DeviceError):  # the devices have to be given back all the same
+            self.laser.close()
+        try:
+            self.slm.close()
+        finally:
+            self.camera.close()
+
+    def _prepare(self, letter: Request, say: Callable[[str], None]) -> Prepared:
+        exposures = tuple(self._exposure(letter, channel) for channel in range(len(self.planes)))
+        say(f"exposure: {', '.join(f'{seconds:.3g} s' for seconds in exposures)}")
+        settle = self._settle(letter.phase, exposures[0] * letter.relative_exposure)
+        say(f"settling: {settle * 1e3:.0f} ms{'' if self.procedure.settle == 'auto' else ' (as set)'}")
+        darks = self._darks(exposures)
+        level = ", ".join(f"{float(np.mean(dark.at(each))):.1f}" for dark, each in zip(darks, exposures, strict=True))
+        say(f"dark: {level} counts{'' if self.procedure.dark else ' (as set)'}")
+        ready = Prepared(exposures, darks, settle, ())
+        gates = []
+        for gate in self._gates(letter, ready):
+            if not gate.passed:
+                raise UserError(gate.line)
+            say(gate.line)
+            gates.append(gate)
+        self.prepared = replace(ready, gates=tuple(gates))
+        return self.prepared
+
+    def _exposure(self, letter: Request, channel: int) -> float:
+        given = self.procedure.exposures(len(self.planes))
+        if given is not None:
+            return given[channel]
+        self._show(letter.phase, channel, self.convention, PATIENCE)
+        return auto_exposure(self.camera, self.planes[channel]) / letter.relative_exposure
+
+    def _settle(self, phase: Tensor, seconds: float) -> float:
+        if self.procedure.settle != "auto":
+            return self.procedure.settle
+        self.laser.select(0)
+        bright, dark = (self.convention.levels(each) for each in (phase[0], torch.zeros_like(phase[0])))
+        toggle = Toggle(
+            show=lambda lit: self.slm.show(bright if lit else dark),
+            take=lambda: averaged(self.camera, seconds, 1, self.planes[0]).counts,
+            wait=self.wait,
+        )
+        return settle_time(toggle)
+
+    def _darks(self, exposures: Sequence[float]) -> tuple[Dark, ...]:
+        if self.procedure.dark_level is not None:
+            return (dark_level(self.procedure.dark_level),) * len(exposures)
+        self.laser.select(None)
+        least, darks = min(self.procedure.hdr), []
+        for seconds, plane in zip(exposures, self.planes, strict=True):
+            span = (seconds * least * DARK_SPAN[0], seconds * DARK_SPAN[1])
+            darks.append(dark_frames(self.camera, self.procedure.dark, span, plane))
+        return tuple(darks)
+
+    def _gates(self, letter: Request, ready: Prepared) -> Iterator[Gate]:
+        for channel, (seconds, dark, plane) in enumerate(zip(ready.exposures, ready.darks, self.planes, strict=True)):
+            self._show(letter.phase, channel, self.convention, ready.settle)
+            take = partial(averaged, self.camera, count=self.procedure.average, plane=plane)
+            gate = linearity(take, seconds * letter.relative_exposure, dark)
+            yield replace(gate, line=f"channel {channel}: {gate.line}") if len(self.planes) > 1 else gate
+        single = replace(self.procedure, average=1, hdr=(1.0,))  # many photographs, of which none is scored
+
+        def show(phase: Tensor, convention: Convention) -> Tensor:
+            return self._take(replace(letter, phase=phase), convention, ready, single).light
+
+        yield phase_sign(show, letter.phase, self.convention)
+        yield full_turn(show, letter.phase, self.convention)
+
+    def _take(self, request: Request, convention: Convention, ready: Prepared, procedure: Procedure) -> Photograph:
+        frames, lost, seconds = [], [], []
+        for channel, (exposure, dark) in enumerate(zip(ready.exposures, ready.darks, strict=True)):
+            self._show(request.phase, channel, convention, ready.settle)
+            wanted, plane = exposure * request.relative_exposure, self.planes[channel]
+            bracket = [averaged(self.camera, wanted * each, procedure.average, plane) for each in procedure.hdr]
+            light, saturated = combined(bracket, dark)
+            frames.append(light)
+            lost.append(saturated)
+            seconds.append(max(each.seconds for each in bracket))
+        shapes = {frame.shape for frame in frames}
+        if len(shapes) > 1:
+            raise DeviceError(f"{self.camera.name}: the channels' frames differ in size: {sorted(shapes)}")
+        stacked = torch.from_numpy(np.stack(frames).astype(np.float32))
+        return Photograph(stacked, float(np.mean(lost)), tuple(seconds))
+
+    def _show(self, phase: Tensor, channel: int, convention: Convention, settle: float) -> None:
+        self.laser.select(channel)
+        self.slm.show(convention.levels(phase[channel]))
+        self.wait(settle)
+
+    def _check(self, phase: Tensor) -> None:
+        wanted = (len(self.planes), *self.slm.shape)
+        if tuple(phase.shape) != wanted:
+            raise CellError(f"phase is {tuple(phase.shape)}, but {self.slm.name} with its wavelengths shows {wanted}")
+        if not phase.is_floating_point() or not bool(torch.isfinite(phase).all()):
+            raise CellError("phase holds values that are no finite real numbers; the panel cannot show it")
+
+    def _ready(self) -> Prepared:
+        if self.prepared is None:
+            raise UserError("the bench takes no photographs before it has been prepared and has passed its gates")
+        return self.prepared
+
+
+def _patiently(take: Callable[[], Photograph]) -> Photograph:
+    for _ in range(TRIES - 1):
+        with suppress(DeviceError):
+            return take()
+    return take()

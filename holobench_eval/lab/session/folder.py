@@ -1,0 +1,241 @@
+"""The photographer of a session folder: writes what is asked for, reads what was photographed."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ...core.errors import CellError, Pending, UserError
+from ...core.hashing import digest
+from ...core.io import write_atomically, write_png
+from ...imaging.convention import Levels
+from ..photograph import Photograph, Request, plane_of
+from .checks import Series, check_present, check_series
+from .frames import Facts, Plane, facts, find, read_frame
+from .manifest import (
+    CAPTURES,
+    DARK,
+    FIDUCIAL,
+    PATTERNS,
+    REPEAT,
+    Manifest,
+    Pattern,
+    capture_of,
+    file_of,
+    inside,
+    read_manifest,
+    write_manifest,
+)
+from .order import Showing, ordered
+
+
+class FolderPhotographer:
+    """Photographs that people take with their own software.
+
+    What is asked for and not there is noted in ``wanted``; ``write_round`` writes the patterns for it. The dark level
+    comes from a round's dark frames, pixel by pixel. ``series`` of a round is known once its photographs were
+    checked.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.manifest: Manifest = read_manifest(folder)
+        self.wanted: dict[str, Request] = {}
+        self.repeated: Request | None = None
+        self._series: dict[int, Series] = {}
+        self._contents: dict[str, str] = {}
+        self._dark: dict[tuple[int, int], tuple[Plane, Plane]] = {}
+        self._known = {(one.key, one.colour): one for one in self.manifest.patterns}
+
+    def announce(self, requests: Sequence[Request]) -> None:
+        """Note what has no pattern yet."""
+        for request in requests:
+            if self.repeated is None and request.role == FIDUCIAL:
+                self.repeated = request
+            key = self._key(request)
+            if (key, 0) not in self._known:
+                self.wanted.setdefault(key, request)
+
+    def photograph(self, request: Request) -> Photograph:
+        """The photograph of a request. Pending where it has not been taken; CellError where it cannot be used."""
+        self.announce([request])
+        key = self._key(request)
+        patterns = [self._known.get((key, colour)) for colour in range(len(request.phase))]
+        taken = [one for one in patterns if one is not None and one.round in self._series]
+        if len(taken) < len(patterns):
+            raise Pending("this hologram has not been photographed yet")
+        planes = [self.light(pattern) for pattern in taken]
+        exposures = tuple(pattern.exposure for pattern in taken)
+        saturated = max(self._series[pattern.round].saturated[pattern.capture] for pattern in taken)
+        return Photograph(torch.from_numpy(np.stack(planes)), saturated, exposures)
+
+    def light(self, pattern: Pattern) -> Plane:
+        """A photograph ``(Hs, Ws)`` with the dark level taken off, in counts per relative exposure, float32."""
+        bias, rate = self._dark_of(pattern.round, pattern.colour)
+        dark = bias + rate * np.float32(pattern.exposure)
+        return np.asarray((self._frame(pattern) - dark) / np.float32(pattern.exposure))
+
+    def _dark_of(self, round_: int, colour: int) -> tuple[Plane, Plane]:
+        """Counts without light, and by how much they grow with the relative exposure, sample by sample."""
+        if (round_, colour) not in self._dark:
+            frames: dict[float, list[Plane]] = {}
+            for one in self.manifest.of_round(round_):
+                if one.role == DARK and one.colour == colour:
+                    frames.setdefault(one.exposure, []).append(self._frame(one))
+            short, long = min(frames), max(frames)
+            low, high = (np.asarray(np.mean(frames[exposure], axis=0), dtype=np.float32) for exposure in (short, long))
+            rate = np.asarray((high - low) / np.float32(max(long - short, 1e-9)), dtype=np.float32)
+            self._dark[round_, colour] = np.asarray(low - rate * np.float32(short), dtype=np.float32), rate
+        return self._dark[round_, colour]
+
+    def _frame(self, pattern: Pattern) -> Plane:
+        path = find(self.folder, pattern.capture)
+        known = (self.manifest.photographed or {}).get(pattern.capture)
+        if path is None:
+            raise CellError(f"{pattern.capture}: the photograph is gone")
+        frame = read_frame(path, plane_of(self.manifest.wavelengths[pattern.colour]))
+        if known is not None and frame.sha256 != known:
+            raise CellError(f"{path}: has changed since its round was read; a session is one series of photographs")
+        return frame.counts
+
+    def check_round(self, number: int) -> tuple[list[str], Mapping[str, str]]:
+        """Read every photograph of a round, after those before it. Faults, a line each, and the sha256 of the files by
+        capture name."""
+        patterns = self.manifest.of_round(number)
+        found = {pattern.capture: find(self.folder, pattern.capture) for pattern in patterns}
+        faults = check_present(self.folder, patterns, found)
+        if faults:
+            return faults, {}
+        known: dict[str, Facts] = {}
+        for pattern in patterns:
+            path = found[pattern.capture]
+            assert path is not None
+            known[pattern.capture] = facts(read_frame(path, plane_of(self.manifest.wavelengths[pattern.colour])))
+        before = self.manifest.photographed or {}
+        changed = [name for name, one in known.items() if before.get(name, one.sha256) != one.sha256]
+        if changed:
+            raise UserError(
+                f"{self.folder / changed[0]}: has changed since its round was read; put the file back, or export a new "
+                "session: one is one series of photographs"
+            )
+        series, faults = check_series(patterns, known)
+        faults += [
+            f"duplicated: {name} is {self._contents[one.content]} of an earlier round"
+            for name, one in known.items()
+            if self._contents.get(one.content, name) != name
+        ]
+        if not faults:
+            self._series[number] = series
+            self._contents |= {one.content: name for name, one in known.items() if one.highest}
+        return faults, {name: one.sha256 for name, one in known.items()}
+
+    def accept(self, captures: Mapping[str, str]) -> None:
+        """Keep what was read, so that a later change is noticed; captures: sha256 by name."""
+        self.manifest = self.manifest.read_already(dict(captures))
+        write_manifest(self.folder, self.manifest)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the scores should know of the photographs, a line each."""
+        return tuple(dict.fromkeys(note for series in self._series.values() for note in series.notes))
+
+    def write_round(self) -> list[Pattern]:
+        """Write the patterns of everything that is wanted, and ``order.csv``; those of the new round."""
+        assert self.repeated is not None
+        number = self.manifest.rounds + 1
+        wanted = list(self.wanted.values())
+        exposures = [1.0, *(self._exposure(request) for request in wanted)]
+        showings = ordered(wanted, self.repeated, f"{self.manifest.session} {number}", exposures)
+        patterns: list[Pattern] = []
+        for showing in showings:
+            patterns += self._written(showing, number, len(patterns))
+        place = self.folder / Path(patterns[0].file).parent
+        _write_order(place / "order.csv", patterns, self.manifest.wavelengths)
+        write_atomically(place / "README.txt", _readme(number, len(patterns)).encode())
+        (inside(self.folder, patterns[0].capture).parent).mkdir(parents=True, exist_ok=True)
+        # last, so that a round that the manifest has is whole
+        self.manifest = replace(self.manifest, patterns=(*self.manifest.patterns, *patterns))
+        write_manifest(self.folder, self.manifest)
+        self._known |= {(one.key, one.colour): one for one in patterns}
+        self.wanted.clear()
+        return patterns
+
+    def _written(self, showing: Showing, round_: int, before: int) -> list[Pattern]:
+        colours = range(len(self.manifest.wavelengths))
+        request, manifest = showing.request, self.manifest
+        if request is None:
+            levels: Levels = np.zeros((len(colours), *manifest.panel), dtype=np.uint8)
+        else:
+            levels = manifest.phase.levels(request.phase)
+        exposure = showing.exposure if request is None else self._exposure(request)
+        counted = digest([showing.role, round_, showing.copy, showing.exposure])
+        key = self._key(request) if request and showing.role != REPEAT else counted
+        patterns = []
+        for colour in colours:
+            number = before + colour + 1
+            path = inside(self.folder, file_of(round_, number))
+            write_png(path, torch.from_numpy(levels[colour][None]), bits=8)
+            patterns.append(
+                Pattern(
+                    round=round_,
+                    number=number,
+                    role=showing.role,  # type: ignore[arg-type]
+                    colour=colour,
+                    exposure=exposure,
+                    key=key,
+                    sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+                    file=file_of(round_, number),
+                    capture=capture_of(round_, number),
+                )
+            )
+        return patterns
+
+    def _exposure(self, request: Request) -> float:
+        return 1.0 if self.manifest.fixed_exposure else request.relative_exposure
+
+    def _key(self, request: Request) -> str:
+        """What a photograph is kept by: what is shown, how long it is exposed, and what for.
+
+        The fiducial grid's holograms by their number alone: made again on another machine they may differ in a level.
+        """
+        if request.role == FIDUCIAL:
+            return digest([request.role, [str(name) for name in request.names]])
+        levels = self.manifest.phase.levels(request.phase)
+        shown = hashlib.sha256(levels.tobytes()).hexdigest()
+        return digest(
+            [shown, list(levels.shape), self._exposure(request), request.role, [str(name) for name in request.names]]
+        )
+
+
+def _write_order(path: Path, patterns: Sequence[Pattern], wavelengths: Sequence[float]) -> None:
+    """The order of showing as a table, for people and for scripts."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["number", "show", "save_photograph_as", "role", "wavelength_nm", "relative_exposure", "laser"])
+    for one in patterns:
+        wavelength = f"{wavelengths[one.colour] * 1e9:.1f}"
+        laser = "blocked" if one.role == DARK else "on"
+        row = [one.number, one.file, f"{one.capture}.png", one.role, wavelength, f"{one.exposure:g}", laser]
+        writer.writerow(row)
+    write_atomically(path, text.getvalue().encode())
+
+
+def _readme(number: int, patterns: int) -> str:
+    """What to do with a round, in words."""
+    return f"""Round {number}: {patterns} patterns.
+
+1. Show the pictures of {PATTERNS}/round-{number} in the order of order.csv, gray level for gray level, one panel pixel
+   a picture pixel. Light each with the laser of its wavelength; block the laser for role 'dark'.
+2. Photograph each after the panel has settled, with gamma, gain control, white balance and denoising off, and the
+   session's own exposure time times relative_exposure. Choose that time once, so that no hologram saturates.
+3. Save each under the name in 'save_photograph_as' ({CAPTURES}/round-{number}/NNNN.png; 8- or 16-bit PNG or TIFF, or
+   the camera's RAW; the same kind for all).
+4. holoeval session import with the folder of manifest.json
+"""

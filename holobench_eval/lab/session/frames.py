@@ -1,0 +1,132 @@
+"""Read one photograph that somebody put into a session folder: linear counts, and what its file says of them."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from ...core.errors import UserError
+from ...optics.colour import srgb_decode
+from .manifest import SUFFIXES, inside
+
+PIXELS = 200_000_000
+"""Most pixels of a photograph; more would be the bomb of a hostile file."""
+LARGEST = 1 << 30
+"""Bytes of a file."""
+LOSSY = (".jpg", ".jpeg")
+PLAIN = (".png", ".tif", ".tiff")
+
+Plane = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A photograph of one colour.
+
+    counts: ``(Hs, Ws)`` float32; top: the largest count that the file's format can hold, or the sensor's white level
+    where a RAW file tells it; step: all counts are multiples of it (16 for 12 bits at the upper end of 16; 0: dark);
+    sha256: of the file; linear: whether the counts are proportional to light (a JPEG's were decoded from sRGB).
+    """
+
+    counts: Plane
+    top: float
+    step: int
+    sha256: str
+    linear: bool
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.counts.shape[0], self.counts.shape[1]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is kept of a photograph while a series is checked: see ``Frame``.
+
+    mean, highest: of its counts; at_highest: the fraction of samples with that count, or with ``top`` and above;
+    content: sha256 of the counts, which a time stamp in the file does not change.
+    """
+
+    shape: tuple[int, int]
+    mean: float
+    highest: float
+    at_highest: float
+    top: float
+    step: int
+    sha256: str
+    content: str
+    linear: bool
+
+
+def facts(frame: Frame) -> Facts:
+    """The facts of a photograph."""
+    highest = min(float(frame.counts.max()), frame.top)
+    share = float((frame.counts >= highest).mean())
+    mean = float(frame.counts.mean(dtype=np.float64))
+    content = hashlib.sha256(frame.counts.tobytes()).hexdigest()
+    return Facts(frame.shape, mean, highest, share, frame.top, frame.step, frame.sha256, content, frame.linear)
+
+
+def find(folder: Path, capture: str) -> Path | None:
+    """The file of a photograph, by its name without ending; None if there is none. UserError for several."""
+    found = [path for ending in SUFFIXES for path in _endings(folder / f"{capture}{ending}") if path.is_file()]
+    if len(found) > 1:
+        raise UserError(f"{folder / capture}: {', '.join(path.name for path in found)}: keep one of these")
+    return inside(folder, str(found[0].relative_to(folder))) if found else None
+
+
+def _endings(path: Path) -> list[Path]:
+    """The name with a small and with a capital ending, each once on file systems that do not tell them apart."""
+    capital = path.with_suffix(path.suffix.upper())
+    return [path, *([capital] if not (path.exists() and capital.exists() and path.samefile(capital)) else [])]
+
+
+def read_frame(path: Path, colour: int) -> Frame:
+    """A photograph; of a colour camera's three channels the one of index ``colour``. UserError for a bad file."""
+    if path.stat().st_size > LARGEST:
+        raise UserError(f"{path}: larger than {LARGEST >> 20} MiB, no photograph")
+    content = path.read_bytes()
+    sha256 = hashlib.sha256(content).hexdigest()
+    if path.suffix.lower() not in (*PLAIN, *LOSSY):
+        return _raw(path, colour, sha256)
+    try:
+        with Image.open(path) as header:
+            if header.width * header.height > PIXELS:
+                raise UserError(f"{path}: {header.width} x {header.height} pixels are too many for a photograph")
+            if getattr(header, "n_frames", 1) > 1:
+                raise UserError(f"{path}: holds several pictures; save one frame a file")
+    except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError) as error:
+        raise UserError(f"{path}: not a picture that can be read ({' '.join(str(error).split())[:80]})") from None
+    levels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if levels is None or levels.dtype not in (np.uint8, np.uint16):
+        raise UserError(f"{path}: damaged, or not of 8 or 16 bits a sample")
+    if levels.ndim == 3 and levels.shape[2] != 3:
+        raise UserError(f"{path}: {levels.shape[2]} channels; save gray or RGB without transparency")
+    plane = levels[..., 2 - colour] if levels.ndim == 3 else levels  # OpenCV: blue first
+    top = 255.0 if levels.dtype == np.uint8 else 65535.0
+    if path.suffix.lower() in LOSSY:
+        light = srgb_decode(torch.from_numpy(plane / np.float32(255))).numpy() * np.float32(255)
+        return Frame(light, 255.0, 1, sha256, linear=False)
+    return Frame(np.ascontiguousarray(plane, dtype=np.float32), top, _step(plane), sha256, linear=True)
+
+
+def _raw(path: Path, colour: int, sha256: str) -> Frame:
+    from ..raw import read_raw
+
+    raw = read_raw(path)
+    return Frame(np.ascontiguousarray(raw.counts[..., colour], dtype=np.float32), raw.white, 1, sha256, linear=True)
+
+
+def _step(levels: NDArray[Any]) -> int:
+    """The largest power of two, up to 256, that divides every level; 0 where there is no light at all."""
+    joined = int(np.bitwise_or.reduce(levels, axis=None))
+    return min(joined & -joined, 256)

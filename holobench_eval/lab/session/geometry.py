@@ -1,0 +1,123 @@
+"""What the photographs of a session say of the bench: its geometry, its drift, and whether they are in order."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from skimage.registration import phase_cross_correlation
+
+from ...core.errors import CellError, UserError
+from ...core.io import write_atomically
+from ...imaging.grid import fiducial
+from ...imaging.grid_picture import grid_picture
+from ...optics.phase import blaze
+from .checks import check_order, thumbnail
+from .manifest import DARK, REPEAT, Pattern, inside
+
+if TYPE_CHECKING:
+    from ..real import RealBench
+    from . import FolderPhotographer
+
+FURTHEST_DRIFT = 2.0
+"""Region pixels: what the bounded refinement of a capture can still take up (protocol v1, point 3)."""
+FINENESS = 20
+"""Steps a pixel of the correlation that measures drift."""
+
+Say = Callable[[str], None]
+
+
+def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: Say) -> tuple[str, ...]:
+    """Register the camera; look for drift and for photographs in the wrong order. UserError for what cannot be used.
+
+    Draws the grid as it was found under ``output``. Returns what a reader of the scores should know, a line each.
+    """
+    try:
+        registration = bench.registration
+    except CellError as error:
+        raise UserError(f"the camera cannot be registered, and nothing was scored: {error}") from None
+    found = f"registration: {max(registration.residual):.2f} px rms"
+    second = bench.disagreement
+    said = "another algorithm finds none" if np.isnan(second) else f"another algorithm differs by {second:.2f} px"
+    say(f"{found}; {said} at the corners")
+    _draw(bench, output / "figures" / "registration.png")
+    moved, dimmed = drift(bench, photographer)
+    say(f"drift: {moved:.2f} px and {dimmed:.1%} of the light, at most, between the repeats of one hologram")
+    if moved > FURTHEST_DRIFT:
+        raise UserError(
+            f"the camera or the picture moved by {moved:.1f} px between repeats, more than {FURTHEST_DRIFT:g}; fix the "
+            "bench and photograph a new session"
+        )
+    faults = misplaced(bench, photographer)
+    if faults:
+        raise UserError("nothing was scored. " + " | ".join(faults))
+    return (
+        f"geometry: {found}, {said} at the corners",
+        f"drift between the repeats of one hologram: {moved:.2f} px and {dimmed:.1%} of the light at most",
+    )
+
+
+def _draw(bench: RealBench, path: Path) -> None:
+    """Every colour's photograph of the grid with what was found in it, side by side."""
+    grid = fiducial(bench.spec.region.shape)
+    frames = bench.grid_photograph.cpu().numpy()
+    warps = zip(frames, range(len(frames)), strict=True)
+    pictures = [grid_picture(frame, grid, bench.registration, channel) for frame, channel in warps]
+    encoded, buffer = cv2.imencode(".png", cv2.cvtColor(np.hstack(pictures), cv2.COLOR_RGB2BGR))
+    if encoded:
+        write_atomically(path, buffer.tobytes())
+
+
+def _rectified(bench: RealBench, photographer: FolderPhotographer, pattern: Pattern) -> NDArray[np.float32]:
+    return bench.registration.warps[pattern.colour].sample(photographer.light(pattern))
+
+
+def drift(bench: RealBench, photographer: FolderPhotographer) -> tuple[float, float]:
+    """Largest shift [region px] and relative change of light of the repeated hologram, against its first photograph."""
+    first: dict[int, NDArray[np.float32]] = {}
+    moved = dimmed = 0.0
+    for pattern in photographer.manifest.patterns:
+        if pattern.role != REPEAT:
+            continue
+        seen = _rectified(bench, photographer, pattern)
+        before = first.setdefault(pattern.colour, seen)
+        if before is seen:
+            continue
+        pair = (np.sqrt(np.maximum(one, 0)) for one in (before, seen))
+        shift, _, _ = phase_cross_correlation(  # type: ignore[no-untyped-call]
+            *pair, upsample_factor=FINENESS, normalization=None
+        )
+        moved = max(moved, float(np.hypot(*shift)))
+        dimmed = max(dimmed, abs(float(seen.mean() / before.mean()) - 1))
+    return moved, dimmed
+
+
+def misplaced(bench: RealBench, photographer: FolderPhotographer) -> list[str]:
+    """Photographs of another pattern than their name says, a line each."""
+    manifest, faults = photographer.manifest, list[str]()
+    carrier = blaze(bench.spec.shape, bench.carrier)
+    for number in range(1, manifest.rounds + 1):
+        patterns = manifest.of_round(number)
+        seen, wanted = {}, {}
+        for pattern in patterns:
+            if pattern.role != DARK:
+                seen[pattern.capture] = thumbnail(_rectified(bench, photographer, pattern))
+                phase = manifest.phase.phase(_levels(photographer.folder, pattern)) - carrier
+                field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
+                wanted[pattern.capture] = thumbnail(bench.spec.region.crop(field.abs().square()).numpy())
+        faults += check_order(patterns, seen, wanted)
+    return faults
+
+
+def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:
+    path = inside(folder, pattern.file)
+    content = path.read_bytes() if path.is_file() else b""
+    if hashlib.sha256(content).hexdigest() != pattern.sha256:
+        raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
+    return np.asarray(cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE), dtype=np.uint8)

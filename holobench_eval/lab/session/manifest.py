@@ -1,0 +1,171 @@
+"""``manifest.json`` of a session folder: what every pattern is, and where its photograph belongs.
+
+The file may come from anywhere. It holds no path that is followed: names of files follow from numbers, and are in it
+for other people's scripts only.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from annotated_types import Interval, Len, MaxLen, MinLen
+
+from ...core.errors import UserError
+from ...core.io import write_atomically
+from ...imaging.convention import Convention
+
+FILE, PATTERNS, CAPTURES = "manifest.json", "patterns", "captures"
+FORMAT = 1
+LARGEST = 64 * 2**20
+"""Bytes of a manifest; about 200,000 patterns."""
+SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
+DARK, FIDUCIAL, HOLOGRAM, REPEAT = "dark", "fiducial", "hologram", "repeat"
+
+Role = Literal["dark", "fiducial", "hologram", "repeat"]
+Hex = Annotated[str, Len(64, 64)]
+Number = Annotated[int, Interval(ge=1, le=1_000_000)]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """One gray picture for the panel.
+
+    number: its place in the order of its round, from 1; colour: index of the wavelength it is lit with; exposure:
+    exposure time relative to the session's own; key: tells what it is needed for; sha256: of the PNG file; file,
+    capture: their names (see ``file_of`` and ``capture_of``), which are compared and not used.
+    """
+
+    round: Number
+    number: Number
+    role: Role
+    colour: Annotated[int, Interval(ge=0, le=2)]
+    exposure: Annotated[float, Interval(gt=0, lt=1e6)]
+    key: Hex
+    sha256: Hex
+    file: Annotated[str, MaxLen(100)]
+    capture: Annotated[str, MaxLen(100)]
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """A session: its study and display, and all patterns so far, round by round in the order of showing.
+
+    session: what tells it from others; study_sha256, bench_sha256: of its config and of its bench or profile; display:
+    name; panel: rows and columns; wavelengths [m]; photographed: sha256 of the photographs that were read, by the
+    name of their pattern's capture.
+    """
+
+    format: Literal[1]
+    session: Hex
+    study_sha256: Hex
+    bench_sha256: Hex
+    display: Annotated[str, MinLen(1), MaxLen(200)]
+    panel: tuple[Annotated[int, Interval(ge=64, le=8192)], Annotated[int, Interval(ge=64, le=8192)]]
+    wavelengths: Annotated[tuple[Annotated[float, Interval(gt=0, lt=1e-4)], ...], MinLen(1), MaxLen(3)]
+    phase: Convention
+    fixed_exposure: bool
+    patterns: Annotated[tuple[Pattern, ...], MaxLen(1_000_000)] = ()
+    photographed: dict[Annotated[str, MaxLen(100)], Hex] | None = None
+
+    @property
+    def rounds(self) -> int:
+        """Rounds so far."""
+        return max((pattern.round for pattern in self.patterns), default=0)
+
+    def of_round(self, number: int) -> list[Pattern]:
+        """The patterns of a round in the order of showing."""
+        return [pattern for pattern in self.patterns if pattern.round == number]
+
+    def read_already(self, captures: dict[str, str]) -> Manifest:
+        """The manifest after photographs were read; captures: their sha256 by name."""
+        return replace(self, photographed={**(self.photographed or {}), **captures})
+
+
+def file_of(round_: int, number: int) -> str:
+    """Where the PNG of a pattern is, in the session's folder."""
+    return f"{PATTERNS}/round-{round_}/{number:04d}.png"
+
+
+def capture_of(round_: int, number: int) -> str:
+    """Where the photograph of a pattern belongs, without the ending of its kind."""
+    return f"{CAPTURES}/round-{round_}/{number:04d}"
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write ``manifest.json``, whole or not at all."""
+    text = json.dumps(asdict(manifest), indent=1, allow_nan=False)
+    write_atomically(folder / FILE, f"{text}\n".encode())
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """The manifest of a session folder, checked. UserError says what is wrong with it."""
+    path = folder / FILE
+    if not path.is_file() or path.is_symlink():
+        raise UserError(f"{path}: no such file; holoeval session export makes a session folder")
+    if path.stat().st_size > LARGEST:
+        raise UserError(f"{path}: larger than {LARGEST // 2**20} MB; not a manifest that holoeval wrote")
+    content = _json(path)
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != FORMAT:
+        raise UserError(f"{path}: format {str(found)[:20]!r} should be {FORMAT}; not a manifest of this version")
+    manifest = _typed(path, content)
+    _check(path, manifest.patterns)
+    return manifest
+
+
+def _json(path: Path) -> Any:
+    def refuse(name: str) -> float:
+        raise ValueError(f"{name} is no number")
+
+    try:
+        return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"{path}: not JSON ({str(error)[:100]})") from None
+
+
+def _typed(path: Path, content: Any) -> Manifest:
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(Manifest).validate_json(json.dumps(content), strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))[:100]
+        raise UserError(f"{path}: {where}: {first['msg'].lower()}, got {json.dumps(first['input'])[:60]}") from None
+
+
+def _check(path: Path, patterns: Sequence[Pattern]) -> None:
+    """Refuse numbers that are not 1, 2, 3, ... and names that do not follow from them."""
+    last = (1, 0)
+    for pattern in patterns:
+        here = (pattern.round, pattern.number)
+        if here not in ((last[0], last[1] + 1), (last[0] + 1, 1)):
+            raise UserError(f"{path}: pattern {here[1]} of round {here[0]} stands after {last[1]} of round {last[0]}")
+        if pattern.file != file_of(*here):
+            raise UserError(f"{path}: file {pattern.file[:60]!r} should be {file_of(*here)!r}")
+        if pattern.capture != capture_of(*here):
+            raise UserError(f"{path}: capture {pattern.capture[:60]!r} should be {capture_of(*here)!r}")
+        last = here
+
+
+def refuse_links_out(folder: Path) -> None:
+    """UserError for any link in a session folder that leads out of it: nothing else is read, or written to."""
+    home = folder.resolve()
+    for place, folders, files in os.walk(home):
+        for name in (*folders, *files):
+            path = Path(place, name)
+            if path.is_symlink() and not path.resolve().is_relative_to(home):
+                raise UserError(f"{path}: leads out of the session folder; put the file itself there")
+
+
+def inside(folder: Path, name: str) -> Path:
+    """A file of the session folder. UserError for one that is, by way of links, anywhere else."""
+    path = folder / name
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise UserError(f"{path}: leads out of the session folder; put the file itself there")
+    return path

@@ -1,0 +1,259 @@
+"""Charts of quality against what it cost: captures of the camera, or seconds.
+
+One panel per display. The baseline is a horizontal line, the floor of what a camera must be worth; the privileged
+method is another, the ceiling. Marks are named where they stand, and rows of one registered method are joined. Pale
+steps show the best quality for a cost, apart for methods with and without the camera for the scored image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+
+from ..data.categories import CALIBRATED, OFFLINE, ONLINE, OPEN_LOOP, TRACKS
+from .labels import Names
+from .style import COLOURS, GREY, PALE, new_figure, save, style
+
+WIDTH = 900
+PANEL = 370
+FOOTER = 50
+MARKERS = {OPEN_LOOP: "o", CALIBRATED: "s", ONLINE: "D"}
+ZERO_GAP = 0.14
+"""Width, relative to that of the logarithmic part, between the place of zero and the smallest cost."""
+SPREAD = 0.02
+"""The same, between marks without any cost, which stand side by side so that none hides another."""
+NAMED_EACH = 2
+"""Up to so many marks of a method each get a name; more are a curve, and the method's name stands at its end."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A row of the study: ``cost`` along the axis, mean quality and its interval (NaN: none).
+
+    group: the registered method, whose rows are joined by a line and share its name; track: which marker.
+    """
+
+    label: str
+    group: str
+    track: str
+    cost: float
+    quality: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """A horizontal line: the baseline or the ceiling; ``low`` and ``high`` bound its band (NaN: none)."""
+
+    label: str
+    quality: float
+    low: float = float("nan")
+    high: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Frontier:
+    """A panel: the marks of a display, and the lines they are compared with; higher: whether more quality is better."""
+
+    condition: str
+    marks: tuple[Mark, ...]
+    higher: bool = True
+    floor: Line | None = None
+    ceiling: Line | None = None
+
+
+@dataclass(frozen=True)
+class Costs:
+    """The axis of costs, equal in all panels: positions are decimal logarithms, and zero has a place of its own.
+
+    low, high: ends of the logarithmic part; free: labels of marks without any cost, side by side around ``zero``.
+    """
+
+    low: float
+    high: float
+    free: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, marks: Sequence[Mark]) -> Costs:
+        """The axis for some marks, at least one of them with a cost above zero."""
+        found = np.log10([mark.cost for mark in marks if mark.cost > 0])
+        left, right = (max(0.12, share * float(np.ptp(found))) for share in (0.06, 0.16))  # to the right stand names
+        free = tuple(dict.fromkeys(mark.label for mark in marks if mark.cost == 0))
+        return cls(float(found.min()) - left, float(found.max()) + right, free)
+
+    @property
+    def width(self) -> float:
+        """Of the logarithmic part."""
+        return self.high - self.low
+
+    @property
+    def half(self) -> float:
+        """Half of what the marks without any cost spread over."""
+        return SPREAD * self.width * (len(self.free) - 1) / 2
+
+    @property
+    def zero(self) -> float | None:
+        """The place of zero; None where every mark has a cost."""
+        return self.low - ZERO_GAP * self.width - self.half if self.free else None
+
+    def position(self, mark: Mark) -> float:
+        """Where a mark stands."""
+        if mark.cost > 0 or self.zero is None:
+            return float(np.log10(mark.cost))
+        return self.zero - self.half + SPREAD * self.width * self.free.index(mark.label)
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Ends of the axis."""
+        return (self.low if self.zero is None else self.zero - self.half - 0.08 * self.width), self.high
+
+    def show(self, axes: Axes) -> None:
+        """Ticks at decades, and at 2 and 5 in between where there are few; zero with a break of the axis."""
+        decades = range(int(np.floor(self.low)), int(np.ceil(self.high)) + 1)
+        named = (1, 2, 5) if self.width < 2.5 else (1,)
+        ticks = [exponent + float(np.log10(step)) for exponent in decades for step in named]
+        small = [exponent + float(np.log10(step)) for exponent in decades for step in range(2, 10)]
+        inside = [tick for tick in ticks if self.low <= tick <= self.high]
+        axes.set_xlim(*self.limits)
+        axes.xaxis.set_major_locator(FixedLocator(inside if self.zero is None else [self.zero, *inside]))
+        axes.xaxis.set_minor_locator(FixedLocator([tick for tick in small if self.low <= tick <= self.high]))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda position, _: self._name(position)))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        if self.zero is not None:
+            _break(axes, self.low - ZERO_GAP * self.width / 2)
+
+    def _name(self, position: float) -> str:
+        cost = 10**position
+        return "0" if position == self.zero else f"{cost:,.0f}" if cost > 0.9 else f"{cost:.1g}"
+
+
+def _break(axes: Axes, position: float) -> None:
+    """Two strokes across the lower spine: the axis is not to scale here."""
+    place = axes.get_xaxis_transform()
+    gap = 0.006 * (axes.get_xlim()[1] - axes.get_xlim()[0])
+    axes.plot([position - gap, position + gap], [0, 0], color="white", linewidth=3, clip_on=False, transform=place)
+    for side in (-gap, gap):
+        axes.plot(
+            [position + side],
+            [0],
+            marker=[(-0.5, -1), (0.5, 1)],
+            markersize=10,
+            color="black",
+            clip_on=False,
+            transform=place,
+            zorder=5,
+        )
+
+
+def draw_frontiers(path: Path, panels: Sequence[Frontier], axis: str, cost: str) -> None:
+    """Draw a panel per display.
+
+    axis: name of the quality with its unit; cost: of what it is drawn against, with its unit.
+    """
+    costs = Costs.of([mark for panel in panels for mark in panel.marks])
+    groups = list(dict.fromkeys(mark.group for panel in panels for mark in panel.marks))
+    colours = {group: COLOURS[index % len(COLOURS)] for index, group in enumerate(groups)}
+    found = {mark.track for panel in panels for mark in panel.marks}
+    with style():
+        figure = new_figure(WIDTH, PANEL * len(panels) + FOOTER)
+        figure.set_layout_engine("constrained")
+        drawn = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+        for axes, panel in zip(drawn, panels, strict=True):
+            axes.set_title(panel.condition, loc="left", weight="bold", parse_math=False)
+            _panel(axes, panel, costs, colours)
+            axes.set_ylabel(axis.replace(", of ", "\nof "))
+        drawn[-1].set_xlabel(cost)
+        keys = [_key(track) for track in TRACKS if track in found]
+        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), frameon=False)
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # names are placed by the pixel, so that nothing may move any more
+        for axes, panel in zip(drawn, panels, strict=True):
+            _name_all(axes, panel, costs)
+        save(figure, path)
+
+
+def _key(track: str) -> Line2D:
+    return Line2D([], [], linestyle="", marker=MARKERS[track], color=GREY, label=f"{track} track")
+
+
+def _joined(panel: Frontier) -> list[list[Mark]]:
+    """The marks of each registered method, by their costs."""
+    groups = dict.fromkeys(mark.group for mark in panel.marks)
+    return [sorted((m for m in panel.marks if m.group == group), key=lambda m: m.cost) for group in groups]
+
+
+def _front(panel: Frontier, tracks: Sequence[str], costs: Costs) -> list[tuple[float, float]]:
+    """Corners of the steps that the best of some tracks make: the quality that is to be had for a cost."""
+    sign = 1 if panel.higher else -1
+    corners: list[tuple[float, float]] = []
+    for mark in sorted((m for m in panel.marks if m.track in tracks), key=lambda m: (m.cost, -sign * m.quality)):
+        best = corners[-1][1] if corners else -sign * np.inf
+        if sign * mark.quality > sign * best:
+            corners += [(costs.position(mark), best)] * bool(corners) + [(costs.position(mark), mark.quality)]
+    return corners
+
+
+def _panel(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str, str]) -> None:
+    for line, dashes in ((panel.floor, (6, 3)), (panel.ceiling, (1.5, 2))):
+        if line is not None:
+            axes.axhline(line.quality, color="black", linewidth=1.1, dashes=dashes, zorder=1)
+            if np.isfinite(line.low):
+                axes.axhspan(line.low, line.high, color="black", alpha=0.07, linewidth=0, zorder=0)
+    for tracks in (OFFLINE, (ONLINE,)):
+        steps = _front(panel, tracks, costs)
+        axes.plot([x for x, _ in steps], [y for _, y in steps], color=PALE, linewidth=2.2, zorder=1)
+    for marks in _joined(panel):
+        places, colour = [costs.position(mark) for mark in marks], colours[marks[0].group]
+        if len(set(places)) > 1:
+            axes.plot(places, [mark.quality for mark in marks], color=colour, linewidth=1.4, zorder=2)
+        for place, mark in zip(places, marks, strict=True):
+            offsets = np.nan_to_num([[mark.quality - mark.low], [mark.high - mark.quality]])
+            axes.errorbar(
+                place,
+                mark.quality,
+                yerr=offsets,
+                fmt=MARKERS[mark.track],
+                color=colour,
+                markersize=6.5,
+                markeredgecolor="white",
+                markeredgewidth=0.6,
+                elinewidth=1.0,
+                capsize=2.5,
+                zorder=3,
+            )
+    costs.show(axes)
+    axes.margins(y=0.1)
+    axes.grid(color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def _name_all(axes: Axes, panel: Frontier, costs: Costs) -> None:
+    names, joined = Names(axes), _joined(panel)
+    lines = [line for line in (panel.floor, panel.ceiling) if line is not None]
+    for marks in joined:
+        names.keep_clear_line([(costs.position(mark), mark.quality) for mark in marks])
+        for mark in marks:
+            place = costs.position(mark)
+            names.keep_clear(place, mark.quality, 11)
+            if np.isfinite(mark.low):
+                names.keep_clear_line([(place, mark.low), (place, mark.high)])
+    for tracks in (OFFLINE, (ONLINE,)):
+        names.keep_clear_line(_front(panel, tracks, costs))
+    for line in lines:
+        names.keep_clear_line([(end, line.quality) for end in axes.get_xlim()], width=2)
+    for line in lines:
+        names.along(line.label, line.quality)
+    for marks in sorted(joined, key=len, reverse=True):
+        last = marks[-1]
+        if len(marks) > NAMED_EACH and last.cost > marks[0].cost:
+            names.beside(last.group.rpartition(":")[2], costs.position(last), last.quality)
+            continue
+        for mark in marks:
+            names.beside(mark.label, costs.position(mark), mark.quality)

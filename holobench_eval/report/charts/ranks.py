@@ -1,0 +1,105 @@
+"""Places of the methods over draws of a display, and how far each draw's ranking is from the nominal one."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from ..data.ranks import Ranks
+from .style import COLOURS, GREY, new_figure, save, slugs, style
+
+WIDTH, ROW, FRAME = 900, 34, 125
+NAME = 34
+"""Characters of a method's name in a line, of which there are two at most."""
+NARROWEST = 0.05
+"""Of a bar on the axis of Kendall's tau."""
+SHADES = LinearSegmentedColormap.from_list("shares", [(0.0, "white"), (0.75, COLOURS[0]), (1.0, "#003A5D")])
+DARK = 0.45
+"""Share from which on figures in a cell are white."""
+
+
+def draw(every: Sequence[Ranks], folder: Path) -> Iterator[tuple[Path, str]]:
+    """Draw a figure for every display that has a ranking; (file, caption) of each."""
+    found = [ranks for ranks in every if ranks.told]
+    stems = slugs([ranks.swept.before for ranks in found])
+    for ranks in found:
+        path = folder / f"quality-ranks-{stems[ranks.swept.before]}.png"
+        draw_ranks(path, ranks)
+        yield path, _caption(ranks)
+
+
+def _caption(ranks: Ranks) -> str:
+    left = (
+        f"Ranks of the methods over {len(ranks.used)} draws of {ranks.swept.before}. Left: share of draws [%] in which "
+        "a method has a rank, methods in nominal order, the nominal rank framed."
+    )
+    if not len(ranks.taus):
+        return left
+    return (
+        f"{left} Right: draws by Kendall's tau-b of their ranking against the nominal one. Dot and bar: mean with its "
+        "95 % interval; dashed: unrelated."
+    )
+
+
+def draw_ranks(path: Path, ranks: Ranks) -> None:
+    """Draw the places of the methods and the agreement of the draws side by side."""
+    with style():
+        figure = new_figure(WIDTH, FRAME + ROW * max(4, len(ranks.methods)))
+        figure.set_layout_engine("constrained", w_pad=0.08)
+        left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": [5, 3]})
+        figure.suptitle(ranks.swept.before, x=0.01, ha="left", weight="bold", fontsize=10, parse_math=False)
+        _shares(left, ranks)
+        _agreement(right, ranks)
+        save(figure, path)
+
+
+def _shares(axes: Axes, ranks: Ranks) -> None:
+    shares, count = ranks.shares, len(ranks.methods)
+    axes.imshow(shares, cmap=SHADES, vmin=0, vmax=1, aspect="auto")
+    for row, column in zip(*np.nonzero(shares), strict=True):
+        percent = 100 * shares[row, column]
+        colour = "white" if shares[row, column] > DARK else "black"
+        axes.text(column, row, f"{percent:.0f}" if percent >= 1 else "<1", ha="center", va="center", color=colour)
+    for row, place in enumerate(ranks.nominal_places):
+        axes.add_patch(
+            Rectangle((place - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
+        )
+    names = [textwrap.fill(label, NAME, max_lines=2, placeholder="...") for label in ranks.methods]
+    axes.set_yticks(range(count), names, parse_math=False, fontsize=8)
+    axes.set_xticks(range(count), [str(place) for place in range(1, count + 1)])
+    axes.set_xticks(np.arange(count + 1) - 0.5, minor=True)
+    axes.set_yticks(np.arange(count + 1) - 0.5, minor=True)
+    axes.grid(which="minor", color="#E5E5E5", linewidth=0.6)
+    axes.tick_params(which="both", length=0)
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("rank in a draw")
+    axes.set_title(f"ranks: share of {len(ranks.used)} draws [%]", loc="left")
+
+
+def _agreement(axes: Axes, ranks: Ranks) -> None:
+    if not len(ranks.taus):
+        axes.set_axis_off()
+        return
+    mean, step = ranks.tau, max(NARROWEST, 4 / (len(ranks.methods) * (len(ranks.methods) - 1)))
+    steps, draws = np.unique(((1 - ranks.taus) / step).round(), return_counts=True)
+    axes.bar(1 - step * steps, draws, width=min(0.8 * step, 0.1), color=COLOURS[0])
+    top = 1.22 * draws.max()
+    ends = np.nan_to_num([[mean.mean - mean.low], [mean.high - mean.mean]])
+    axes.errorbar([mean.mean], [0.93 * top], xerr=ends, fmt="o", color=GREY, markersize=5, capsize=3, elinewidth=1.2)
+    interval = f" [{mean.low:.2f}, {mean.high:.2f}]" if np.isfinite(mean.low) else ""
+    axes.set_title(f"mean tau {mean.mean:.2f}{interval}", loc="left")
+    axes.axvline(0, color="black", linewidth=0.8, linestyle="--")
+    axes.set_xlim(min(0.0, ranks.taus.min()) - 0.08, 1.08)
+    axes.set_ylim(0, top)
+    axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    axes.set_ylabel("draws")
+    axes.set_xlabel("Kendall's tau-b against\nthe nominal ranking")
+    axes.grid(axis="y", color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)

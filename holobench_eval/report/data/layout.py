@@ -1,0 +1,210 @@
+"""What the tables need to know of a study: which rows there should be, in which order, and how they are marked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from ...core import plugins
+from ...display.simulated.changes import draws
+from ...display.simulated.profile import load_profile
+from ...study.focal_stacks import planes_of
+from ...study.plan import changed, displays, scored_dataset
+from .categories import CALIBRATED, CEILING, GIVEN, ONLINE, OPEN_LOOP
+from .text import FILES, Wording, from_files, plain, wording
+
+if TYPE_CHECKING:
+    from ...study.config import Study
+    from ...study.displays import Condition
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """What all methods of a study may train on.
+
+    dataset: its name and parameters; images: how many there are; held_out: how many of them only watch the training;
+    captures: the most that a method may take (None: no limit).
+    """
+
+    dataset: str
+    images: int
+    held_out: int
+    captures: int | None
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A change of a display, by one value after another, and the conditions under which cells stand for it.
+
+    kind: of ``display.simulated.changes``; before: the condition without the change; points: (value, condition) of
+    every other one, in the order of the config; drawn: of random draws, the value of each parameter that the display
+    has, by its name in ``display.simulated.changes.draws``, a mapping per point.
+    """
+
+    kind: str
+    before: str
+    points: tuple[tuple[float | str, str], ...]
+    drawn: tuple[Mapping[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The rows of a study's tables.
+
+    pairs: (method label, condition) of every planned row, in the order of the config: methods, then conditions.
+    targets: what every pair is measured on, in the order of the dataset; seed: of the study.
+    baseline: label that every method is tested against (None: no such tests).
+    headline: score key of the headline metric, such as ``psnr_linear``.
+    privileged: labels of methods that may differentiate through the bench; they are the ceiling, not competitors.
+    reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
+    reported_beside: the condition whose rows they stand beside (None: every one's).
+    note: a paragraph that the study wants beside its tables. measure: ``picture``, ``prediction``, ``focus`` or
+    ``files`` (pictures that were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
+    holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
+    stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
+    that is a trained network (None: benches).
+    trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
+    camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
+    of others. real: whether the display exists. metrics: names of those the study wants (None: all).
+    """
+
+    title: str
+    pairs: tuple[tuple[str, str], ...]
+    targets: tuple[str, ...]
+    seed: int = 0
+    headline: str = "psnr_linear"
+    baseline: str | None = None
+    privileged: frozenset[str] = frozenset()
+    reported: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    reported_source: str = ""
+    reported_beside: str | None = None
+    note: str = ""
+    measure: str = "picture"
+    holograms: str = ""
+    learned_display: str | None = None
+    trained: frozenset[str] = frozenset()
+    training: TrainingSet | None = None
+    camera: frozenset[str] = frozenset()
+    sweeps: tuple[Swept, ...] = ()
+    planes: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    stacked: frozenset[str] = frozenset()
+    metrics: tuple[str, ...] | None = None
+    real: bool = False
+    values: str = ""
+
+    def track(self, label: str) -> str:
+        """The track that a method competes in."""
+        if self.measure == FILES:
+            return GIVEN
+        if label in self.privileged:
+            return CEILING
+        if label in self.camera:
+            return ONLINE
+        return CALIBRATED if label in self.trained else OPEN_LOOP
+
+    @property
+    def spends_captures(self) -> bool:
+        """Whether some method takes captures, for its training or while it solves."""
+        return bool(self.trained or self.camera)
+
+    @property
+    def wording(self) -> Wording:
+        """What is compared, in words."""
+        if self.measure == FILES:
+            return from_files(self.values)
+        return wording(self.measure, self.holograms.partition(" (")[0], self.learned_display is not None, self.real)
+
+    def published(self, label: str, condition: str) -> Mapping[str, float]:
+        """Published figures of a row, by metric."""
+        return self.reported.get(label, {}) if self.reported_beside in (None, condition) else {}
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Method labels in the order of the config."""
+        return tuple(dict.fromkeys(label for label, _ in self.pairs))
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions in the order of the config."""
+        return tuple(dict.fromkeys(condition for _, condition in self.pairs))
+
+    @property
+    def changed(self) -> frozenset[str]:
+        """Conditions that are a change of another."""
+        return frozenset(condition for sweep in self.sweeps for _, condition in sweep.points)
+
+    @property
+    def reported_metrics(self) -> tuple[str, ...]:
+        """Names of the published figures, in the order in which the config first names them."""
+        return tuple(dict.fromkeys(name for row in self.reported.values() for name in row))
+
+
+def layout_of(study: Study) -> Layout:
+    """The layout of a checked study. Reads its profiles and lists its dataset; computes nothing."""
+    reported = study.reported
+    shown = displays(study)
+    names = {source: place.name for source, place in shown.items()}
+    methods = {entry.label: plugins.find("methods", entry.name, study.folder) for entry in study.methods}
+
+    def marked(attribute: str) -> frozenset[str]:
+        return frozenset(label for label, method in methods.items() if getattr(method, attribute, False))
+
+    trained = marked("trains")
+    probe = study.holograms
+    return Layout(
+        title=study.title,
+        pairs=tuple(
+            (entry.label, place.title)
+            for entry in study.methods
+            for source in entry.profiles
+            for place in changed(study, source, shown[source])
+        ),
+        targets=tuple(scored_dataset(study).items()),
+        seed=study.seed,
+        headline=study.headline,
+        baseline=study.baseline,
+        privileged=marked("privileged"),
+        reported=reported.rows if reported else {},
+        reported_source=reported.source if reported else "",
+        reported_beside=names[reported.beside] if reported and reported.beside else None,
+        note=study.note,
+        measure=study.measure,
+        metrics=study.protocol.metrics,
+        holograms=f"{probe.name} ({plain(probe.params)})" if study.measure == "prediction" else "",
+        learned_display=next(iter(names.values())) if study.display.learned else None,
+        trained=trained,
+        training=_training_set(study) if trained or study.display.learned else None,
+        camera=marked("camera"),
+        sweeps=tuple(_sweeps(study, shown)),
+        planes=planes_of(scored_dataset(study), study.targets.dataset) if study.measure == "focus" else {},
+        real=study.display.real,
+        stacked=marked("planes") if study.measure == "focus" else frozenset(),
+    )
+
+
+def _sweeps(study: Study, shown: Mapping[str, Condition]) -> Iterator[Swept]:
+    for kind in dict.fromkeys(sweep.condition for sweep in study.sweeps):
+        same = tuple(sweep for sweep in study.sweeps if sweep.condition == kind)
+        for source, before in shown.items():
+            places = changed(replace(study, sweeps=same), source, before)[1:]
+            points = tuple((place.change[1], place.title) for place in places if place.change)
+            if points:
+                drawn = _drawn(before, points) if kind == "draw" else ()
+                yield Swept(kind, before.name, points, drawn)
+
+
+def _drawn(place: Condition, points: tuple[tuple[float | str, str], ...]) -> tuple[dict[str, float], ...]:
+    """What was drawn at every point, without the parameters of stages that the display lacks."""
+    profile = load_profile(place.source, folder=place.folder)
+    every = draws.PARAMETERS.items()
+    felt = {name for name, one in every if one.put(profile, one.low) != one.put(profile, one.high)}
+    drawn = (draws.values(profile, int(index)) for index, _ in points)
+    return tuple({name: value for name, value in one.items() if name in felt} for one in drawn)
+
+
+def _training_set(study: Study) -> TrainingSet:
+    chosen = study.training
+    dataset = plugins.build("datasets", chosen.dataset, dict(chosen.params), study.folder)
+    named = f"{chosen.dataset} ({plain(chosen.params)})"
+    return TrainingSet(named, len(dataset.items()), chosen.held_out, chosen.captures)

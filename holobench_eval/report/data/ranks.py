@@ -1,0 +1,264 @@
+"""Does the ranking of methods survive a change of bench? Their places over random draws of a display's parameters."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from ...display.simulated.changes.draws import PARAMETERS
+from ..sections.findings import SIGNIFICANCE
+from .categories import OFFLINE
+from .layout import Swept
+from .results import Results
+from .statistics import FEWEST, Array, Estimate, bootstrap_mean, holm
+
+ENOUGH = 0.5
+"""Share of the draws in which a method needs a value for every target to be ranked, so that one that seldom has does
+not take the draws from all others."""
+CIRCULAR = frozenset({"zero_phase"})
+"""Parameters that are angles over a full turn: neither end of their range is more than the other."""
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A number of every draw that a difference between two methods may go with.
+
+    parameter: its name in ``draws.PARAMETERS``; form: the value; its size, where the range has both signs; or the sine
+    or cosine of an angle; values: ``(draws,)``.
+    """
+
+    parameter: str
+    form: Literal["value", "size", "sine", "cosine"]
+    values: Array
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What a difference goes with: Spearman's rank correlation, and its p value after Holm over all that were tried."""
+
+    feature: Feature
+    correlation: float
+    p: float
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two methods, the nominally better one first.
+
+    nominal, differences ``(draws,)``: by how much the first is better, in units of the headline metric; cause: what
+    the difference goes with most, None for none of the parameters, or for a pair that never flips.
+    """
+
+    first: str
+    second: str
+    nominal: float
+    differences: Array
+    cause: Cause | None = None
+
+    @property
+    def flips(self) -> int:
+        """Draws in which the order is the other way than nominally; a tie is no order."""
+        return int((np.sign(self.differences) * np.sign(self.nominal) < 0).sum())
+
+    @property
+    def flipped(self) -> Estimate:
+        """Share of such draws."""
+        return share(self.flips, len(self.differences))
+
+    @property
+    def lead(self) -> Estimate:
+        """Mean difference over draws."""
+        return bootstrap_mean(self.differences)
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """The ranking of methods on a display and on the draws of it.
+
+    Methods that see the camera for the scored image, or inside the bench, are not among those that are ranked.
+    """
+
+    swept: Swept
+    results: Results
+
+    @cached_property
+    def quality(self) -> dict[str, Array]:
+        """``(1 + draws,)`` mean headline of every method, that on the nominal display first; turned so that larger is
+        better, NaN where a target has no score."""
+        results, conditions = self.results, [self.swept.before, *(name for _, name in self.swept.points)]
+        sign = 1 if results.headline.higher_is_better else -1
+        labels = [label for label in results.methods(conditions[0]) if results.layout.track(label) in OFFLINE]
+        return {
+            label: sign * np.array([results.values(label, condition).mean() for condition in conditions])
+            for label in labels
+        }
+
+    @cached_property
+    def methods(self) -> list[str]:
+        """Those that are ranked, nominally best first: with every target nominally and in enough of the draws."""
+        known = {label: np.isfinite(quality) for label, quality in self.quality.items()}
+        some = np.any([whole[1:] for whole in known.values()], axis=0) if known else np.zeros(0)
+        kept = [label for label, whole in known.items() if whole[0] and whole[1:].sum() >= ENOUGH * some.sum() > 0]
+        return sorted(kept, key=lambda label: -self.quality[label][0])
+
+    @cached_property
+    def used(self) -> list[int]:
+        """Indices of the draws in which every ranked method has a value for every target."""
+        if not self.methods:
+            return []
+        values = np.stack([self.quality[label][1:] for label in self.methods])
+        return [int(index) for index in np.flatnonzero(np.isfinite(values).all(axis=0))]
+
+    @property
+    def empty(self) -> list[int]:
+        """Indices of the draws in which no ranked method has a value for every target."""
+        values = np.stack([self.quality[label][1:] for label in self.methods]) if self.methods else np.zeros((0, 0))
+        return [int(index) for index in np.flatnonzero(~np.isfinite(values).any(axis=0))]
+
+    @property
+    def told(self) -> bool:
+        """Whether there is a ranking to speak of: two methods and a draw."""
+        return len(self.methods) > 1 and bool(self.used)
+
+    @cached_property
+    def nominal(self) -> Array:
+        """``(methods,)`` quality on the nominal display."""
+        return np.array([self.quality[label][0] for label in self.methods])
+
+    @cached_property
+    def drawn(self) -> Array:
+        """``(draws, methods)`` quality in the draws that are used."""
+        return np.stack([self.quality[label][1:][self.used] for label in self.methods], axis=1)
+
+    @cached_property
+    def nominal_places(self) -> Array:
+        """``(methods,)`` from 1; equal means share the better place."""
+        return places(self.nominal)
+
+    @cached_property
+    def places(self) -> Array:
+        """``(draws, methods)`` from 1; equal means share the better place."""
+        return places(self.drawn)
+
+    @cached_property
+    def shares(self) -> Array:
+        """``(methods, places)`` share of draws in which a method has a place."""
+        return np.stack([(self.places == place).mean(axis=0) for place in range(1, len(self.methods) + 1)], axis=1)
+
+    def first(self, label: str) -> Estimate:
+        """Share of draws in which a method is first."""
+        return share(int((self.places[:, self.methods.index(label)] == 1).sum()), len(self.used))
+
+    @cached_property
+    def taus(self) -> Array:
+        """Kendall's tau-b of each draw's ranking against the nominal one; without draws in which all methods tie."""
+        found = np.array([stats.kendalltau(self.nominal, row).statistic for row in self.drawn])
+        return found[np.isfinite(found)]
+
+    @property
+    def tau(self) -> Estimate:
+        """Their mean, and its interval over draws."""
+        return bootstrap_mean(self.taus)
+
+    @property
+    def unchanged(self) -> int:
+        """Draws in which every method has its nominal place."""
+        return int((self.places == self.nominal_places).all(axis=1).sum())
+
+    @cached_property
+    def features(self) -> list[Feature]:
+        """What was drawn, as the numbers that a difference may go with."""
+        if not self.swept.drawn:
+            return []
+        drawn = [self.swept.drawn[index] for index in self.used]
+        columns = {name: np.array([one[name] for one in drawn]) for name in drawn[0]}
+        return [feature for name, values in columns.items() for feature in _features(name, values)]
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """Every pair of ranked methods, in the order of the nominal ranking."""
+        numbers = itertools.combinations(range(len(self.methods)), 2)
+        every = [
+            Pair(
+                self.methods[first],
+                self.methods[second],
+                float(self.nominal[first] - self.nominal[second]),
+                self.drawn[:, first] - self.drawn[:, second],
+            )
+            for first, second in numbers
+        ]
+        causes = _causes([pair for pair in every if pair.flips], self.features)
+        return [replace(pair, cause=causes.get((pair.first, pair.second))) for pair in every]
+
+    @property
+    def tests(self) -> int:
+        """How many correlations were tried."""
+        return len(self.features) * sum(pair.flips > 0 for pair in self.pairs)
+
+
+def places(quality: Array) -> Array:
+    """Places from 1 along the last axis, the largest first; equal values share the better place."""
+    found: Array = stats.rankdata(-quality, method="min", axis=-1).astype(np.float64)
+    return found
+
+
+def share(count: int, total: int) -> Estimate:
+    """A share of ``total`` draws with its 95 % interval (Wilson 1927)."""
+    ends = stats.binomtest(count, total).proportion_ci(0.95, method="wilson")
+    return Estimate(count / total, float(ends.low), float(ends.high), total)
+
+
+def _features(name: str, values: Array) -> list[Feature]:
+    if name in CIRCULAR:
+        return [Feature(name, "sine", np.sin(values)), Feature(name, "cosine", np.cos(values))]
+    value = Feature(name, "value", values)
+    signed = PARAMETERS[name].low < 0 < PARAMETERS[name].high
+    return [value, Feature(name, "size", np.abs(values))] if signed else [value]
+
+
+def _causes(pairs: Sequence[Pair], features: Sequence[Feature]) -> Mapping[tuple[str, str], Cause]:
+    """The strongest significant correlation of each pair that has one; one family of tests over all of them."""
+    tried = [(pair, feature, *_spearman(feature.values, pair.differences)) for pair in pairs for feature in features]
+    corrected = holm([p for *_, p in tried])
+    causes: dict[tuple[str, str], Cause] = {}
+    for (pair, feature, correlation, _), p in zip(tried, corrected, strict=True):
+        names, found = (pair.first, pair.second), Cause(feature, correlation, p)
+        if p < SIGNIFICANCE and (names not in causes or abs(correlation) > abs(causes[names].correlation)):
+            causes[names] = found
+    return causes
+
+
+def _spearman(a: Array, b: Array) -> tuple[float, float]:
+    """Spearman's correlation and its two-sided p value; NaN where one side is constant, or for too few draws."""
+    if len(a) < FEWEST or np.ptp(a) == 0 or np.ptp(b) == 0:
+        return math.nan, math.nan
+    found = stats.spearmanr(a, b)
+    least = 2 / math.factorial(min(len(a), 100))  # of all orders: the approximation by Student's t goes down to zero
+    return float(found.statistic), max(float(found.pvalue), least)
+
+
+def ranks(results: Results) -> list[Ranks]:
+    """The rankings of every display of which a study has draws, those of all its sweeps together."""
+    drawn = [swept for swept in results.layout.sweeps if swept.kind == "draw"]
+    by_display: dict[str, list[Swept]] = {}
+    for swept in drawn:
+        by_display.setdefault(swept.before, []).append(swept)
+    return [
+        Ranks(
+            Swept(
+                "draw",
+                before,
+                tuple(point for swept in parts for point in swept.points),
+                tuple(values for swept in parts for values in swept.drawn),
+            ),
+            results,
+        )
+        for before, parts in by_display.items()
+    ]

@@ -1,0 +1,219 @@
+"""The numbers of a study, ready to be asked: values by target, ranks, paired tests, floors."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from ...core.errors import UserError, suggest
+from ...study.plan import FLOORS, REFERENCE
+from .categories import CEILING, OFFLINE, TRACKS
+from .layout import Layout
+from .scores import Score, parse
+from .statistics import Array, Estimate, PairedTest, bootstrap_mean, holm, paired_test
+from .tables import DONE, per_target, score_columns, table_from_records
+
+
+@dataclass(frozen=True)
+class Results:
+    """A records frame with the layout of its study; see ``tables.records_frame``."""
+
+    frame: pd.DataFrame
+    layout: Layout
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """A row per method and condition, as in table.csv."""
+        return table_from_records(self.frame, self.layout)
+
+    @cached_property
+    def scores(self) -> list[Score]:
+        """Every score of the records, in the order of the tables."""
+        return [parse(key) for key in score_columns(self.frame)]
+
+    @cached_property
+    def headline(self) -> Score:
+        """The headline metric. UserError when no record has it, though some were scored."""
+        keys = score_columns(self.frame)
+        if keys and self.layout.headline not in keys:
+            plain = [score.key for score in self.scores if score.domain and not score.variant]
+            raise UserError(
+                f"headline '{self.layout.headline}' is in no record; {suggest(self.layout.headline, plain)}"
+            )
+        return parse(self.layout.headline)
+
+    @cached_property
+    def targets(self) -> list[str]:
+        """Names of the targets, those of the dataset first and in its order."""
+        return list(dict.fromkeys([*self.layout.targets, *self.frame["target"]]))
+
+    @cached_property
+    def conditions(self) -> list[str]:
+        """Conditions that have rows, without the reference and without those that are a change of another."""
+        aside = {REFERENCE, *self.layout.changed}
+        return [name for name in dict.fromkeys(self.table["condition"]) if name not in aside]
+
+    def methods(self, condition: str) -> list[str]:
+        """Labels with a row under ``condition``, in the order of the table."""
+        return [label for label, place in self._rows if place == condition]
+
+    def lost(self, label: str, before: str, condition: str) -> Estimate | None:
+        """Headline score before a change minus that after it, target by target, so that a loss is positive where higher
+        is better; None without a complete pair of rows."""
+        rows = [name for name in (before, condition) if label in self.methods(name) and self.whole(label, name)]
+        if len(rows) < 2:
+            return None
+        sign = 1 if self.headline.higher_is_better else -1
+        return bootstrap_mean(sign * (self.values(label, before) - self.values(label, condition)))
+
+    def row(self, label: str, condition: str) -> pd.Series:
+        """A row of the table."""
+        return self._rows[label, condition]
+
+    @cached_property
+    def _rows(self) -> dict[tuple[str, str], pd.Series]:
+        """The rows of the table, in its order."""
+        return {(row["method"], row["condition"]): row for _, row in self.table.iterrows()}
+
+    def cells(self, label: str, condition: str) -> pd.DataFrame:
+        """The records of a method under a condition."""
+        return self._groups.get((label, condition), self.frame.iloc[:0])
+
+    @cached_property
+    def _groups(self) -> dict[tuple[str, str], pd.DataFrame]:
+        return {(str(label), str(place)): rows for (label, place), rows in self.frame.groupby(["method", "condition"])}
+
+    def values(self, label: str, condition: str, key: str | None = None) -> Array:
+        """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
+        means, column = self._means.get((label, condition)), key or self.headline.key
+        if means is None or column not in means:
+            return np.full(len(self.targets), np.nan)
+        return means[column].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def _means(self) -> dict[tuple[str, str], pd.DataFrame]:
+        """Every number of a method under a condition, a row for each of ``targets``."""
+        return {pair: per_target(rows).reindex(self.targets) for pair, rows in self._groups.items()}
+
+    def whole(self, label: str, condition: str, key: str | None = None) -> bool:
+        """Whether a method has a value for every target: only then may its mean be compared."""
+        return not np.isnan(self.values(label, condition, key)).any()
+
+    def complete(self, condition: str, key: str | None = None, tracks: Sequence[str] = OFFLINE) -> list[str]:
+        """Methods of the tracks with a value for every target: the only means that may be ranked together.
+
+        Methods that see the camera for the scored image are not among the others, and are asked for by name.
+        """
+        return [
+            label
+            for label in self.methods(condition)
+            if self.layout.track(label) in tracks and self.whole(label, condition, key)
+        ]
+
+    def ranking(self, condition: str, key: str | None = None, tracks: Sequence[str] = OFFLINE) -> list[str]:
+        """Complete methods of the tracks, best mean first."""
+        score = parse(key) if key else self.headline
+        sign = -1 if score.higher_is_better else 1
+        return sorted(
+            self.complete(condition, key, tracks),
+            key=lambda label: sign * self.values(label, condition, key).mean(),
+        )
+
+    @cached_property
+    def tracks(self) -> list[str]:
+        """The tracks that have rows, in their order."""
+        found = {self.layout.track(label) for condition in self.conditions for label in self.methods(condition)}
+        return [track for track in TRACKS if track in found]
+
+    def ceiling(self, condition: str) -> str | None:
+        """The best complete privileged method."""
+        return next(iter(self.ranking(condition, tracks=(CEILING,))), None)
+
+    def gain(self, label: str, condition: str) -> Estimate | None:
+        """Headline score minus that of the baseline, target by target; None without a complete pair of rows."""
+        baseline = self.layout.baseline
+        if baseline not in self.methods(condition) or not self.whole(baseline, condition):
+            return None
+        if not self.whole(label, condition):
+            return None
+        return bootstrap_mean(self.values(label, condition) - self.values(baseline, condition))
+
+    def closed(self, label: str, condition: str) -> float:
+        """How much of the way from the baseline's mean to the ceiling's a method goes; NaN where there is no way.
+
+        For PSNR, in dB: (method - baseline) / (ceiling - baseline). 0 is the baseline, 1 the ceiling.
+        """
+        ceiling = self.ceiling(condition)
+        gained = self.gain(label, condition)
+        most = self.gain(ceiling, condition) if ceiling else None
+        sign = 1 if self.headline.higher_is_better else -1
+        if gained is None or most is None or sign * most.mean <= 0:
+            return float("nan")
+        return gained.mean / most.mean
+
+    @cached_property
+    def floors(self) -> list[str]:
+        """Names of the reference rows that have a headline score."""
+        rows = (name for name in FLOORS if name in self.methods(REFERENCE))
+        return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.key])]
+
+    def has_floor(self, condition: str) -> bool:
+        """Whether the reference rows were scored against the same images as the methods under ``condition``.
+
+        Pictures are compared with targets, equal for all displays; predictions with the captures of one display.
+        """
+        return bool(self.floors) and self.has_pictures(condition)
+
+    def has_pictures(self, condition: str) -> bool:
+        """Whether the pictures that stand for the targets are what the methods under ``condition`` are scored against.
+
+        The reference rows make them: for predictions, captures of one display.
+        """
+        made_for = self.frame.loc[self.frame["condition"] == REFERENCE, "profile"]
+        return self.layout.measure != "prediction" or condition in set(made_for)
+
+    @cached_property
+    def holes(self) -> pd.DataFrame:
+        """The records without a score."""
+        return self.frame[self.frame["state"] != DONE]
+
+    @cached_property
+    def against_baseline(self) -> list[PairedTest]:
+        """Every method against the baseline; one family of tests per condition."""
+        baseline = self.layout.baseline
+        return [
+            test
+            for condition in self.conditions
+            if baseline in self.methods(condition)
+            for test in self._family(
+                condition, ((str(baseline), other) for other in self.methods(condition) if other != baseline)
+            )
+        ]
+
+    @cached_property
+    def between_all(self) -> list[PairedTest]:
+        """Every method against every other; one family of tests per condition."""
+        return [
+            test
+            for condition in self.conditions
+            for test in self._family(condition, itertools.combinations(self.methods(condition), 2))
+        ]
+
+    def _family(self, condition: str, pairs: Iterable[tuple[str, str]]) -> list[PairedTest]:
+        tests = [
+            paired_test(condition, first, second, (self.values(first, condition), self.values(second, condition)))
+            for first, second in pairs
+        ]
+        corrected = holm([test.p for test in tests])
+        return [replace(test, p_holm=p) for test, p in zip(tests, corrected, strict=True)]
+
+    def floor_difference(self, label: str, condition: str, floor: str) -> float:
+        """Mean headline difference of a method to a floor row, over the targets that both have."""
+        difference = self.values(label, condition) - self.values(floor, REFERENCE)
+        known = difference[np.isfinite(difference)]
+        return float(known.mean()) if known.size else float("nan")

@@ -1,0 +1,121 @@
+"""Reading score keys: ``psnr_linear_blur1`` is a metric, a domain and a variant, and has a title, a unit and digits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...metrics.catalogue import catalogue, direction
+
+DOMAINS = ("linear", "amplitude", "srgb", "stored")
+DOMAIN_NAMES = {"linear": "linear light", "amplitude": "amplitude", "srgb": "sRGB", "stored": "values as stored"}
+
+_TITLES = {
+    "psnr": "PSNR",
+    "ssim": "SSIM",
+    "ms_ssim": "MS-SSIM",
+    "lpips_alex": "LPIPS (AlexNet)",
+    "lpips_vgg": "LPIPS (VGG)",
+    "mofd": "MOFD",
+    "flip": "FLIP",
+    "gmsd": "GMSD",
+    "haarpsi": "HaarPSI",
+    "mdsi": "MDSI",
+    "fsim": "FSIM",
+    "vsi": "VSI",
+    "scale_0": "match factor (red)",
+    "scale_1": "match factor (green)",
+    "scale_2": "match factor (blue)",
+}
+_UNITS = {"psnr": "dB"}
+_DIGITS = {"psnr": 2}
+
+_PATTERN = re.compile(rf"(?P<metric>\w+?)_(?P<domain>{'|'.join(DOMAINS)})(?:_(?P<variant>\w[\w.]*))?")
+_BLUR = re.compile(r"blur_?(?P<width>\d+(?:[.p]\d+)?)")
+
+
+@dataclass(frozen=True)
+class Score:
+    """A score key in its parts; ``domain`` is empty for figures that are not image metrics, such as an efficiency."""
+
+    key: str
+    metric: str
+    domain: str = ""
+    variant: str = ""
+
+    @property
+    def title(self) -> str:
+        """The metric's usual name."""
+        name = _TITLES.get(self.metric, self.metric.replace("_", " "))
+        return f"{name} in focus" if self.in_focus else name
+
+    @property
+    def in_focus(self) -> bool:
+        """Whether it is the score of what is in focus at the plane of a focal stack, and not of the whole picture."""
+        return self.variant == "infocus"
+
+    @property
+    def unit(self) -> str:
+        """Unit, empty for pure numbers."""
+        return _UNITS.get(self.metric, "")
+
+    @property
+    def axis(self) -> str:
+        """Title with domain and unit, for an axis or a sentence: ``PSNR, linear light [dB]``."""
+        domain = f", {DOMAIN_NAMES[self.domain]}" if self.domain else ""
+        return f"{self.title}{domain}{f' [{self.unit}]' if self.unit else ''}"
+
+    @property
+    def higher_is_better(self) -> bool:
+        """The direction of the metric."""
+        return direction(self.key) != "lower"
+
+    @property
+    def blur(self) -> float | None:
+        """Standard deviation in pixels of the blur put on both images before scoring; None without one."""
+        match = _BLUR.fullmatch(self.variant)
+        return float(match["width"].replace("p", ".")) if match else None
+
+    def with_unit(self, value: float, signed: bool = False) -> str:
+        """The value with the metric's digits and unit: ``17.62 dB``, ``0.475``, ``+1.20 dB``."""
+        return f"{self.number(value, signed)}{f' {self.unit}' if self.unit else ''}"
+
+    def number(self, value: float, signed: bool = False) -> str:
+        """The value with the metric's digits; a dash for NaN."""
+        if np.isnan(value):
+            return "–"
+        return f"{value:{'+' if signed else ''}z.{_DIGITS.get(self.metric, 3)}f}"
+
+    def interval(self, mean: float, low: float, high: float, signed: bool = False) -> str:
+        """``17.62 [16.90, 18.31]``; the mean alone where there is no interval."""
+        if np.isnan(low):
+            return self.number(mean, signed)
+        return f"{self.number(mean, signed)} [{self.number(low, signed)}, {self.number(high, signed)}]"
+
+    def better(self, a: float, b: float) -> bool:
+        """Is ``a`` better than ``b``?"""
+        return a > b if self.higher_is_better else a < b
+
+
+def parse(key: str) -> Score:
+    """A score key in its parts."""
+    match = _PATTERN.fullmatch(key)
+    if match is None:
+        return Score(key, key)
+    return Score(key, match["metric"], match["domain"], match["variant"] or "")
+
+
+def order_scores(keys: Iterable[str]) -> list[str]:
+    """Score keys in the order of tables: plain before variants, metrics as in their catalogue, linear light first."""
+    known = [metric.name for metric in catalogue()]
+
+    def rank(key: str) -> tuple[bool, bool, str, int, int, str]:
+        score = parse(key)
+        metric = known.index(score.metric) if score.metric in known else len(known)
+        domain = DOMAINS.index(score.domain) if score.domain else len(DOMAINS)
+        return not score.domain, bool(score.variant), score.variant, metric, domain, key
+
+    return sorted(set(keys), key=rank)

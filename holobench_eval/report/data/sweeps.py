@@ -1,0 +1,153 @@
+"""What a change of the display cost each method: losses, their slope, and where an advantage ends."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...display.simulated.changes import KINDS, Kind
+from .layout import Swept
+from .results import Results
+from .statistics import Estimate, bootstrap_mean, bootstrap_ratio
+
+SMALL = 1.0
+"""dB; a mean loss up to this is called small. It is what the acceptance of a moved image is told by, too."""
+RANKS = frozenset({"draw"})
+"""Kinds whose points are other benches, which are asked for rankings and not for losses."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep with the numbers of its study."""
+
+    swept: Swept
+    results: Results
+
+    @property
+    def kind(self) -> Kind:
+        """What changes."""
+        return KINDS[self.swept.kind]
+
+    @property
+    def points(self) -> tuple[tuple[float | str, str], ...]:
+        """(value, condition), by value, the unchanged display among numbers at its place."""
+        if self.kind.nominal is None:
+            return self.swept.points
+        numbers = [(self.kind.nominal, self.swept.before), *self.swept.points]
+        return tuple(sorted(numbers, key=lambda point: float(point[0])))
+
+    @property
+    def values(self) -> dict[str, float | str]:
+        """The value of every changed condition."""
+        return {condition: value for value, condition in self.swept.points}
+
+    @property
+    def methods(self) -> list[str]:
+        """Labels that were planned under every condition of the sweep."""
+        rows = [self.results.methods(condition) for _, condition in ((0.0, self.swept.before), *self.swept.points)]
+        return [label for label in rows[0] if all(label in others for others in rows)]
+
+    def mean(self, label: str, condition: str) -> Estimate:
+        """Headline score under a condition."""
+        return bootstrap_mean(self.results.values(label, condition))
+
+    def loss(self, label: str, condition: str) -> Estimate | None:
+        """What the change cost, target by target."""
+        return self.results.lost(label, self.swept.before, condition)
+
+    def losses(self, label: str) -> dict[str, Estimate]:
+        """What every change cost, by condition; without those that lack a target."""
+        found = {condition: self.loss(label, condition) for _, condition in self.swept.points}
+        return {condition: loss for condition, loss in found.items() if loss is not None}
+
+    def worst(self, label: str) -> tuple[float | str, Estimate] | None:
+        """The value that cost most, and what it cost."""
+        losses = self.losses(label)
+        if not losses:
+            return None
+        condition = max(losses, key=lambda name: losses[name].mean)
+        return self.values[condition], losses[condition]
+
+    @property
+    def sides(self) -> list[int]:
+        """-1 and 1 where there are points below and above the nominal value; none for names and for factors."""
+        nominal = self.kind.nominal
+        if nominal is None or not self.kind.per:
+            return []
+        return [side for side in (-1, 1) if any(side * (float(v) - nominal) > 0 for v, _ in self.swept.points)]
+
+    def slope(self, label: str, side: int) -> Estimate | None:
+        """Loss for ``kind.per`` of the change to one side: the least-squares line through zero, target by target."""
+        nominal = float(self.kind.nominal or 0.0)
+        points = [(abs(float(v) - nominal), name) for v, name in self.swept.points if side * (float(v) - nominal) > 0]
+        if not points or any(self.loss(label, name) is None for _, name in points):
+            return None
+        sign = 1 if self.results.headline.higher_is_better else -1
+        reach = np.array([away for away, _ in points])
+        before = self.results.values(label, self.swept.before)
+        after = np.stack([self.results.values(label, condition) for _, condition in points])
+        return bootstrap_mean(self.kind.per * (reach @ (sign * (before - after))) / float(reach @ reach))
+
+    def gain(self, label: str, condition: str) -> Estimate | None:
+        """Headline score above the baseline under the same change, positive where it is better."""
+        gained = self.results.gain(label, condition)
+        if gained is None or self.results.headline.higher_is_better:
+            return gained
+        return Estimate(-gained.mean, -gained.high, -gained.low, gained.n)
+
+    def break_even(self, label: str) -> list[float] | None:
+        """Where a method that is above the baseline without a change falls to it, on either side of the nominal value,
+        by straight lines between the points; empty where it never does. None where a difference is not known."""
+        if self.kind.nominal is None or any(self.gain(label, condition) is None for _, condition in self.points):
+            return None
+        found = []
+        for side in (-1, 1):
+            walk = sorted(
+                (side * (float(value) - self.kind.nominal), condition)
+                for value, condition in self.points
+                if side * (float(value) - self.kind.nominal) >= 0
+            )
+            gains = [(reach, gained.mean) for reach, name in walk if (gained := self.gain(label, name)) is not None]
+            for (near, above), (far, below) in itertools.pairwise(gains):
+                if above > 0 >= below:
+                    found.append(self.kind.nominal + side * (near + (far - near) * above / (above - below)))
+                    break
+        return found
+
+    def small_range(self, label: str) -> tuple[float, float] | None:
+        """The values around the nominal one up to which the mean changes by at most ``SMALL``; None without numbers."""
+        if self.kind.nominal is None:
+            return None
+        losses = self.losses(label)
+        ends = []
+        for side in (-1, 1):
+            reach = 0.0
+            for value, condition in sorted(self.swept.points, key=lambda point: abs(float(point[0]))):
+                away = side * (float(value) - self.kind.nominal)
+                if away > 0:
+                    if condition not in losses or abs(losses[condition].mean) > SMALL:
+                        break
+                    reach = away
+            ends.append(self.kind.nominal + side * reach)
+        return ends[0], ends[1]
+
+    def recovered(self, label: str, remedy: Sweep) -> dict[str, Estimate]:
+        """Share of each loss that is got back under the same value of another kind, by value; of a loss that is small,
+        or not clear, no share is told."""
+        shares = {}
+        same = dict(remedy.swept.points)
+        for value, condition in self.swept.points:
+            if value in same:
+                lost, left = self.loss(label, condition), remedy.loss(label, same[value])
+                if lost is not None and left is not None and lost.mean > SMALL and not lost.low <= 0:
+                    before = self.results.values(label, self.swept.before)
+                    blurred, cured = (self.results.values(label, name) for name in (condition, same[value]))
+                    shares[str(value)] = bootstrap_ratio(cured - blurred, before - blurred)
+        return shares
+
+
+def sweeps(results: Results) -> list[Sweep]:
+    """The sweeps of a study, those of rankings aside."""
+    return [Sweep(swept, results) for swept in results.layout.sweeps if swept.kind not in RANKS]

@@ -1,0 +1,1 @@
+"""The sections of report.md: tables and sentences."""

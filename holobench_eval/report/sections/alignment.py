@@ -1,0 +1,146 @@
+"""How given pictures were aligned with their targets, and whether another algorithm agrees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from ...study.plan import REFERENCE
+from ..data.results import Results
+from ..data.scores import Score, parse
+from ..data.tables import DONE
+from ..markdown import table
+
+AGREE = 0.2
+"""dB of the headline PSNR by which two aligners may differ before the report warns."""
+UNTOLD = "–"
+
+Records = Sequence[Mapping[str, Any]]
+
+
+def sentences(results: Results, records: Records) -> list[str]:
+    """What a reader has to know of the geometry before the scores are believed."""
+    found = _captures(records)
+    kinds = [record["cell"]["geometry"]["kind"] for record in found]
+    shared, own, none = (kinds.count(kind) for kind in ("shared", "own", "none"))
+    told = [
+        "The geometry comes from the images and not from fiducials: features or templates propose where a target lies "
+        "in its capture, and the enhanced correlation coefficient refines the homography. No score takes part."
+    ]
+    if shared:
+        told.append(
+            f"One shared alignment for {_count(shared)} in one pose: their own alignments agree within a pixel and "
+            "were averaged, so that none has an alignment better fitted to it than another. A capture that gave "
+            "none of its own is among them only where the shared one fits it."
+        )
+    if own:
+        told.append(
+            f"An alignment of its own for {_count(own)}: no other capture of its size agrees with it within a pixel. "
+            "Each has an error of its own, which counts in its score."
+        )
+    if none:
+        told.append(f"Refused, and without a score: {_count(none)}.")
+    return [*told, *filter(None, [agreement(results)])]
+
+
+def table_of(results: Results, records: Records) -> Markup:
+    """Each capture's alignment, and the headline metric by another algorithm's."""
+    score = _doubled(results)
+    rows = []
+    for record in _captures(records):
+        geometry, scores = record["cell"]["geometry"], record["scores"]
+        turn, mirrored, scale = _pose(geometry)
+        rows.append(
+            [
+                record["label"],
+                record["cell"]["target"],
+                geometry["kind"],
+                *(
+                    [f"{geometry['correlation']:.3f}", f"{scale:.3f}", f"{turn:.1f}", "yes" if mirrored else "no"]
+                    if geometry["kind"] != "none"
+                    else [UNTOLD] * 4
+                ),
+                *(_pair(scores, score) if score else []),
+            ]
+        )
+    columns = [
+        "method",
+        "target",
+        "alignment",
+        "correlation",
+        "capture pixels a target pixel",
+        "turn [deg]",
+        "mirrored",
+    ]
+    second = [score.axis, "by the second aligner", "difference", "apart [target px]"] if score else []
+    return table([*columns, *second], rows)
+
+
+def _captures(records: Records) -> list[Mapping[str, Any]]:
+    return [r for r in records if r["cell"]["condition"] != REFERENCE and r["cell"]["capture_sha256"]]
+
+
+def _count(captures: int) -> str:
+    return f"{captures} capture{'s' * (captures != 1)}"
+
+
+def _doubled(results: Results) -> Score | None:
+    """The PSNR in the headline's domain, where a second aligner was asked."""
+    score = parse(f"psnr_{results.headline.domain}")
+    return score if f"{score.key}_second" in results.frame else None
+
+
+def agreement(results: Results) -> str:
+    """Whether the scores depend on which of two aligners is right, with a warning where they do; empty without scores.
+
+    The first one fixes circles of a fiducial grid, or features of the pictures; the second correlates blocks.
+    """
+    frame, score = results.frame, _doubled(results)
+    done = frame[(frame["state"] == DONE) & (frame["condition"] != REFERENCE)]
+    if not len(done):
+        return ""
+    if score is None:
+        return "Warning: the second aligner has no opinion of any capture."
+    differences = done[f"{score.key}_second"] - done[score.key]
+    names = done["method"] + ", " + done["target"].astype(str)
+    apart = {name: value for name, value in zip(names, differences, strict=True) if np.isfinite(value)}
+    silent = f" It has no opinion of {_count(len(done) - len(apart))}." if len(apart) < len(done) else ""
+    if not apart:
+        return "Warning: the second aligner has no opinion of any capture."
+    most = max(apart.values(), key=abs)
+    beyond = [f"{name}: {value:+.2f} dB" for name, value in apart.items() if abs(value) > AGREE]
+    if not beyond:
+        return (
+            f"A second aligner, which shares no algorithm with the first, agrees within {AGREE} dB on "
+            f"{_count(len(apart))}; it differs by {most:+.2f} dB at most.{silent}"
+        )
+    return (
+        f"Warning: a second aligner, which shares no algorithm with the first, gives scores that differ by more than "
+        f"{AGREE} dB ({'; '.join(beyond)}). These scores depend on the alignment.{silent}"
+    )
+
+
+def _pair(scores: Mapping[str, float], score: Score) -> list[str]:
+    """The score by both aligners, its difference, and how far apart they put a corner."""
+    first, second = (scores.get(key, np.nan) for key in (score.key, f"{score.key}_second"))
+    apart = scores.get("second_aligner_px", np.nan)
+    return [
+        score.number(first),
+        score.number(second),
+        score.number(second - first, signed=True),
+        UNTOLD if np.isnan(apart) else f"{apart:.2f}",
+    ]
+
+
+def _pose(geometry: Mapping[str, Any]) -> tuple[float, bool, float]:
+    """Turn [degrees], mirror and scale of a target in its capture, at the target's upper left corner."""
+    if geometry["kind"] == "none":
+        return np.nan, False, np.nan
+    h = np.array(geometry["homography"])
+    linear = (h[:2, :2] - np.outer(h[:2, 2], h[2, :2]) / h[2, 2]) / h[2, 2]
+    mirrored = bool(np.linalg.det(linear) < 0)
+    down = linear[:, 1]  # a mirror from left to right leaves it
+    return float(np.degrees(np.arctan2(-down[0], down[1]))), mirrored, float(np.sqrt(abs(np.linalg.det(linear))))

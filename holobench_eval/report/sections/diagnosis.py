@@ -1,0 +1,115 @@
+"""What trained methods say of their displays, beside the truth, and what these displays have that no model of them has.
+
+From ``estimates`` and ``missing`` in the provenance of a training (``study.training.diagnosis``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from ...display.estimates import QUANTITIES
+from ..markdown import escape, table
+from .training import Trained
+
+COLOURS = ("red", "green", "blue")
+MOST = 1e12
+"""No quantity is anywhere near; a larger number in a stranger's file is no estimate."""
+Row = Mapping[str, Any]
+
+
+def diagnoses(found: Sequence[Trained]) -> list[tuple[str, Markup, str]]:
+    """Of every training that tells something: whose and of which display, the table, and a sentence on the errors."""
+    told = []
+    for one in found:
+        rows = estimates(one)
+        if rows:
+            whose = one.name if one.name.endswith(f" on {one.display}") else f"{one.name} on {one.display}"
+            told.append((whose, _table(rows), _verdict(rows)))
+    return told
+
+
+def missing(found: Sequence[Trained]) -> list[Markup]:
+    """For every display, what lies outside the form of the models that were trained on it."""
+    lists: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for one in found:
+        texts = one.record.provenance.get("missing") if one.record else None
+        if isinstance(texts, list) and all(isinstance(text, str) for text in texts):
+            lists.setdefault((one.display, tuple(texts)), []).extend(one.labels)
+    return [
+        escape(
+            f"{display} has, and the form of the model of {', '.join(dict.fromkeys(labels))} has not: "
+            f"{'; '.join(texts) if texts else 'nothing'}."
+        )
+        for (display, texts), labels in lists.items()
+    ]
+
+
+def estimates(one: Trained) -> list[Row]:
+    """The estimates of a training; what is no list of them in a stranger's file is none."""
+    rows = one.record.provenance.get("estimates") if one.record else None
+    if not isinstance(rows, list):
+        return []
+    return [row for row in rows if isinstance(row, dict) and _legible(row)]
+
+
+def _legible(row: Row) -> bool:
+    colour = row.get("colour")
+    return isinstance(row.get("name"), str) and _known(row.get("value")) and (colour is None or type(colour) is int)
+
+
+def _known(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST  # not for NaN
+
+
+def _table(rows: Sequence[Row]) -> Markup:
+    """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth."""
+    colours = sorted({row["colour"] for row in rows if isinstance(row.get("colour"), int)})
+    columns: list[int | None] = [*colours, *([None] if any(row.get("colour") is None for row in rows) else [])]
+    lines = []
+    for name in dict.fromkeys(row["name"] for row in rows):
+        same = {row.get("colour"): row for row in rows if row["name"] == name}
+        first = next(iter(same.values()))
+        words = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
+        off = [abs(difference(row)) for row in same.values() if _known(row.get("truth"))]
+        lines.append(
+            [
+                words,
+                first.get("unit") or "",
+                *(_cell(same[colour]) if colour in same else "" for colour in columns),
+                f"{max(off):.3f}" if off else "–",
+                f"{first['error']:g}" if _known(first.get("error")) else "–",
+            ]
+        )
+    heads = [_colour(colour) for colour in columns]
+    return table(["quantity", "unit", *heads, "largest difference", "stated error"], lines)
+
+
+def _colour(colour: int | None) -> str:
+    if colour is None:
+        return "all"
+    return COLOURS[colour] if 0 <= colour < len(COLOURS) else f"colour {colour}"
+
+
+def _cell(row: Row) -> str:
+    return f"{row['value']:.3f} ({row['truth']:.3f})" if _known(row.get("truth")) else f"{row['value']:.3f} (–)"
+
+
+def difference(row: Row) -> float:
+    """Estimate less truth, phases in rad by the shorter way around."""
+    apart = float(row["value"]) - float(row["truth"])
+    return math.remainder(apart, math.tau) if row.get("unit") == "rad" else apart
+
+
+def _verdict(rows: Sequence[Row]) -> str:
+    judged = [row for row in rows if _known(row.get("truth")) and _known(row.get("error"))]
+    if not judged:
+        return "None of these has a truth and a stated error to be compared with."
+    outside = [row for row in judged if abs(difference(row)) > row["error"]]
+    if not outside:
+        return f"All {len(judged)} numbers are within their stated errors."
+    named = ", ".join(dict.fromkeys(row["name"].replace("_", " ") for row in outside))
+    return f"{len(judged) - len(outside)} of {len(judged)} numbers are within their stated errors; outside: {named}."

@@ -1,0 +1,221 @@
+"""What the numbers say, as sentences; each is computed from the records and none is written without its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...study.plan import REFERENCE
+from ..data.categories import CALIBRATED, ONLINE
+from ..data.results import Results
+from ..data.scores import DOMAIN_NAMES, Score
+from ..data.statistics import FEWEST, PairedTest
+from ..data.text import words
+
+SIGNIFICANCE = 0.05
+
+
+def p_value(p: float) -> str:
+    """``p = 0.031`` or ``p < 0.001``."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
+
+
+def findings(results: Results) -> list[tuple[str, list[str]]]:
+    """The sentences of the report's summary under their headings: each display, then what holds across displays."""
+    groups = [
+        (
+            condition,
+            [
+                *_best(results, condition),
+                *_best_online(results, condition),
+                *_incomplete(results, condition),
+                *_other_metrics(results, condition),
+                *_ceiling(results, condition),
+                *_significant(results, condition),
+                *_floor(results, condition, "floor_constant"),
+                *_floor(results, condition, "floor_speckle"),
+                *_blur(results, condition),
+            ],
+        )
+        for condition in results.conditions
+    ]
+    across = _across_conditions(results)
+    return [*groups, ("Across displays", across)] if across else groups
+
+
+def _margin(score: Score, test: PairedTest) -> str:
+    """The mean paired difference, second minus first, with all that belongs to it."""
+    difference, pairs = test.difference, f"{test.complete} of {test.targets} targets"
+    if test.complete < FEWEST:
+        return f"{score.with_unit(difference.mean, signed=True)} over {pairs}, too few for an interval or a test"
+    low, high = score.number(difference.low, signed=True), score.number(difference.high, signed=True)
+    mean = score.with_unit(difference.mean, signed=True)
+    return f"{mean} [{low}, {high}] over {pairs}, {p_value(test.p_holm)} after Holm"
+
+
+def _best(results: Results, condition: str) -> list[str]:
+    ranking, said = results.ranking(condition), results.layout.wording
+    if not ranking:
+        return ["No method has a score for every target, so none is ranked."]
+    among = said.best.format(count=len(ranking)) if len(ranking) > 1 else said.only
+    if ONLINE in results.tracks:
+        among = f"Without the camera for the scored image, {among[0].lower()}{among[1:]}"
+    return _leading(results, condition, ranking, among)
+
+
+def _best_online(results: Results, condition: str) -> list[str]:
+    """The first of the track whose methods see the camera for the scored image."""
+    ranking = results.ranking(condition, tracks=(ONLINE,))
+    if not ranking:
+        return []
+    among = f"best of the {len(ranking)} ranked methods" if len(ranking) > 1 else "the only ranked method"
+    return _leading(results, condition, ranking, f"With the camera for the scored image (online track), {among}")
+
+
+def _leading(results: Results, condition: str, ranking: Sequence[str], among: str) -> list[str]:
+    """What the first of a ranking scores, and by how much it differs from the baseline (the baseline: from the next).
+
+    among: who was ranked, the beginning of the sentence.
+    """
+    score, baseline, best = results.headline, results.layout.baseline, ranking[0]
+    row = results.row(best, condition)
+    value = score.interval(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
+    over = f"over {row['n']} target{'' if row['n'] == 1 else 's'}"
+    sentence = f"{among}: {best}, {score.title} {value}{f' {score.unit}' if score.unit else ''} {over}"
+    if best == baseline:
+        compared, intro = list(ranking[1:2]), "; it is the baseline, and from it the next,"
+    else:
+        compared, intro = [best], f"; against the baseline {baseline}, which has"
+    for test in results.against_baseline:
+        if test.condition == condition and test.second in compared and test.complete:
+            if best == baseline:
+                return [f"{sentence}{intro} {test.second}, differs by {_margin(score, test)}."]
+            other = score.with_unit(results.row(test.first, condition)[score.key])
+            return [f"{sentence}{intro} {other}: {_margin(score, test)}."]
+    return [f"{sentence}."]
+
+
+def _incomplete(results: Results, condition: str) -> list[str]:
+    plain = [label for label in results.methods(condition) if label not in results.layout.privileged]
+    holes = [label for label in plain if not results.whole(label, condition)]
+    counts = [f"{label} ({int(results.row(label, condition)['n'])} of {len(results.targets)})" for label in holes]
+    return [f"Not ranked, since they lack targets: {', '.join(counts)}."] if holes else []
+
+
+def _other_metrics(results: Results, condition: str) -> list[str]:
+    best = results.ranking(condition)[:1]
+    others: dict[str, list[str]] = {}
+    for score in results.scores:
+        if score.domain and not score.variant and score.key != results.headline.key:
+            ranking = results.ranking(condition, score.key)
+            if len(ranking) > 1 and best and ranking[0] != best[0]:
+                others.setdefault(ranking[0], []).append(f"{score.title} ({DOMAIN_NAMES[score.domain]})")
+    other = results.layout.wording.other
+    return [other.format(metrics=words(names), label=label, best=best[0]) for label, names in others.items()]
+
+
+def _ceiling(results: Results, condition: str) -> list[str]:
+    ranking, score = results.ranking(condition), results.headline
+    sentences = []
+    for label in results.methods(condition):
+        value = results.row(label, condition)[score.key]
+        if label in results.layout.privileged and ranking and np.isfinite(value):
+            gap = float(np.nanmean(results.values(label, condition) - results.values(ranking[0], condition)))
+            sentences.append(
+                f"The ceiling {label} (privileged: it may differentiate through the bench) scores "
+                f"{score.with_unit(value)}, {score.with_unit(gap, signed=True)} from {ranking[0]}."
+            )
+    for track in (CALIBRATED, ONLINE):
+        best = results.ranking(condition, tracks=(track,))[:1]
+        closed = [value for label in best if np.isfinite(value := results.closed(label, condition))]
+        if closed:
+            sentences.append(
+                f"Of the way from the baseline {results.layout.baseline} to the ceiling, the best method of the "
+                f"{track} track, {best[0]}, goes {100 * closed[0]:z.0f} %."
+            )
+    return sentences
+
+
+def _significant(results: Results, condition: str) -> list[str]:
+    tests = [test for test in results.against_baseline if test.condition == condition]
+    made = [test for test in tests if np.isfinite(test.p)]
+    if not tests:
+        return []
+    if not made:
+        return [f"No test against the baseline: fewer than {FEWEST} complete pairs."]
+    clear = [test.second for test in made if test.p_holm < SIGNIFICANCE]
+    most = max(test.complete for test in made)
+    smallest = min(1.0, len(made) * 2.0 ** (1 - most))
+    caution = (
+        f"With {most} pairs and {len(made)} comparisons no corrected p can be below {smallest:.2g}, so this test could "
+        f"not have shown any difference."
+        if smallest >= SIGNIFICANCE
+        else f"The smallest corrected p that {most} pairs and {len(made)} comparisons allow is {smallest:.2g}."
+    )
+    return [
+        f"Different from the baseline {made[0].first} at p < {SIGNIFICANCE} after Holm: "
+        f"{words(clear) if clear else 'none'} ({len(clear)} of {len(made)}). {caution}"
+    ]
+
+
+def _floor(results: Results, condition: str, floor: str) -> list[str]:
+    if floor not in results.floors or not results.has_floor(condition):
+        return []
+    score, row = results.headline, results.row(floor, REFERENCE)
+    differences = {label: results.floor_difference(label, condition, floor) for label in results.methods(condition)}
+    known = {label: value for label, value in differences.items() if np.isfinite(value)}
+    if not known:
+        return []
+    below = [label for label, value in known.items() if not score.better(value, 0.0)]
+    verdict = (
+        f"not better on average: {words(below)}"
+        if below
+        else f"all of the {len(known)} with a score are better on average"
+    )
+    named = results.layout.wording.floor_name(floor)
+    return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]
+
+
+def blur_keys(results: Results) -> list[Score]:
+    """The headline metric, of whole pictures, at each blur width, sharpest first; plain counts as width zero."""
+    same = [s for s in results.scores if (s.metric, s.domain) == (results.headline.metric, results.headline.domain)]
+    blurred = sorted((s for s in same if s.blur is not None), key=lambda s: s.blur or 0.0)
+    return [next(s for s in same if not s.variant), *blurred] if blurred else []
+
+
+def _blur(results: Results, condition: str) -> list[str]:
+    keys = blur_keys(results)
+    rankings = {score: results.ranking(condition, score.key) for score in keys}
+    plain = rankings[keys[0]] if keys else []
+    if len(plain) < 2:
+        return []
+    flips = []
+    for score, ranking in rankings.items():
+        changed = [
+            f"{b} above {a}"
+            for index, a in enumerate(plain)
+            for b in plain[index + 1 :]
+            if {a, b} <= set(ranking) and ranking.index(b) < ranking.index(a)
+        ]
+        if changed:
+            flips.append(f"at {score.blur:g} px {words(changed)}")
+    widths = words([f"{score.blur:g}" for score in keys[1:]])
+    if not flips:
+        return [f"The order of the {len(plain)} ranked methods is the same at blur widths of {widths} px."]
+    return [f"The ranking depends on the blur width: {'; '.join(flips)}."]
+
+
+def _across_conditions(results: Results) -> list[str]:
+    rankings = {condition: results.ranking(condition) for condition in results.conditions}
+    shared = set.intersection(*(set(ranking) for ranking in rankings.values())) if rankings else set()
+    if len(rankings) < 2 or len(shared) < 2:
+        return []
+    orders = {name: [label for label in ranking if label in shared] for name, ranking in rankings.items()}
+    distinct = {tuple(order) for order in orders.values()}
+    if len(distinct) == 1:
+        return [
+            f"The {len(shared)} methods ranked under every display have the same order on all {len(orders)} of them."
+        ]
+    listed = "; ".join(f"{name}: {' > '.join(order)}" for name, order in orders.items())
+    return [f"The order of methods depends on the display: {listed}."]

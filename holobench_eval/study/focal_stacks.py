@@ -1,0 +1,67 @@
+"""Focal stacks in a plan: at which distance each target is shown, and which cells share a hologram (paper 7.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..core.errors import UserError
+from .displays import Condition
+
+SCORES = ("psnr_linear_infocus", "ssim_linear_infocus")
+"""Scores of the part of a picture that is in focus."""
+VERSION = "infocus 1"
+"""Of these scores; raised whenever a value would change."""
+LENS, STAYS = "refocus", "other_plane"
+"""How the camera meets a plane: the display moves the picture there by a lens, or the hologram stays as it is."""
+
+Target = tuple[str, str]
+"""Name and digest."""
+Showing = list[tuple[Target, Condition]]
+"""Targets, each with the display that it is shown on."""
+
+
+def planes_of(dataset: Any, name: str) -> dict[str, tuple[str, float]]:
+    """Scene and plane [mm on the full panel] of every target. UserError for a dataset without planes."""
+    if not all(callable(getattr(dataset, part, None)) for part in ("scene", "plane", "mask")):
+        raise UserError(f"dataset '{name}' has no planes; measure: focus needs one that has, such as focal_stacks")
+    return {item: (dataset.scene(item), float(dataset.plane(item))) for item in dataset.items()}
+
+
+def planes_a_scene(planes: Mapping[str, tuple[str, float]]) -> int:
+    """How many targets apart the next scene is: another plane of a scene is no wrong picture of it."""
+    return len(planes) // len({scene for scene, _ in planes.values()})
+
+
+def showings(
+    method: type[Any], group: Sequence[Condition], targets: Sequence[Target], planes: Mapping[str, tuple[str, float]]
+) -> Iterator[Showing]:
+    """Targets and displays that share a solution of a method, for every solution.
+
+    A method with ``planes = True`` makes one hologram of all planes of a scene, for displays whose planes lie equally
+    far apart; others make one a target, which the display moves to the target's plane.
+    """
+    if not getattr(method, "planes", False):
+        for target in targets:
+            yield [(target, _at(place, LENS, planes[target[0]][1])) for place in group]
+        return
+    alike: dict[float, list[Condition]] = {}
+    for place in group:
+        alike.setdefault(offset(place, {STAYS: 1.0}), []).append(place)
+    for scene in dict.fromkeys(planes[name][0] for name, _ in targets):
+        stack = [target for target in targets if planes[target[0]][0] == scene]
+        for places in alike.values():
+            yield [(target, _at(place, STAYS, planes[target[0]][1])) for target in stack for place in places]
+
+
+def _at(place: Condition, kind: str, millimetres: float) -> Condition:
+    return place if millimetres == 0 else replace(place, change=(kind, millimetres))
+
+
+def offset(place: Condition, change: Mapping[str, Any]) -> float:
+    """How far a cell's plane lies from that of its display [m], on the display's own panel."""
+    from ..display import load_profile
+
+    full = load_profile(place.source, folder=place.folder).panel.distance
+    return float(sum(change.values())) * 1e-3 * place.spec.distance / full

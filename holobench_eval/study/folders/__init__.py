@@ -1,0 +1,1 @@
+"""Photographs that somebody took, in folders: read, aligned and scored."""

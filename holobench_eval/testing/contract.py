@@ -1,0 +1,95 @@
+"""What every method promises, as one check that its tests call."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..core.hashing import canonical
+from ..core.plugins import params_of
+from ..core.seeds import generator
+from ..display import MeteredBench, Workbench, load_profile, open_bench
+from ..study.versions import method_version
+
+PLAIN_PANEL, CAMERA_PANEL = (64, 64), (128, 128)
+"""A display that is photographed needs a region large enough to register its camera."""
+
+
+def check_method(method: Any) -> None:
+    """Check a method, given as a class (then with its default parameters) or as an instance.
+
+    AssertionError, with a sentence on what is wrong, unless it is a frozen dataclass with plain parameters, turns
+    intensity ``(B, C, h, w)`` into a finite phase ``(B, C, H, W)`` for one and several images and for one and three
+    colours (for three alone if it has a camera), gives the same phase for the same seed, leaves its target alone, and
+    captures only with ``camera = True``.
+    """
+    cls = method if isinstance(method, type) else type(method)
+    instance = _default(cls) if isinstance(method, type) else method
+    _check_parameters(cls, instance)
+    camera = bool(getattr(cls, "camera", False))
+    bench = open_bench(load_profile("ideal"), CAMERA_PANEL if camera else PLAIN_PANEL, seed=0)
+    fewest = 3 if camera else 1  # a capture is of all colours of the display
+    _check_solution(instance, bench, _target(bench, images=1, channels=3), camera)
+    _check_solution(instance, bench, _target(bench, images=2, channels=fewest), camera)
+    _check_repeatable(instance, bench, _target(bench, images=2, channels=fewest))
+
+
+def _default(cls: type[Any]) -> Any:
+    assert is_dataclass(cls), f"{cls.__name__} is not a dataclass; write @dataclass(frozen=True) above it"
+    try:
+        return cls()
+    except TypeError as error:
+        raise AssertionError(f"{cls.__name__} needs a default for every parameter: {error}") from error
+
+
+def _check_parameters(cls: type[Any], instance: Any) -> None:
+    name = cls.__name__
+    assert is_dataclass(cls), f"{name} is not a dataclass; write @dataclass(frozen=True) above it"
+    for item in fields(cls):
+        try:
+            setattr(instance, item.name, getattr(instance, item.name))
+        except FrozenInstanceError:
+            continue
+        raise AssertionError(f"{name} can be changed after it was made; write @dataclass(frozen=True)")
+    for flag in ("camera", "privileged"):
+        assert isinstance(getattr(cls, flag, False), bool), f"{name}.{flag} must be True or False"
+        assert flag not in {item.name for item in fields(cls)}, f"{name}.{flag} must be a ClassVar, not a parameter"
+    canonical(params_of(instance))
+    assert method_version(cls) == method_version(cls), f"the code of {name} cannot be identified"
+    assert callable(getattr(instance, "solve", None)), f"{name} has no method 'solve'"
+    assert replace(instance) == instance, f"{name} is not equal to its own copy; remove eq=False"
+
+
+def _target(bench: Workbench, images: int, channels: int) -> Tensor:
+    """Smooth blobs and an edge: what a picture has, in the region's size."""
+    height, width = bench.spec.region.shape
+    noise = torch.rand((images, channels, 6, 6), generator=generator("contract", images, channels))
+    target = torch.nn.functional.interpolate(noise, (height, width), mode="bilinear")
+    target[..., : height // 3, : width // 3] = 0.9
+    return target.clamp(0, 1)
+
+
+def _check_solution(method: Any, bench: Workbench, target: Tensor, camera: bool) -> None:
+    name, before = type(method).__name__, target.clone()
+    shape = (*target.shape[:2], *bench.spec.shape)
+    phase, handle = _solve(method, bench, target)
+    assert isinstance(phase, Tensor), f"{name}.solve returned {type(phase).__name__}, not a tensor"
+    assert tuple(phase.shape) == shape, f"{name}.solve returned {tuple(phase.shape)} for {shape}"
+    assert phase.is_floating_point(), f"{name}.solve returned {phase.dtype}, not a phase in radians"
+    assert bool(phase.isfinite().all()), f"{name}.solve returned a phase with NaN or infinite values"
+    assert torch.equal(target, before), f"{name}.solve changed its target; clone it first"
+    assert camera or handle.captures == 0, f"{name} captures, but declares no camera; set camera = True"
+
+
+def _check_repeatable(method: Any, bench: Workbench, target: Tensor) -> None:
+    (first, _), (again, _) = _solve(method, bench, target), _solve(method, bench, target)
+    assert torch.equal(first, again), f"{type(method).__name__}.solve is not repeatable; draw from bench.generator(...)"
+
+
+def _solve(method: Any, bench: Workbench, target: Tensor) -> tuple[Any, MeteredBench]:
+    handle = bench.for_method(method, type(method).__name__, target[0], item="contract", repeat=0)
+    torch.seed()  # another one at every call: it shows up a method that draws from the global generator
+    return method.solve(target, handle), handle

@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.commands.app import main
+from holobench_eval.report.charts import sheet
+
+PLUGINS = """
+import hashlib
+from dataclasses import dataclass
+
+import torch
+
+
+@dataclass(frozen=True)
+class Images:
+    def items(self):
+        return ["steps"]
+
+    def digest(self, item):
+        return hashlib.sha256(item.encode()).hexdigest()
+
+    def load(self, item, shape, channels=3):
+        steps = (torch.arange(shape[1]) * 4 // shape[1] + 1) / 5
+        return steps.expand(channels, *shape).clone()
+
+
+@dataclass(frozen=True)
+class Flat:
+    def solve(self, target, bench):
+        return torch.zeros(*target.shape[:2], *bench.spec.shape)
+
+
+@dataclass(frozen=True)
+class Blind:
+    def solve(self, target, bench):
+        return torch.full((*target.shape[:2], *bench.spec.shape), torch.nan)
+"""
+
+CONFIG = """\
+title: Command line
+display: {profiles: [ideal], panel: [128, 128]}
+targets: {dataset: "plugins.py:Images"}
+methods: ["plugins.py:Flat", "plugins.py:Blind"]
+"""
+
+
+@pytest.fixture
+def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plugins.py").write_text(PLUGINS)
+    path = tmp_path / "toy.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+def holoeval(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    """The exit code of a command."""
+    monkeypatch.setattr(sys, "argv", ["holoeval", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    code = stopped.value.code
+    return code if isinstance(code, int) else 0
+
+
+@pytest.mark.slow
+def test_a_study_from_run_to_check(
+    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert holoeval(monkeypatch, "plan", config) == 0
+    assert not Path("reports").exists()
+    assert "missing" in capsys.readouterr().out
+
+    assert holoeval(monkeypatch, "run", config, "--executor", "serial", "--threads", 1) == 1
+    shown = capsys.readouterr().out
+    assert "1 cell failed" in shown
+    assert "Flat" in shown
+    assert Path("reports/toy/report.md").exists()
+    tables = [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")]
+    assert b"Blind,ideal,0,1" in tables[0]
+    assert b"1 values that are NaN" not in tables[1]
+    assert b"values that are NaN or infinite" in tables[1]
+
+    shutil.rmtree("reports/toy/figures", ignore_errors=True)
+    assert holoeval(monkeypatch, "report", config) == 0
+    assert [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
+
+    another = config.with_name("another.yaml")
+    another.write_text(f"{config.read_text()}\nseed: 99\n")
+    assert holoeval(monkeypatch, "report", another, "--output", "reports/toy") == 2
+    assert "no cell of this study has a record here" in capsys.readouterr().err
+    assert [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
+
+    assert holoeval(monkeypatch, "check") == 0
+    Path("reports/toy/table.csv").write_text("changed")
+    assert holoeval(monkeypatch, "check") == 1
+    assert "1 report, 1 problem" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("run", "absent.yaml"), "absent.yaml: cannot be read"),
+        (("run", "toy.yaml", "--executor", "lokal"), "unknown executor 'lokal'; did you mean 'local'?"),
+        (("run", "toy.yaml", "--executor", "serial", "--workers", "3"), "--workers 3 needs --executor local"),
+        (("report", "toy.yaml"), "no records in this folder"),
+        (("list", "metods"), "unknown kind 'metods'; did you mean 'methods'?"),
+        (("new-method", "Class"), "'Class' is no name for a method"),
+        (("check", "nowhere"), "no reports in this folder"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    config: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    message: str,
+) -> None:
+    assert holoeval(monkeypatch, *arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("holoeval: ")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_a_mistake_in_a_config_leaves_nothing_behind(
+    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config.write_text(CONFIG.replace("panel", "pannel"))
+    assert holoeval(monkeypatch, "run", config) == 2
+    assert f"{config}:2:30: unknown key 'pannel' in display; did you mean 'panel'?" in capsys.readouterr().err
+    assert not Path("reports").exists()
+
+
+@pytest.mark.parametrize("option", ["--threads", "--workers"])
+def test_no_workers_and_no_threads_are_refused(config: Path, monkeypatch: pytest.MonkeyPatch, option: str) -> None:
+    assert holoeval(monkeypatch, "run", config, "--executor", "local", option, "0") == 2
+
+
+def test_everything_that_a_config_may_name_is_listed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert holoeval(monkeypatch, "list") == 0
+    shown = capsys.readouterr().out
+    for word in ("wirtinger", "gerchberg_saxton", "photographs", "ideal", "ssim", "higher is better"):
+        assert word in shown
+
+
+def test_a_new_method_is_written_and_named(
+    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert holoeval(monkeypatch, "new-method", "quiet_phase", "--folder", "mine") == 0
+    assert "mine/quiet_phase.py:QuietPhase" in capsys.readouterr().out
+    assert holoeval(monkeypatch, "new-method", "quiet_phase", "--folder", "mine") == 2
+
+
+def test_help_needs_no_heavy_import() -> None:
+    code = "import sys, holobench_eval.commands.app\n"
+    code += "print(sorted({'torch', 'numpy', 'pydantic', 'dask'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_display_is_shown_with_its_effects_and_what_the_parametric_model_lacks(
+    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sheet, "draw_sheet", lambda *_: Path("stages.png"))
+    assert holoeval(monkeypatch, "show", "leto-dusty") == 0
+    shown = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if line.startswith("│")}
+    assert "has it" in shown["look_up_table"]
+    assert "lacks it" in shown["plane_dust"]

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.commands.report_check import check
+from holobench_eval.core.errors import UserError
+from holobench_eval.report import layout_of, recompute_table
+from holobench_eval.report.data.tables import csv_text, records_frame
+from holobench_eval.study.config import load_study
+from tests.study.test_run import compute
+from tests.support.fake_study import write_config
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Path:
+    """A folder with one finished study in ``reports/`` and its config beside."""
+    config = write_config(tmp_path, count=2)
+    folder = tmp_path / "reports" / "study"
+    outcome = compute(config, folder)
+    layout = layout_of(load_study(config))
+    text = csv_text(records_frame(outcome.records, layout))
+    (folder / "records.csv").write_text(text)
+    (folder / "table.csv").write_text(recompute_table(text, layout))
+    return folder
+
+
+def problems(report: Path) -> list[str]:
+    reports, found = check(report.parent)
+    assert reports == 1
+    return found
+
+
+def test_a_report_that_follows_from_its_records_passes(report: Path) -> None:
+    assert problems(report) == []
+
+
+def test_a_changed_number_in_a_table_is_found(report: Path) -> None:
+    table = report / "table.csv"
+    table.write_text(table.read_text().replace("Toy,ideal,2,", "Toy,ideal,3,"))
+    assert ["does not follow from records.csv" in problem for problem in problems(report)] == [True]
+
+
+def test_a_changed_config_is_found(report: Path) -> None:
+    config = report.parents[1] / "study.yaml"
+    config.write_text(config.read_text() + "# later\n")
+    assert ["config has changed" in problem for problem in problems(report)] == [True]
+
+
+def test_a_config_that_does_not_load_is_found(report: Path) -> None:
+    config = report.parents[1] / "study.yaml"
+    config.write_text(config.read_text() + "sede: 1\n")
+    assert ["unknown key 'sede'" in problem for problem in problems(report)] == [True]
+
+
+def test_a_changed_profile_is_found(report: Path) -> None:
+    file = report / "provenance.json"
+    file.write_text(file.read_text().replace('"version": 1', '"version": 77'))
+    assert ["profile 'ideal' was {'version': 77" in problem for problem in problems(report)] == [True]
+
+
+@pytest.mark.parametrize("name", ["table.csv", "records.csv"])
+def test_a_missing_table_is_found(report: Path, name: str) -> None:
+    (report / name).unlink()
+    assert [name in problem for problem in problems(report)] == [True]
+
+
+def test_a_damaged_provenance_is_found(report: Path) -> None:
+    (report / "provenance.json").write_text("{}")
+    assert ["lacks config, config_sha256, profiles" in problem for problem in problems(report)] == [True]
+
+
+def test_a_folder_without_reports_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no reports"):
+        check(tmp_path)

@@ -1,0 +1,332 @@
+"""``holoeval score``: pictures in, the report of a study out, and one clear line for everything that is wrong."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import zlib
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+from rich.console import Console
+
+from holobench_eval.commands.score_folders import score_folders
+from holobench_eval.core.errors import UserError
+from holobench_eval.imaging.align import Alignment
+from holobench_eval.metrics import score
+from holobench_eval.study.folders import scoring as scored_pictures
+from holobench_eval.study.folders.files import read_folders
+from tests.support.photographed import captured, photograph, pose
+
+REAL = Path(__file__).resolve().parents[2] / "../shared/captures/stanford-2021"
+PUBLISHED = {"sgd-asm": 20.94, "citl-asm": 25.16, "sgd-ours": 27.41}
+SHAPE = (160, 200)
+SPECKLE = {"clean": 0.2, "coarse": 0.6}
+
+
+def few(*pictures: Any, **options: Any) -> dict[str, float]:
+    """The scores of the two metrics that are quick."""
+    return score(*pictures, **{**options, "metrics": ("psnr", "ssim")})
+
+
+def save(path: Path, picture: np.ndarray) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    levels = np.round(picture * 255).astype(np.uint8)
+    Image.fromarray(levels[0] if len(levels) == 1 else levels.transpose(1, 2, 0)).save(path)
+
+
+def lay_out(root: Path) -> Path:
+    """Two methods, two targets, one pose."""
+    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3, turns=1, mirrored=True)
+    for name in ("astronaut", "coffee"):
+        target = photograph(name, SHAPE)
+        save(root / "targets" / f"{name}.png", target)
+        for index, (method, contrast) in enumerate(SPECKLE.items()):
+            draw = np.random.default_rng(index)
+            save(root / "captures" / method / f"{name}.png", captured(target, where, size, draw, contrast=contrast))
+    return root
+
+
+def run(root: Path, **options: str) -> str:
+    report, _ = score_folders(root / "captures", root / "targets", root / "out", console=quiet(), **options)
+    return report.read_text()
+
+
+def records(root: Path) -> list[Path]:
+    """The files of records, those of alignments left out."""
+    return sorted(path for path in (root / "out" / "records").glob("*.json") if not path.name.startswith("alignment"))
+
+
+def quiet() -> Console:
+    return Console(file=io.StringIO())
+
+
+@pytest.fixture(scope="module")
+def scored(tmp_path_factory):
+    root = lay_out(tmp_path_factory.mktemp("pictures"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scored_pictures, "score", few)
+        text = run(root, baseline="coarse")
+    return root, text
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(scored_pictures, "score", few)
+
+
+@pytest.fixture
+def pictures(scored, tmp_path):
+    """A copy of the scored folders, to be spoilt."""
+    shutil.copytree(scored[0], tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+def test_the_report_says_where_the_geometry_came_from_and_ranks(scored):
+    _, text = scored
+    assert "The geometry comes from the images and not from fiducials" in text
+    assert "One shared alignment for 4 captures in one pose" in text
+    assert "A second aligner" in text
+    assert "None: every planned cell has a score." in text
+    for section in ("## Alignment", "### The floor", "## Paired tests", "## Sensitivity to blur"):
+        assert section in text
+    assert "the wrong target" in text
+
+
+def test_the_report_has_no_word_of_displays_that_were_not_there(scored):
+    for word in ("simulated", "panel", "profile", "Seconds", "Holograms of a circle grid", "yaml", "phase pattern"):
+        assert word not in scored[1]
+
+
+def test_scores_of_stored_values_are_never_called_linear(scored):
+    columns = (scored[0] / "out" / "table.csv").read_text().splitlines()[0]
+    assert "psnr_stored" in columns
+    assert "linear" not in columns
+    assert "linear light [dB]" not in scored[1]
+
+
+def test_the_cleaner_pictures_score_higher(scored):
+    table = pd.read_csv(scored[0] / "out" / "table.csv", index_col="method")
+    assert table.loc["clean", "psnr_stored"] > table.loc["coarse", "psnr_stored"] + 1
+    assert table.loc["clean", "n"] == 2
+
+
+def test_every_alignment_has_a_picture_in_the_report(scored):
+    root, text = scored
+    for method in SPECKLE:
+        for name in ("astronaut", "coffee"):
+            file = root / "out" / "figures" / f"alignment-{method}-{name}.jpg"
+            assert f"figures/{file.name}" in text
+            assert cv2.imread(str(file)) is not None
+
+
+def test_a_second_run_computes_nothing_and_says_the_same(scored, monkeypatch):
+    root, text = scored
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("computed again")
+
+    for name in ("align", "score", "second_warp"):
+        monkeypatch.setattr(scored_pictures, name, never)
+    before = (root / "out" / "records.csv").read_bytes()
+    assert run(root, baseline="coarse") == text
+    assert (root / "out" / "records.csv").read_bytes() == before
+
+
+def test_an_interrupted_run_goes_on(pictures, monkeypatch, quick):
+    kept = records(pictures)
+    kept[0].unlink()
+    monkeypatch.setattr(scored_pictures, "align", None)
+    assert "None: every planned cell has a score." in run(pictures, baseline="coarse")
+    assert kept[0].is_file()
+
+
+def test_a_changed_capture_is_scored_anew(pictures, quick):
+    path = pictures / "captures" / "coarse" / "coffee.png"
+    before = pd.read_csv(pictures / "out" / "records.csv").set_index(["method", "target"])["psnr_stored"]
+    Image.open(path).convert("L").convert("RGB").save(path)
+    run(pictures)
+    after = pd.read_csv(pictures / "out" / "records.csv").set_index(["method", "target"])["psnr_stored"]
+    assert after["coarse", "coffee"] != before["coarse", "coffee"]
+    assert after["clean", "astronaut"] == pytest.approx(before["clean", "astronaut"], abs=0.5)
+
+
+def test_a_capture_of_another_picture_and_a_lacking_one_are_holes(pictures, quick):
+    captures = pictures / "captures"
+    shutil.copy(captures / "clean" / "coffee.png", captures / "coarse" / "astronaut.png")
+    (captures / "clean" / "astronaut.png").unlink()
+    text = run(pictures)
+    assert "the target is not found in the capture" in text
+    assert "no capture of 'astronaut' in the folder of clean" in text
+    assert "Refused, and without a score: 1 capture." in text
+    assert "is the same picture as" in text
+    cells = pd.read_csv(pictures / "out" / "records.csv")
+    holes = cells[cells["state"] != "done"]
+    assert sorted(holes["state"]) == ["failed", "missing"]
+    assert holes["psnr_stored"].isna().all()
+
+
+def test_gray_and_colour_do_not_mix_and_gray_alone_is_scored(pictures, quick):
+    for path in [*(pictures / "captures" / "clean").iterdir(), pictures / "targets" / "astronaut.png"]:
+        Image.open(path).convert("L").save(path)
+    text = run(pictures)
+    assert "the capture is gray and the target in colour" in text
+    assert "match factor" in text
+    states = pd.read_csv(pictures / "out" / "records.csv").set_index(["method", "target"])["state"]
+    assert states["clean", "astronaut"] == "done"
+
+
+@pytest.mark.parametrize(("values", "key"), [("srgb", "psnr_linear"), ("linear", "psnr_amplitude")])
+def test_values_may_be_light_as_well(pictures, quick, values, key):
+    shutil.rmtree(pictures / "captures" / "coarse")
+    text = run(pictures, values=values)
+    assert key in (pictures / "out" / "table.csv").read_text()
+    assert "values as stored" not in text
+    assert "None: every planned cell has a score." in text
+
+
+def test_a_capture_that_gives_no_alignment_may_use_the_shared_one(pictures, quick):
+    for path in (pictures / "out" / "records").glob("alignment-*.json"):
+        plain = json.loads(path.read_text())
+        if "homography" in plain:
+            path.write_text(json.dumps({"refused": "not found"}))
+            break
+    assert "One shared alignment for 4 captures" in run(pictures)
+
+
+def test_two_aligners_that_differ_are_told(pictures, monkeypatch, quick):
+    def elsewhere(_frame, _reference, first):
+        shift = np.array([[1, 0, 3.0], [0, 1, 0], [0, 0, 1]])
+        return Alignment.from_dict(
+            {"shape": first.shape, "homography": first.homography @ shift, "correlation": 1}
+        ).warp
+
+    shutil.rmtree(pictures / "out")
+    monkeypatch.setattr(scored_pictures, "second_warp", elsewhere)
+    assert "Warning: a second aligner" in run(pictures)
+
+
+def spoil_alpha(path: Path) -> None:
+    Image.open(path).convert("RGBA").save(path)
+
+
+def spoil_frames(path: Path) -> None:
+    Image.open(path).save(path, save_all=True, append_images=[Image.new("RGB", (64, 64))])
+
+
+def spoil_end(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:3000])
+
+
+def spoil_size(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[16:24] = (20_000).to_bytes(4, "big") * 2
+    content[29:33] = zlib.crc32(content[12:29]).to_bytes(4, "big")
+    path.write_bytes(bytes(content))
+
+
+def spoil_link(path: Path) -> None:
+    outside = path.parents[3] / "outside.png"
+    path.rename(outside)
+    path.symlink_to(outside)
+
+
+def spoil_twin(path: Path) -> None:
+    Image.open(path).save(path.with_suffix(".tif"))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "line"),
+    [
+        (spoil_alpha, "an image with alpha"),
+        (spoil_frames, "frames or pages"),
+        (spoil_end, "truncated or damaged"),
+        (spoil_size, "million"),
+        (spoil_link, "leads out of the folder"),
+        (spoil_twin, "another picture named 'coffee'"),
+        (lambda path: path.write_bytes(b""), "not an image"),
+        (lambda path: path.rename(path.with_name("coffe.png")), "did you mean 'coffee'"),
+        (lambda path: Image.new("RGB", (8, 8)).save(path), "8 x 8 pixels"),
+        (lambda path: shutil.rmtree(path.parent), "no folders in it"),
+        (lambda path: path.rename(path.parents[1] / "loose.png"), "outside a method's folder"),
+        (lambda path: shutil.rmtree(path.parents[2] / "targets"), "no such folder"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, spoil, line):
+    small = photograph("coffee", (48, 64))
+    path = tmp_path / "bench" / "captures" / "m" / "coffee.png"
+    save(path, small)
+    save(tmp_path / "bench" / "targets" / "coffee.png", small)
+    spoil(path)
+    with pytest.raises(UserError, match=line) as error:
+        read_folders(tmp_path / "bench" / "captures", tmp_path / "bench" / "targets")
+    assert "\n" not in str(error.value)
+    assert "expected" in str(error.value) or "allowed" in str(error.value) or ";" in str(error.value)
+
+
+def test_what_is_suspicious_is_noted(tmp_path):
+    small = photograph("coffee", (48, 64))
+    for place in ("captures/a/coffee.png", "captures/b/coffee.jpg", "targets/coffee.png", "targets/unseen.png"):
+        save(tmp_path / place, small if "unseen" not in place else small[:, ::-1])
+    notes = " ".join(read_folders(tmp_path / "captures", tmp_path / "targets").notes)
+    assert "not linear in light: coffee.jpg" in notes
+    assert "a/coffee is a target itself" in notes
+    assert "Without any capture: unseen" in notes
+
+
+def test_sixteen_bits_are_read_over_their_own_full_scale(tmp_path):
+    levels = (np.arange(48 * 64).reshape(48, 64) * 20).astype(np.uint16)
+    for place in ("captures/a/ramp.tif", "targets/ramp.png"):
+        (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(str(tmp_path / place), levels)
+    picture = read_folders(tmp_path / "captures", tmp_path / "targets").captures["a", "ramp"]
+    assert picture.load() == pytest.approx(levels[None] / 65535, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({"values": "gamma"}, "allowed: linear, srgb, stored"),
+        ({"baseline": "cleen"}, "did you mean 'clean'"),
+    ],
+)
+def test_wrong_choices_are_named(scored, options, line):
+    with pytest.raises(UserError, match=line):
+        run(scored[0], **options)
+
+
+def test_an_output_among_the_captures_is_refused(scored):
+    root = scored[0]
+    with pytest.raises(UserError, match="would mix with"):
+        score_folders(root / "captures", root / "targets", root / "captures" / "out", console=quiet())
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="the real captures are not here")
+def test_three_published_captures_keep_their_order_and_their_scores(tmp_path, monkeypatch):
+    def fast(*pictures, **options):
+        return score(*pictures, **{"metrics": ("psnr",), **options, "refine": False, "blur": ()})
+
+    monkeypatch.setattr(scored_pictures, "score", fast)
+    for name in PUBLISHED:
+        (tmp_path / "captures" / name).mkdir(parents=True)
+        shutil.copy(REAL / f"{name}.png", tmp_path / "captures" / name / "target.png")
+    (tmp_path / "targets").mkdir()
+    shutil.copy(REAL / "target.png", tmp_path / "targets" / "target.png")
+    text = run(tmp_path, baseline="sgd-asm")
+    assert "One shared alignment for 3 captures" in text
+    assert "agrees within 0.2 dB on 3 captures" in text
+    found = pd.read_csv(tmp_path / "out" / "table.csv", index_col="method")["psnr_stored"][list(PUBLISHED)].to_dict()
+    assert found == pytest.approx(PUBLISHED, abs=0.3)
+    assert sorted(found, key=found.__getitem__) == list(PUBLISHED)
+    for path in records(tmp_path):
+        geometry = json.loads(path.read_text())["cell"]["geometry"]
+        if geometry["kind"] == "shared":
+            warp = Alignment.from_dict(geometry).warp
+            crop = 1.2 * (np.array([[0, 0], [799, 0], [0, 799], [799, 799]]) + 0.5) - 0.5 + [360, 0]
+            assert np.linalg.norm(warp.corners() - crop, axis=1).max() < 0.5

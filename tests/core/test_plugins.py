@@ -1,0 +1,63 @@
+"""Methods from files."""
+
+import gc
+import os
+import sys
+import weakref
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.core import plugins
+
+METHOD = """
+import dataclasses
+
+asked = []
+
+@dataclasses.dataclass
+class Mine:
+    number: int = {number}
+
+    def solve(self, target, bench):
+        asked.append(target)
+        return len(asked)
+"""
+
+
+def test_what_a_file_remembers_does_not_reach_the_next_cell(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(METHOD.format(number=1))
+    assert [plugins.build("methods", "mine.py:Mine", {}, tmp_path).solve(None, None) for _ in range(3)] == [1, 1, 1]
+
+
+def test_a_file_that_was_edited_is_imported_again(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(METHOD.format(number=1))
+    assert plugins.build("methods", "mine.py:Mine", {}, tmp_path).number == 1
+    (tmp_path / "mine.py").write_text(METHOD.format(number=22))
+    assert plugins.build("methods", "mine.py:Mine", {}, tmp_path).number == 22
+
+
+def test_equal_files_in_two_folders_are_two_modules(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine.py").write_text(METHOD.format(number=1))
+    first, second = (plugins.find("methods", "mine.py:Mine", tmp_path / name) for name in ("a", "b"))
+    assert first is not second
+
+
+def test_classes_of_files_are_not_kept(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(METHOD.format(number=1))
+    built = [weakref.ref(type(plugins.build("methods", "mine.py:Mine", {}, tmp_path))) for _ in range(4)]
+    gc.collect()
+    assert [one() is None for one in built[:-1]] == [True] * 3  # the last is that of the module in use
+
+
+def test_a_file_is_never_run_from_bytecode_of_an_earlier_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    file = tmp_path / "mine.py"
+    for number in (1, 2):  # equal size and equal time, which is all that bytecode is checked by
+        file.write_text(METHOD.format(number=number))
+        os.utime(file, (1e9, 1e9))
+        assert plugins.build("methods", "mine.py:Mine", {}, tmp_path).number == number

@@ -1,0 +1,87 @@
+"""What every registered dataset must do."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import UserError
+
+SHAPES = [(48, 64), (64, 48), (40, 40)]
+
+
+@pytest.fixture(params=["photographs", "dead_leaves", "charts", "folder", "focal_stacks"])
+def dataset(request, tmp_path) -> Any:
+    params: dict[str, Any] = {}
+    if request.param == "folder":
+        draw = np.random.default_rng(0)
+        for name in ("b.png", "a.png"):
+            Image.fromarray(draw.integers(0, 256, (30, 50, 3), dtype=np.uint8)).save(tmp_path / name)
+        params = {"path": str(tmp_path)}
+    return plugins.build("datasets", request.param, params)
+
+
+def test_every_dataset_is_registered():
+    assert {"photographs", "dead_leaves", "charts", "folder", "focal_stacks"} <= set(plugins.names("datasets"))
+
+
+def test_items_are_unique_and_in_a_fixed_order(dataset):
+    items = dataset.items()
+    assert items
+    assert len(set(items)) == len(items)
+    assert items == dataset.items()
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("channels", [3, 1])
+def test_a_target_is_float32_of_the_shape_asked_for_in_0_to_1(dataset, shape, channels):
+    for item in dataset.items()[:3]:
+        target = dataset.load(item, shape, channels=channels)
+        assert target.shape == (channels, *shape)
+        assert target.dtype == torch.float32
+        assert 0.0 <= float(target.min()) < float(target.max()) <= 1.0
+
+
+def test_loading_twice_gives_the_same_numbers_in_memory_of_its_own(dataset):
+    item = dataset.items()[0]
+    first = dataset.load(item, (40, 56))
+    second = dataset.load(item, (40, 56))
+    assert torch.equal(first, second)
+    first.zero_()
+    assert torch.equal(second, dataset.load(item, (40, 56)))
+
+
+def test_one_channel_is_the_luminance_of_three(dataset):
+    item = dataset.items()[0]
+    colour = dataset.load(item, (40, 56))
+    weighted = 0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2]
+    assert torch.allclose(dataset.load(item, (40, 56), channels=1)[0], weighted, atol=1e-6)
+
+
+def test_two_channels_are_refused(dataset):
+    with pytest.raises(UserError, match="3 channels"):
+        dataset.load(dataset.items()[0], (40, 56), channels=2)
+
+
+def test_digests_are_sha256_and_tell_the_items_apart(dataset):
+    digests = [dataset.digest(item) for item in dataset.items()]
+    assert all(len(digest) == 64 and set(digest) <= set("0123456789abcdef") for digest in digests)
+    assert len(set(digests)) == len(digests)
+    assert digests == [dataset.digest(item) for item in dataset.items()]
+
+
+def test_an_unknown_item_is_one_line(dataset):
+    for act in (lambda: dataset.load("nothing", (40, 40)), lambda: dataset.digest("nothing")):
+        with pytest.raises(UserError) as caught:
+            act()
+        assert "nothing" in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_only_generated_images_are_for_training():
+    training = {name: plugins.find("datasets", name).training for name in plugins.names("datasets")}
+    assert training["dead_leaves"]
+    assert not any(training[name] for name in ("photographs", "charts", "folder", "focal_stacks"))

@@ -1,0 +1,171 @@
+"""Image files: what is taken, and that everything else is refused in one line."""
+
+import io
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from PIL import Image, ImageCms, ImageOps
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.datasets import images
+from holobench_eval.datasets.images import decode, read
+from holobench_eval.optics import srgb_decode
+
+PIXELS = np.random.default_rng(5).integers(0, 256, (12, 20, 3), dtype=np.uint8)
+DEEP = np.random.default_rng(6).integers(0, 65536, (12, 20, 3), dtype=np.uint16)
+
+
+def encoded(image: Image.Image, kind: str = "PNG", **options: object) -> bytes:
+    file = io.BytesIO()
+    image.save(file, kind, **options)
+    return file.getvalue()
+
+
+def deep(pixels: np.ndarray, suffix: str = ".png") -> bytes:
+    return cv2.imencode(suffix, pixels[..., ::-1] if pixels.ndim == 3 else pixels)[1].tobytes()
+
+
+def linear(pixels: np.ndarray) -> torch.Tensor:
+    return srgb_decode(torch.from_numpy(pixels.astype(np.float64)) / np.iinfo(pixels.dtype).max).float()
+
+
+def refusal(content: bytes, **options) -> str:
+    with pytest.raises(UserError) as caught:
+        decode(content, "folder/x.png", **options)
+    line = str(caught.value)
+    assert line.startswith("folder/x.png: ")
+    assert "expected" in line
+    assert "\n" not in line
+    return line
+
+
+RGB = Image.fromarray(PIXELS)
+
+
+@pytest.mark.parametrize("kind", ["PNG", "TIFF", "BMP"])
+def test_eight_bit_rgb_is_decoded_to_linear_light(kind):
+    found = decode(encoded(RGB, kind), "x")
+    assert torch.allclose(found, linear(PIXELS).permute(2, 0, 1), atol=1e-6)
+
+
+@pytest.mark.parametrize(("kind", "options"), [("JPEG", {"quality": 95}), ("WEBP", {"lossless": True})])
+def test_other_formats_are_read(kind, options):
+    assert decode(encoded(RGB, kind, **options), "x").shape == (3, 12, 20)
+
+
+KINDS = {
+    "one channel": (encoded(RGB.convert("L")), "one-channel"),
+    "alpha": (encoded(RGB.convert("RGBA")), "alpha"),
+    "gray with alpha": (encoded(RGB.convert("LA")), "alpha"),
+    "palette": (encoded(RGB.convert("P")), "palette"),
+    "one bit": (encoded(RGB.convert("1")), "1-bit"),
+    "CMYK": (encoded(RGB.convert("CMYK"), "JPEG"), "CMYK"),
+    "CIELAB": (encoded(RGB.convert("LAB"), "TIFF"), "CIELAB"),
+    "floating point": (encoded(RGB.convert("F"), "TIFF"), "floating-point"),
+    "transparent colour": (encoded(RGB, transparency=(0, 0, 0)), "transparent colour"),
+    "16-bit": (deep(DEEP), "16-bit"),
+    "16-bit TIFF": (deep(DEEP, ".tiff"), "16-bit"),
+    "two frames": (encoded(RGB, save_all=True, append_images=[ImageOps.mirror(RGB)]), "2 frames"),
+    "two pages": (encoded(RGB, "TIFF", save_all=True, append_images=[RGB]), "2 frames or pages"),
+    "GIF": (encoded(RGB.convert("P"), "GIF"), "palette"),
+    "text": (b"not an image at all", "not an image"),
+    "nothing": (b"", "not an image"),
+    "PostScript": (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n", "not an image"),
+}
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_every_other_kind_is_refused_by_its_name(kind):
+    content, word = KINDS[kind]
+    assert word in refusal(content)
+
+
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "TIFF", "BMP", "WEBP"])
+@pytest.mark.parametrize("kept", [0.05, 0.5, 0.9])
+def test_a_truncated_file_is_refused(kind, kept):
+    smooth = Image.fromarray(np.random.default_rng(1).integers(0, 256, (80, 80, 3), dtype=np.uint8))
+    content = encoded(smooth, kind)
+    refusal(content[: int(len(content) * kept)])
+
+
+def test_a_truncated_16_bit_file_is_refused():
+    content = deep(np.random.default_rng(1).integers(0, 65536, (80, 80, 3), dtype=np.uint16))
+    assert "truncated" in refusal(content[: len(content) // 2], sixteen_bit="srgb")
+
+
+def chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
+@pytest.mark.parametrize("size", [(9000, 9000), (12000, 12000), (60000, 60000)])
+def test_a_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(size, monkeypatch):
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None if size == (60000, 60000) else Image.MAX_IMAGE_PIXELS)
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", *size, 8, 2, 0, 0, 0))
+    content = b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+    assert "million" in refusal(content)
+
+
+def test_gray_is_replicated_when_it_is_asked_for():
+    gray = PIXELS[..., 0]
+    found = decode(encoded(Image.fromarray(gray)), "x", gray=True)
+    assert torch.allclose(found, linear(gray).expand(3, -1, -1), atol=1e-6)
+    assert "alpha" in refusal(encoded(RGB.convert("LA")), gray=True)
+    assert "1-bit" in refusal(encoded(RGB.convert("1")), gray=True)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tiff"])
+def test_16_bit_levels_keep_their_precision_as_srgb_or_as_linear_light(suffix):
+    content = deep(DEEP, suffix)
+    as_srgb, as_linear = decode(content, "x", sixteen_bit="srgb"), decode(content, "x", sixteen_bit="linear")
+    assert torch.allclose(as_srgb, linear(DEEP).permute(2, 0, 1), atol=1e-6)
+    assert torch.allclose(as_linear, torch.from_numpy(DEEP / 65535).float().permute(2, 0, 1), atol=1e-7)
+
+
+def test_16_bit_gray_needs_both_choices():
+    content = deep(DEEP[..., 0])
+    assert "one-channel" in refusal(content, sixteen_bit="linear")
+    assert "16-bit" in refusal(content, gray=True)
+    found = decode(content, "x", gray=True, sixteen_bit="linear")
+    assert torch.allclose(found, torch.from_numpy(DEEP[..., 0] / 65535).float().expand(3, -1, -1), atol=1e-7)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("kind", ["PNG", "TIFF", "JPEG"])
+def test_the_exif_orientation_is_applied(orientation, kind):
+    exif = Image.Exif()
+    exif[274] = orientation
+    content = encoded(RGB, kind, exif=exif)
+    upright = ImageOps.exif_transpose(Image.open(io.BytesIO(content)))
+    assert upright.size == ((20, 12) if orientation < 5 else (12, 20))
+    wanted = linear(np.asarray(upright)).permute(2, 0, 1)
+    assert torch.allclose(decode(content, "x"), wanted, atol=1e-6)
+
+
+def test_a_16_bit_image_that_is_not_stored_upright_is_refused():
+    exif = Image.Exif()
+    exif[274] = 6
+    turned = encoded(Image.fromarray(DEEP[..., 0]), "TIFF", exif=exif)
+    assert "stored upright" in refusal(turned, gray=True, sixteen_bit="srgb")
+
+
+def test_an_srgb_profile_is_taken_and_another_is_refused():
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    assert decode(encoded(RGB, icc_profile=srgb), "x").shape == (3, 12, 20)
+    lab = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
+    assert "ICC colour profile is 'Lab" in refusal(encoded(RGB, icc_profile=lab))
+    assert "cannot be read" in refusal(encoded(RGB, icc_profile=b"no profile"))
+
+
+def test_reading_refuses_what_is_no_file(tmp_path, monkeypatch):
+    with pytest.raises(UserError, match="no such file"):
+        read(tmp_path / "missing.png")
+    with pytest.raises(UserError, match="not a regular file"):
+        read(tmp_path)
+    monkeypatch.setattr(images, "LARGEST_BYTES", 10)
+    (tmp_path / "large.png").write_bytes(bytes(11))
+    with pytest.raises(UserError, match="larger than"):
+        read(tmp_path / "large.png")

@@ -1,0 +1,85 @@
+"""The photographs inside scikit-image."""
+
+import hashlib
+import importlib.resources
+
+import numpy as np
+import pytest
+import skimage
+import torch
+
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import UserError
+from holobench_eval.datasets import photographs
+from holobench_eval.datasets.photographs import FILES, Photographs
+from holobench_eval.optics import srgb_decode
+
+
+def test_the_default_is_six_in_colour_then_two_in_gray():
+    wanted = ["astronaut", "coffee", "chelsea", "rocket", "hubble_deep_field", "retina", "camera", "brick"]
+    assert Photographs().items() == wanted
+
+
+def test_all_are_the_eight_and_three_more():
+    assert Photographs(count=None).items() == [*Photographs().items(), "grass", "gravel", "text"]
+
+
+def test_count_takes_the_first_and_names_keep_their_order():
+    assert Photographs(count=2).items() == ["astronaut", "coffee"]
+    assert Photographs(names=("text", "astronaut")).items() == ["text", "astronaut"]
+
+
+@pytest.mark.parametrize("name", ["coffee", "camera"])
+def test_pixels_are_those_of_skimage_in_linear_light(name):
+    pixels = getattr(skimage.data, name)()
+    linear = srgb_decode(torch.from_numpy(pixels / 255.0)).float()
+    wanted = linear.permute(2, 0, 1) if linear.ndim == 3 else linear.expand(3, *linear.shape)
+    assert torch.allclose(Photographs().load(name, pixels.shape[:2]), wanted, atol=1e-6)
+
+
+def test_gray_photographs_have_three_equal_channels():
+    for name in ("camera", "brick", "grass", "gravel", "text"):
+        target = Photographs(count=None).load(name, (40, 60))
+        assert torch.equal(target[0], target[1])
+        assert torch.equal(target[0], target[2])
+
+
+def test_the_digest_is_that_of_the_file_in_the_package():
+    file = importlib.resources.files("skimage").joinpath("data", "astronaut.png")
+    assert Photographs().digest("astronaut") == hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def test_every_file_ships_with_scikit_image_and_nothing_asks_for_a_download(monkeypatch):
+    def refuse(*names: object) -> None:
+        raise AssertionError(f"asked scikit-image to fetch {names}")
+
+    monkeypatch.setattr("skimage.data._fetchers._fetch", refuse)
+    photographs._decoded.cache_clear()
+    photographs._content_digest.cache_clear()
+    dataset = Photographs(count=None)
+    assert len({dataset.digest(item) for item in dataset.items()}) == len(FILES)
+    assert np.isfinite(dataset.load("grass", (16, 16)).numpy()).all()
+
+
+def test_a_file_missing_from_scikit_image_is_one_line(monkeypatch):
+    monkeypatch.setitem(FILES, "brick", "no-such-file.png")
+    photographs._content_digest.cache_clear()
+    with pytest.raises(UserError, match="'brick' is not in the installed scikit-image"):
+        Photographs().digest("brick")
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"names": ["astronut"]}, "unknown photograph 'astronut'; did you mean 'astronaut'"),
+        ({"names": []}, "the list of photographs is empty"),
+        ({"names": ["brick", "brick"]}, "'brick' is given twice"),
+        ({"count": 0}, "'count'"),
+        ({"count": 12}, "'count'"),
+    ],
+)
+def test_wrong_parameters_are_one_line(params, message):
+    with pytest.raises(UserError) as caught:
+        plugins.build("datasets", "photographs", params)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

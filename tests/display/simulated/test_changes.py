@@ -1,0 +1,258 @@
+"""Changes of a bench at test time: each changes the stages that it names, by as much as it says, and no other."""
+
+import itertools
+from dataclasses import fields, replace
+
+import pytest
+import torch
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.core.plugins import build
+from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display.simulated.changes import KINDS, altered, checked
+from holobench_eval.display.simulated.changes.camera import SENSORS
+from holobench_eval.display.simulated.changes.vision import EYEPIECE, Prescription
+from holobench_eval.methods.wirtinger import Wirtinger
+from holobench_eval.metrics import score
+
+PANEL = (128, 128)
+EXAMPLES = {
+    "camera_shift_x": 30.0,
+    "camera_shift_y": -20.0,
+    "drift": 60.0,
+    "sensor": "fujifilm-s5-pro",
+    "distance": 0.5,
+    "wavelength": 1.0,
+    "defocus": 0.2,
+    "laser_power": 0.5,
+    "temperature": 20.0,
+    "obstruction": 0.3,
+    "bits": 4.0,
+    "sibling": "3",
+    "ambient": 0.05,
+    "refocus": 2.0,
+    "other_plane": 2.0,
+    "eye": "-2 / -1 x 30",
+    "corrected_eye": "-2 / -1 x 30",
+    "known_eye": "-2 / -1 x 30",
+    "draw": "1",
+}
+
+
+def picture(shape):
+    dataset = build("datasets", "photographs", {"count": 2}, None)
+    return dataset.load(dataset.items()[1], shape, channels=3)
+
+
+def changed_fields(before, after):
+    return {item.name for item in fields(before) if getattr(before, item.name) != getattr(after, item.name)}
+
+
+def test_every_kind_has_an_example_here():
+    assert set(EXAMPLES) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ["leto-aged", "ideal"])
+def test_a_condition_changes_the_stages_that_it_names_and_no_other(name, kind):
+    profile = load_profile(name)
+    found = changed_fields(profile, altered(profile, kind, EXAMPLES[kind]))
+    assert found <= set(KINDS[kind].stages)
+    if name == "leto-aged":
+        assert found
+        assert found == set(KINDS[kind].stages) or kind == "draw"
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind].numeric])
+def test_the_nominal_value_changes_nothing(kind):
+    profile = load_profile("leto-aged")
+    assert altered(profile, kind, KINDS[kind].nominal) is profile
+    applied = KINDS[kind].apply(profile, KINDS[kind].nominal)
+    assert changed_fields(profile, applied) <= {"propagation", "panel"}
+    assert open_bench(applied, PANEL).bench.spec == open_bench(profile, PANEL).bench.spec
+
+
+@pytest.mark.parametrize("kind", ["drift", "camera_shift_x", "laser_power", "refocus"])
+def test_the_bench_of_a_nominal_value_gives_the_same_capture(kind):
+    profile = load_profile("leto-aged")
+    phase = torch.rand(3, *PANEL, generator=torch.Generator().manual_seed(0)) * 6
+    captures = [
+        open_bench(one, PANEL).bench.session("a", exposure=(1e3,) * 3).capture(phase).frame
+        for one in (profile, KINDS[kind].apply(profile, KINDS[kind].nominal))
+    ]
+    assert torch.equal(*captures)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [
+        ("drift", -1), ("drift", "a year"), ("drift", True), ("camera_shift_x", 41), ("bits", 0), ("temprature", 1),
+    ],
+)  # fmt: skip
+def test_a_value_out_of_range_is_refused(kind, value):
+    with pytest.raises(UserError):
+        checked(kind, value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"), [("sensor", "canon"), ("eye", "two"), ("eye", "-30"), ("sibling", "twin"), ("bits", 2.5)]
+)
+def test_a_name_that_means_nothing_is_refused(kind, value):
+    with pytest.raises(UserError):
+        altered(load_profile("leto-aged"), kind, checked(kind, value))
+
+
+def test_a_value_has_one_form_however_it_is_written():
+    assert checked("sibling", 3) == checked("sibling", 3.0) == checked("sibling", "3") == "3"
+    assert checked("eye", "-2/-1x30") == checked("eye", "-2 / -1 x 30") == "-2 / -1 x 30"
+    assert checked("eye", -2) == checked("known_eye", "-2.0") == "-2"
+    for wrong in (0, "0", "01", 1.5, "1_0", -1):
+        with pytest.raises(UserError):
+            checked("sibling", wrong)
+
+
+def test_a_change_adds_to_what_the_profile_has():
+    profile = load_profile("leto-aged")
+    aged = replace(profile, drift=replace(profile.drift, days=30.0))
+    assert altered(aged, "drift", 10.0).drift.days == 40
+    moved = altered(profile, "camera_shift_x", 20.0)
+    assert altered(moved, "camera_shift_x", 20.0).propagation.pupil_shift[1] == pytest.approx(0.25)
+
+
+def test_bits_of_a_panel_with_a_table_of_levels_are_fixed():
+    with pytest.raises(UserError, match="smooth look-up table"):
+        altered(load_profile("plm-4bit"), "bits", 3.0)
+
+
+def test_the_drift_of_a_day_does_not_depend_on_how_far_the_path_is_followed():
+    geometry = open_bench(load_profile("leto-aged"), PANEL).bench.channels[1].geometry
+    drift = load_profile("leto-aged").drift
+
+    def steps(days):
+        places = [replace(drift, days=day).laser_power(geometry) for day in days]
+        return dict(zip(days, places, strict=True))
+
+    weekly, monthly, once = steps(range(0, 91, 7)), steps(range(0, 91, 30)), steps([90, 63, 30, 7, 0])
+    assert weekly[63] == once[63]
+    assert weekly[7] == once[7]
+    assert monthly[90] == once[90]
+    assert monthly[30] == once[30]
+    assert once[0] == 1
+
+
+def test_dust_settles_speck_by_speck_and_stays():
+    profile = load_profile("leto-aged")
+    geometry = open_bench(profile, PANEL).bench.channels[1].geometry
+    drifts = [replace(profile.drift, days=days) for days in (0, 30, 60, 365)]
+    shades = [drift.dust(geometry, profile.coherent_noise) for drift in drifts]
+    assert torch.equal(shades[0], torch.ones(PANEL, dtype=torch.float64))
+    for earlier, later in itertools.pairwise(shades):
+        assert (later <= earlier).all()
+        assert (later < earlier).any()
+    clean = replace(profile.coherent_noise, specks=0)
+    assert torch.equal(drifts[-1].dust(geometry, clean), torch.ones(PANEL, dtype=torch.float64))
+
+
+def test_a_warm_panel_has_less_stroke_by_the_law_of_its_birefringence():
+    gains = [altered(load_profile("ideal"), "temperature", kelvin).lut.gain[1] for kelvin in (-20.0, 10.0, 40.0)]
+    assert gains[0] > 1 > gains[1] > gains[2]
+    assert gains[1] == pytest.approx(0.967, abs=2e-3)
+
+
+def test_twice_the_power_gives_twice_the_light_and_ambient_light_an_offset():
+    profile = replace(load_profile("ideal"), relay=load_profile("ideal").relay)
+    phase = torch.zeros(3, *PANEL)
+
+    def light(one):
+        session = open_bench(one, PANEL).bench.session("a", exposure=(1e3,) * 3)
+        return session.capture(phase).linear()
+
+    plain, bright = light(profile), light(altered(profile, "laser_power", 2.0))
+    assert torch.allclose(bright, 2 * plain, rtol=1e-4, atol=1e-6)
+    sensor = profile.sensor
+    added = light(altered(profile, "ambient", 0.1)) - plain
+    assert torch.allclose(added, torch.full_like(added, 0.1 * sensor.full_well / sensor.headroom / 1e3), rtol=1e-3)
+
+
+def test_an_obstructed_pupil_loses_low_frequencies_and_a_shifted_one_is_no_longer_even():
+    profile = load_profile("ideal")
+    bench = open_bench(profile, PANEL).bench
+    blocked = open_bench(altered(profile, "obstruction", 0.3), PANEL).bench
+    moved = open_bench(altered(profile, "camera_shift_x", 40.0), PANEL).bench
+    transfer, less, other = (one.channels[1].path.transfer.abs() for one in (bench, blocked, moved))
+    assert transfer[0, 0] == pytest.approx(1)
+    assert less[0, 0] == pytest.approx(0, abs=1e-6)
+    assert less.max() == pytest.approx(1)
+    middle = transfer.shape[1] // 2
+    assert torch.allclose(transfer[0, 1:middle], transfer[0, -middle + 1 :].flip(0)[: middle - 1])
+    assert other[0, 1:middle].sum() > 1.2 * other[0, -middle + 1 :].sum()
+
+
+def test_prescriptions_are_read_as_they_are_written():
+    assert Prescription.read("-2") == Prescription(-2)
+    assert Prescription.read("+1.5 / -0.75 x 90") == Prescription(1.5, -0.75, 90)
+    assert Prescription.read("-2/-1x30") == Prescription(-2, -1, 30)
+    for wrong in ("", "2 D", "-2 / -1", "-2 / -1 x 200", "nan", "-20"):
+        with pytest.raises(UserError):
+            Prescription.read(wrong)
+
+
+def test_a_short_sighted_eye_sees_a_plane_further_from_the_panel_and_a_cylinder_one_meridian_of_it():
+    rows, columns, cross = Prescription(-2).shift()
+    assert rows == columns == pytest.approx(2 * EYEPIECE**2)
+    assert cross == 0
+    rows, columns, cross = Prescription(0, -1, 0).shift()  # power across a horizontal axis: vertical
+    assert (rows, columns, cross) == pytest.approx((EYEPIECE**2, 0, 0))
+    rows, columns, cross = Prescription(0, -1, 90).shift()
+    assert (rows, columns, cross) == pytest.approx((0, EYEPIECE**2, 0), abs=1e-12)
+    rows, columns, cross = Prescription(-1, 0.5, 30).shift()
+    plus = Prescription(-0.5, -0.5, 120).shift()  # the same glasses in the other notation
+    assert (rows, columns, cross) == pytest.approx(plus)
+
+
+def test_an_eye_that_needs_glasses_loses_the_picture_and_gets_it_back_from_the_hologram():
+    """Two samples a pixel, so that a picture between the pixels is seen as it is."""
+    profile, eye = replace(load_profile("ideal"), sampling=2), "-2 / 1 x 30"
+    nominal, target = open_bench(profile, PANEL), picture((104, 104))
+
+    def seen(kind, own):
+        bench = open_bench(altered(profile, kind, eye), PANEL, 0, None if KINDS[kind].moves else nominal)
+        method = Wirtinger(iterations=40)
+        solver = bench if own else nominal
+        phase = method.solve(target[None], solver.for_method(method, "w", target, "x", 0))[0]
+        return score(bench.photograph(phase, target, "x", 0).image, target)["psnr_linear"]
+
+    method = Wirtinger(iterations=40)
+    phase = method.solve(target[None], nominal.for_method(method, "w", target, "x", 0))[0]
+    before = score(nominal.photograph(phase, target, "x", 0).image, target)["psnr_linear"]
+    lost = before - seen("eye", own=False)
+    assert lost > 8
+    assert before - seen("corrected_eye", own=False) < 0.1 * lost
+    assert before - seen("known_eye", own=True) < 0.1 * lost
+
+
+@pytest.mark.parametrize("millimetres", [-2.0, 2.0])
+def test_a_lens_moves_the_image_without_loss_where_the_camera_follows(millimetres):
+    profile = replace(load_profile("ideal"), sampling=2)
+    nominal, target, method = open_bench(profile, PANEL), picture((104, 104)), Wirtinger(iterations=40)
+    phase = method.solve(target[None], nominal.for_method(method, "w", target, "x", 0))[0]
+
+    def psnr(bench):
+        return score(bench.photograph(phase, target, "x", 0).image, target)["psnr_linear"]
+
+    moved = open_bench(altered(profile, "refocus", millimetres), PANEL)
+    left = open_bench(altered(profile, "other_plane", millimetres), PANEL, 0, nominal)
+    assert abs(psnr(moved) - psnr(nominal)) < 1
+    assert psnr(left) < psnr(nominal) - 3
+
+
+def test_the_cameras_of_the_paper_have_their_published_pitch():
+    assert SENSORS["canon-t6i"].pitch == 3.72e-6
+    assert SENSORS["fujifilm-s5-pro"].pitch == pytest.approx(23e-3 / 4256, rel=2e-3)
+
+
+def test_an_unmoved_camera_keeps_its_registration():
+    profile = load_profile("ideal")
+    nominal = open_bench(profile, PANEL)
+    blurred = open_bench(altered(profile, "defocus", 0.5), PANEL, 0, nominal)
+    assert blurred.registration is nominal.registration

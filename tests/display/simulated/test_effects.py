@@ -1,0 +1,51 @@
+"""What a profile has is listed, and the display model's form names only effects that exist."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from holobench_eval.commands.listing import effects as listed
+from holobench_eval.display import load_profile
+from holobench_eval.display.simulated.effects import effects
+from holobench_eval.display.simulated.profile import names
+from holobench_eval.display.simulated.stages import Flicker, LookUpTable
+from holobench_eval.methods.display_model import FORM
+
+
+def found(name: str) -> set[str]:
+    return {one.name for one in effects(load_profile(name))}
+
+
+def test_an_ideal_display_has_its_levels_alone() -> None:
+    assert found("ideal") == {"quantisation"}
+
+
+def test_an_effect_is_listed_when_it_is_switched_on() -> None:
+    ideal = load_profile("ideal")
+    flickering = {one.name: one.text for one in effects(replace(ideal, flicker=Flicker(0.02)))}
+    assert flickering.keys() - {"quantisation"} == {"flicker"}
+    assert "2 %" in flickering["flicker"]
+    bent = replace(ideal, lut=LookUpTable(gamma=(1.0, 1.2, 1.0)))
+    assert "1/1.2/1" in next(one.text for one in effects(bent) if one.name == "look_up_table")
+
+
+def test_a_form_names_only_effects_that_some_display_has_or_may_have() -> None:
+    everywhere = set().union(*map(found, names()))
+    assert FORM - everywhere <= {"drift", "astigmatism_45", "coma_y", "spherical"}
+
+
+@pytest.mark.parametrize("name", names())
+def test_no_effect_is_listed_twice(name: str) -> None:
+    told = [one.name for one in effects(load_profile(name))]
+    assert len(told) == len(set(told))
+
+
+def test_the_form_of_the_model_is_wrong_for_the_paper_like_display_and_more_so_for_the_dusty_one() -> None:
+    for name in ("leto-aged", "leto-dusty"):
+        lacking = {effect for effect, _, modelled in listed(name) if not modelled}
+        assert {"sub_pixel_field", "pixel_aperture", "flicker", "plane_dust", "roughness", "noise"} <= lacking
+        assert {"look_up_table", "crosstalk", "zero_order", "defocus", "coma_x"}.isdisjoint(lacking)
+    assert "trefoil_y" in {effect for effect, _, modelled in listed("leto-dusty") if not modelled}
+    assert "blaze" in {effect for effect, _, modelled in listed("pluto-offaxis") if not modelled}

@@ -1,0 +1,154 @@
+"""The stages together: a bench that is the nominal model when nothing is wrong, and repeatable when much is."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.profile import names
+from holobench_eval.display.simulated.stages import (
+    CoherentNoise,
+    Crosstalk,
+    Drift,
+    PixelAperture,
+    Propagation,
+    Sensor,
+    ZeroOrder,
+)
+from holobench_eval.optics import quantise
+
+PANEL = (96, 128)
+
+
+def field_of(spec, phase, channel=1):
+    return spec.propagator(channel).forward(torch.polar(torch.ones(spec.shape), quantise(phase, spec.bits)))
+
+
+def test_ideal_bench_is_the_nominal_model(ideal, phase):
+    bench = SimulatedBench(ideal)
+    right = field_of(bench.spec, phase[1]).abs().square()
+    found = bench.intensity(phase[1], 1)
+    assert float((found - right).norm() / right.norm()) < 2e-3
+
+
+def test_finer_sampling_changes_nothing_without_sub_pixel_effects(with_stage, phase):
+    coarse = SimulatedBench(with_stage(sampling=1)).intensity(phase[1], 1)
+    fine = SimulatedBench(with_stage(sampling=3)).intensity(phase[1], 1)[::2, ::2]
+    assert float((fine - coarse).norm() / coarse.norm()) < 0.08  # nine points a pixel instead of one
+
+
+def test_full_pixels_roll_off_like_a_sinc(with_stage):
+    """A grating near the band's edge loses the light that a square pixel's diffraction takes."""
+    columns = torch.arange(PANEL[1], dtype=torch.float32)
+    grating = (2 * torch.pi * 0.3 * columns).expand(3, *PANEL)
+    ideal = SimulatedBench(with_stage()).intensity(grating[1], 1)
+    held = SimulatedBench(with_stage(sampling=1, aperture=PixelAperture())).intensity(grating[1], 1)
+    share = float(held.sum() / ideal.sum())
+    assert share == pytest.approx(float(torch.sinc(torch.tensor(0.3)) ** 2), rel=0.02)
+
+
+def test_blazed_light_is_that_of_a_square_pixel_at_its_angle(with_stage):
+    """A flat phase with a blaze leaves at the carrier, where a full pixel sends sinc^2 of its light."""
+    flat = torch.zeros(PANEL)
+    panel = replace(with_stage().panel, blaze=(0.0, 0.25), pupil=0.4)
+    straight = SimulatedBench(with_stage(panel=replace(panel, blaze=(0.0, 0.0)))).intensity(flat, 1).mean()
+    for sampling in (1, 3, 5):
+        bench = SimulatedBench(with_stage(panel=panel, sampling=sampling, aperture=PixelAperture()))
+        share = float(bench.intensity(flat, 1).mean() / straight)
+        assert share == pytest.approx(float(torch.sinc(torch.tensor(0.25)) ** 2), rel=0.02)
+
+
+def test_unmodulated_light_is_there_under_any_phase(with_stage, phase):
+    bench = SimulatedBench(with_stage(zero_order=ZeroOrder(0.999)))
+    assert float(bench.intensity(phase[1], 1).mean()) == pytest.approx(1, abs=0.1)
+
+
+def test_iris_stops_the_zero_order_off_axis():
+    profile = load_profile("pluto-offaxis").scaled(PANEL)
+    flat = torch.zeros(3, *PANEL)
+    with_iris = SimulatedBench(profile)
+    only_zero = replace(profile, zero_order=ZeroOrder(0.999))
+    assert float(SimulatedBench(only_zero).intensity(flat[1], 1).mean()) < 0.01
+    assert float(with_iris.intensity(flat[1], 1).mean()) > 0.2
+
+
+def test_blaze_leaves_the_image_where_it_was(with_stage, phase):
+    straight = SimulatedBench(with_stage(panel=replace(load_profile("ideal").scaled(PANEL).panel, pupil=0.4)))
+    panel = replace(straight.profile.panel, blaze=(0.0, 0.25))
+    blazed = SimulatedBench(replace(straight.profile, panel=panel))
+    a, b = (bench.intensity(phase[1] / 8, 1) for bench in (straight, blazed))
+    assert float((a - b).norm() / a.norm()) < 0.02
+
+
+def test_light_is_not_made(phase):
+    for name in names():
+        profile = load_profile(name).scaled(PANEL)
+        image = SimulatedBench(profile).image(phase)
+        assert float(image.mean()) < 1.02
+
+
+def test_dust_plane_without_dust_is_no_plane(with_stage, phase):
+    way = Propagation(distance_error=0.01)
+    clean = SimulatedBench(with_stage(propagation=way)).intensity(phase[1], 1)
+    speckless = CoherentNoise(plane_specks=1, speck_radius=1e-9)
+    dusty = SimulatedBench(with_stage(propagation=way, coherent_noise=speckless)).intensity(phase[1], 1)
+    assert float((clean - dusty).norm() / clean.norm()) < 0.05
+
+
+def test_defocus_of_the_bench_is_that_of_the_nominal_model(with_stage, phase):
+    bench = SimulatedBench(with_stage(propagation=Propagation(distance_error=0.1)))
+    moved = replace(bench.spec, distance=bench.spec.distance * 1.1)
+    right = field_of(moved, phase[1]).abs().square()
+    assert float((bench.intensity(phase[1], 1) - right).norm() / right.norm()) < 1e-2
+
+
+def test_image_gradient_points_downhill(with_stage, phase):
+    bench = SimulatedBench(with_stage(sampling=3, crosstalk=Crosstalk(0.4), aperture=PixelAperture(0.93, 0.5)))
+    moving = phase.clone().requires_grad_()
+    wanted = torch.ones(PANEL) * 0.5
+    loss = (bench.image(moving)[1] - wanted).square().mean()
+    (slope,) = torch.autograd.grad(loss, moving)
+    with torch.no_grad():
+        better = (bench.image(phase - 40 * slope)[1] - wanted).square().mean()
+    assert float(better) < float(loss.detach())
+
+
+def test_noise_depends_on_names_and_frame_not_on_what_is_shown(phase):
+    bench = SimulatedBench(load_profile("leto-aged").scaled(PANEL))
+    exposure = (2000.0, 2000.0, 2000.0)
+
+    def frames(*names):
+        session = bench.session(*names, exposure=exposure)
+        return [session.capture(phase).frame for _ in range(2)]
+
+    first, again, other = frames("a", 0), frames("a", 0), frames("a", 1)
+    assert torch.equal(first[0], again[0])
+    assert torch.equal(first[1], again[1])
+    assert not torch.equal(first[0], first[1])
+    assert not torch.equal(first[0], other[0])
+
+
+@pytest.mark.parametrize("noise", [True, False])
+def test_a_capture_carries_no_gradient(with_stage, phase, noise):
+    bench = SimulatedBench(with_stage(sensor=Sensor(noise=noise)))
+    shown = phase.clone().requires_grad_()
+    capture = bench.session("names", exposure=(100.0,) * 3).capture(shown)
+    assert not capture.frame.requires_grad
+    assert bench.image(shown).requires_grad  # what the oracle alone may differentiate
+
+
+def test_days_change_the_bench_and_zero_days_do_not(phase):
+    profile = load_profile("leto-aged").scaled(PANEL)
+    today = SimulatedBench(profile).intensity(phase[1], 1)
+    still = SimulatedBench(replace(profile, drift=replace(profile.drift, days=0.0))).intensity(phase[1], 1)
+    later = SimulatedBench(replace(profile, drift=Drift(days=90, gain=0.01, tilt=0.05))).intensity(phase[1], 1)
+    assert torch.equal(today, still)
+    assert not torch.allclose(today, later, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_profile_registers_its_camera_within_its_bound(name):
+    workbench = open_bench(load_profile(name), (192, 192))
+    assert max(workbench.registration.residual) <= workbench.bench.profile.residual_bound

@@ -1,0 +1,78 @@
+from importlib.resources import files
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.display import load_profile
+from holobench_eval.display.simulated.profile import names
+from holobench_eval.optics.padding import spread
+
+PROFILES = files("holobench_eval.display.simulated") / "profiles"
+
+
+def test_the_promised_profiles_are_there():
+    assert {"ideal", "leto-mild", "leto-aged", "plm-4bit", "pluto-offaxis"} <= set(names())
+
+
+@given(rows=st.integers(64, 2000), columns=st.integers(64, 2000), name=st.sampled_from(names()))
+def test_scaling_keeps_pitch_and_relative_spread(rows, columns, name):
+    full, small = load_profile(name).spec(), load_profile(name).spec((rows, columns))
+    assert small.pitch == full.pitch
+    relative = [spread(s.pitch, s.wavelengths[0], s.distance) / s.shape[0] for s in (full, small)]
+    assert relative[0] == pytest.approx(relative[1])
+    assert small.region.height <= rows
+    assert small.region.top * 2 + small.region.height in (rows, rows - 1)
+
+
+def test_scaling_is_said():
+    assert "full panel" in load_profile("ideal").scaling_note(None)
+    assert "the distance goes from 100 to 23.7 mm" in load_profile("ideal").scaling_note((256, 256))
+
+
+def test_digest_follows_the_file(tmp_path):
+    text = (PROFILES / "ideal.yaml").read_text()
+    (tmp_path / "mine.yaml").write_text(text)
+    assert load_profile("mine.yaml", tmp_path).digest == load_profile("ideal").digest
+    (tmp_path / "mine.yaml").write_text(text + "# changed\n")
+    assert load_profile("mine.yaml", tmp_path).digest != load_profile("ideal").digest
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("bits: 8", "bits: many"), r"mine.yaml:\d+:\d+: panel.bits should be a whole number"),
+        (("bits: 8", "bits: 99"), r"mine.yaml:\d+:\d+: panel.bits"),
+        (("sensor:", "sensro:"), r"mine.yaml:\d+:1: unknown key 'sensro'.*did you mean 'sensor'"),
+        (("pitch: 6.4e-6", "pitch: -1"), r"mine.yaml:\d+:\d+: panel.pitch"),
+        (("version: 1\n", ""), "missing key 'version'"),
+    ],
+)
+def test_a_fault_in_a_profile_is_one_line_with_its_place(tmp_path, change, message):
+    text = (PROFILES / "ideal.yaml").read_text()
+    assert change[0] in text
+    (tmp_path / "mine.yaml").write_text(text.replace(*change))
+    with pytest.raises(UserError, match=message) as caught:
+        load_profile("mine.yaml", tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_profile_suggests_the_nearest():
+    with pytest.raises(UserError, match="did you mean 'leto-aged'"):
+        load_profile("leto-agde")
+    with pytest.raises(UserError, match="no such file"):
+        load_profile("none.yaml")
+
+
+@pytest.mark.parametrize("shape", [(10, 10), (64, 100000)])
+def test_panel_that_cannot_be_is_refused(shape):
+    with pytest.raises(UserError, match="64 to 8192"):
+        load_profile("ideal").spec(shape)
+
+
+def test_table_must_have_an_entry_for_every_level(tmp_path):
+    text = (PROFILES / "plm-4bit.yaml").read_text()
+    (tmp_path / "mine.yaml").write_text(text.replace("bits: 4", "bits: 5"))
+    with pytest.raises(UserError, match="16 entries; a panel of 5 bits has 32"):
+        load_profile("mine.yaml", tmp_path)

@@ -1,0 +1,233 @@
+"""Every stage alone: what it does to the light, in numbers that can be checked by hand."""
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holobench_eval.display.simulated.stages import (
+    CoherentNoise,
+    Crosstalk,
+    Drift,
+    Flicker,
+    Illumination,
+    LookUpTable,
+    PixelAperture,
+    Propagation,
+    Relay,
+    Sensor,
+    ZeroOrder,
+)
+from holobench_eval.display.simulated.stages.crosstalk import sample_positions
+from holobench_eval.display.simulated.stages.quantise import straight_through_level
+from holobench_eval.display.simulated.stages.relay import box_filter, sample, sampling_grid
+
+TAU = 2 * math.pi
+
+
+def test_level_is_whole_and_its_gradient_is_that_of_the_phase():
+    phase = torch.tensor([0.1, 3.0, 6.2], requires_grad=True)
+    level = straight_through_level(phase, 8)
+    level.sum().backward()
+    assert torch.equal(level.detach(), level.detach().round())
+    assert torch.allclose(phase.grad, torch.full((3,), 256 / TAU))
+
+
+def test_linear_table_gives_the_nominal_phase(geometry):
+    table = LookUpTable()
+    level = torch.arange(256.0).view(1, -1)
+    assert torch.allclose(table.phase(level, 8, torch.ones(1), 0), level / 256 * TAU, atol=1e-4)
+    assert torch.allclose(table.gain_map(geometry), torch.ones(geometry.shape))
+
+
+def test_gamma_and_gain_bend_and_shorten_the_stroke():
+    curve = LookUpTable(gamma=(1.2, 1.2, 1.2), gain=(0.9, 0.9, 0.9)).curve(8, 0)
+    assert float(curve[128]) == pytest.approx(0.9 * TAU * 0.5**1.2, rel=1e-5)
+    assert float(curve[255]) < 0.9 * TAU
+
+
+def test_published_table_gives_its_percentages():
+    percent = (0.0, 10.0, 40.0, 100.0)
+    curve = LookUpTable(table=percent).curve(2, 0)
+    assert torch.allclose(curve, torch.tensor(percent) / 100 * TAU * 3 / 4)
+
+
+def test_table_of_the_wrong_length_is_refused():
+    with pytest.raises(ValueError, match="entries"):
+        LookUpTable(table=(0.0, 100.0)).curve(4, 0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0, 1), st.integers(1, 5))
+def test_crosstalk_keeps_a_constant_phase(width, samples):
+    stage = Crosstalk(width)
+    phase = torch.full((12, 16), 2.5)
+    assert torch.allclose(stage.apply(phase, stage.weights(samples)), torch.full((samples**2, 12, 16), 2.5), atol=1e-5)
+
+
+def test_crosstalk_turns_a_wrap_edge_into_a_ramp():
+    phase = torch.zeros(9, 16)
+    phase[:, 8:] = TAU
+    stage = Crosstalk(0.45)
+    row = stage.apply(phase, stage.weights(3)).reshape(3, 3, 9, 16)[1, :, 4].T.reshape(-1)
+    assert torch.all(row.diff() >= -1e-6)
+    inside = (row > 0.05 * TAU) & (row < 0.95 * TAU)
+    assert 3 <= int(inside.sum()) <= 6
+
+
+def test_no_crosstalk_keeps_pixels_apart():
+    stage = Crosstalk(0.0)
+    phase = torch.rand(8, 8)
+    assert torch.allclose(stage.apply(phase, stage.weights(3)), phase.expand(9, 8, 8), atol=1e-6)
+
+
+@given(st.floats(0.1, 1.0), st.integers(1, 7))
+def test_active_shares_add_up_to_the_fill_factor(fill, samples):
+    assert float(PixelAperture(fill).active_share(samples).mean()) == pytest.approx(fill, abs=1e-5)
+
+
+def test_dead_area_reflects_without_modulation():
+    aperture = PixelAperture(fill=0.5, dead_amplitude=0.4)
+    assert float(aperture.active_share(1)) == pytest.approx(0.5)
+    assert float(aperture.dead_share(1)) == pytest.approx(0.5 * 0.4)
+
+
+def test_samples_sit_symmetrically_in_their_pixel():
+    assert sample_positions(1) == [0.0]
+    assert sample_positions(3) == pytest.approx([-1 / 3, 0, 1 / 3])
+
+
+def test_flicker_has_its_rms():
+    draw = torch.Generator().manual_seed(0)
+    gains = torch.tensor([Flicker(0.05).gain(draw) for _ in range(2000)])
+    assert float(gains.std()) == pytest.approx(0.05, rel=0.1)
+    assert Flicker().gain(draw) == 1.0
+
+
+def test_illumination_has_unit_mean_power_and_the_stated_phase(geometry):
+    light = Illumination(beam_sigma=0.8, fringes=0.08, phase_rms=0.25).field(geometry)
+    assert float(light.abs().square().mean()) == pytest.approx(1, rel=1e-4)
+    assert float(light.angle().square().mean().sqrt()) == pytest.approx(0.25, rel=1e-3)
+    assert torch.allclose(Illumination().field(geometry), torch.ones(geometry.shape, dtype=torch.complex64))
+
+
+def test_fringes_modulate_by_what_they_say(geometry):
+    amplitude = Illumination(fringes=0.08).field(geometry).abs()
+    assert 0.10 < float(amplitude.max() - amplitude.min()) <= 0.17
+
+
+def test_dirt_only_absorbs(geometry):
+    dirty = CoherentNoise(specks=20, scratches=2, plane_specks=5)
+    panel, plane = dirty.panel(geometry).abs(), dirty.plane(geometry).abs()
+    for transmission in (panel, plane):
+        assert 0 <= float(transmission.min()) < 0.7
+        assert float(transmission.max()) <= 1 + 1e-6
+        assert float((transmission < 0.99).float().mean()) < 0.2
+    assert CoherentNoise().plane(geometry) is None
+
+
+def test_roughness_has_its_rms(geometry):
+    rough = CoherentNoise(roughness=0.1).panel(geometry).angle()
+    assert float(rough.square().mean().sqrt()) == pytest.approx(0.1, rel=0.01)
+
+
+def test_random_patterns_depend_on_the_bench_alone(geometry):
+    first, again = (CoherentNoise(specks=9).panel(geometry) for _ in range(2))
+    other = CoherentNoise(specks=9).panel(replace(geometry, seed=("test", 1)))
+    assert torch.equal(first, again)
+    assert not torch.equal(first, other)
+
+
+def test_aberration_has_its_rms_over_the_iris(geometry):
+    stage = Propagation(aberration={"astigmatism_0": 0.1})
+    f = torch.linspace(-0.4, 0.4, 301, dtype=torch.float64) / geometry.pitch
+    fy, fx = f[:, None], f[None, :]
+    inside = fy**2 + fx**2 <= (0.4 / geometry.pitch) ** 2
+    waves = stage.pupil_phase(fy, fx, geometry, 0.8)[inside] / TAU
+    assert float(waves.square().mean().sqrt()) == pytest.approx(0.1, rel=0.02)
+
+
+def test_two_legs_of_the_way_are_the_way(geometry):
+    stage = Propagation(distance_error=0.01, aberration={"coma_x": 0.05})
+    whole = stage.transfer(geometry, (128, 160), 0.8, (0.0, 1.0))
+    legs = stage.transfer(geometry, (128, 160), 0.8, (0.0, 0.7)) * stage.transfer(geometry, (128, 160), 0.8, (0.7, 1.0))
+    assert torch.allclose(whole, legs, atol=1e-4)
+
+
+def test_zero_order_splits_the_power():
+    stage = ZeroOrder(0.2, 0.3)
+    assert stage.modulated**2 + abs(stage.unmodulated) ** 2 == pytest.approx(1)
+
+
+def test_straight_relay_samples_the_panel_at_its_pixels():
+    points = Relay().panel_points((64, 96), 6.4e-6, 3.2e-6)
+    step = points[1, 0] - points[0, 0]
+    assert torch.allclose(step, torch.tensor([0.5, 0.0], dtype=torch.float64))
+    assert torch.allclose(points.mean((0, 1)), torch.tensor([31.5, 47.5], dtype=torch.float64), atol=1e-9)
+
+
+def test_relay_turns_by_its_angle():
+    points = Relay(rotation=90).panel_points((64, 64), 6.4e-6, 6.4e-6)
+    along = points[10, 40] - points[10, 39]
+    assert torch.allclose(along, torch.tensor([-1.0, 0.0], dtype=torch.float64), atol=1e-9)
+
+
+def test_sampling_is_exact_on_a_plane_and_dark_outside():
+    rows = torch.arange(20.0)[:, None].expand(20, 30)
+    points = torch.tensor([[[3.25, 4.5], [-5.0, 2.0]]], dtype=torch.float64)
+    grid = sampling_grid(points, (20, 30))
+    assert torch.allclose(sample(rows, grid, 1), torch.tensor([[3.25, 0.0]]), atol=1e-4)
+    finer = (torch.arange(40.0) / 2)[:, None].expand(40, 60)
+    assert torch.allclose(sample(finer, grid, 2), torch.tensor([[3.25, 0.0]]), atol=1e-4)
+
+
+@given(st.floats(0.3, 5))
+def test_pixel_area_keeps_a_constant_and_has_its_width(width):
+    flat = torch.ones(1, 24, 24)
+    assert torch.allclose(box_filter(flat, width), flat, atol=1e-5)
+    point = torch.zeros(1, 25, 25)
+    point[0, 12, 12] = 1
+    assert float(box_filter(point, width).sum()) == pytest.approx(1, abs=1e-5)
+
+
+def test_counts_of_an_ideal_camera_are_the_light(geometry):
+    sensor = Sensor(noise=False, dark=100)
+    light = torch.rand(8, 8)
+    counts = sensor.expose(light, 1000.0, torch.ones(8, 8), torch.Generator())
+    assert torch.allclose((counts - 100) / (1000 * sensor.counts_per_electron), light, atol=1e-4)
+
+
+def test_shot_and_read_noise_have_their_variance():
+    sensor = Sensor(full_well=30000, read_noise=10, bits=16, dark=500)
+    counts = sensor.expose(torch.ones(300, 300), 5000.0, torch.ones(300, 300), torch.Generator().manual_seed(0))
+    electrons = (counts - 500) / sensor.counts_per_electron
+    assert float(electrons.mean()) == pytest.approx(5000, rel=1e-3)
+    assert float(electrons.var()) == pytest.approx(5000 + 100, rel=0.03)
+
+
+def test_bright_light_saturates_at_the_white_level():
+    sensor = Sensor(bits=12)
+    counts = sensor.expose(torch.full((4, 4), 9.0), sensor.full_well, torch.ones(4, 4), torch.Generator())
+    assert torch.all(counts == 4095)
+
+
+def test_vignetting_darkens_the_corner(geometry):
+    response = Sensor(vignetting=0.2).response((50, 50), geometry)
+    assert float(response[0, 0]) == pytest.approx(0.8, rel=1e-3)
+    assert float(response[25, 25]) == pytest.approx(1, rel=1e-2)
+
+
+def test_drift_takes_one_path_however_far_it_is_asked_for(geometry):
+    at = {days: Drift(days=days, gain=0.01).phase_gain(geometry) for days in (0, 30, 90, 90.5, 91)}
+    assert at[0] == 1.0
+    middle = math.log(at[90.5])
+    assert middle == pytest.approx((math.log(at[90]) + math.log(at[91])) / 2)
+    assert at[30] != at[90]
+
+
+def test_drift_grows_as_a_random_walk(geometry):
+    far = [Drift(days=90).walk(replace(geometry, seed=("walk", n)), "power") for n in range(300)]
+    assert torch.tensor(far).std().item() == pytest.approx(math.sqrt(90), rel=0.15)

@@ -1,0 +1,115 @@
+import pytest
+import torch
+
+from holobench_eval.core.errors import BudgetError, CellError
+from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display.calibrated import MeteredBench, concentration
+from holobench_eval.testing.propagation_conformance import gaussian_beam
+
+PANEL = (192, 192)
+
+
+class Camera:
+    camera = True
+
+
+class Privileged:
+    privileged = True
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return open_bench(load_profile("ideal"), PANEL, seed=3)
+
+
+@pytest.fixture
+def target(bench):
+    return gaussian_beam(bench.spec.region.shape, 300e-6).abs().float().expand(3, -1, -1)
+
+
+def test_method_without_camera_may_not_capture(bench, target):
+    handle = bench.for_method(object(), "blind", target, "t", 0)
+    with pytest.raises(CellError, match="blind took a capture"):
+        handle.capture(torch.zeros(3, *PANEL))
+    assert handle.captures == 0
+
+
+def test_captures_are_counted_and_stop_at_the_budget(bench, target):
+    handle = bench.for_method(Camera(), "camera", target, "t", 0, budget=2)
+    image = handle.rectify(handle.capture(torch.zeros(3, *PANEL)))
+    assert image.shape == target.shape
+    handle.capture(torch.zeros(3, *PANEL))
+    with pytest.raises(BudgetError, match="used its 2 captures"):
+        handle.capture(torch.zeros(3, *PANEL))
+    assert handle.captures == 2
+
+
+def test_only_privileged_methods_see_the_simulation(bench, target):
+    assert bench.for_method(Privileged(), "oracle", target, "t", 0).simulation.bench is bench.bench
+    with pytest.raises(CellError, match="privileged"):
+        _ = bench.for_method(Camera(), "camera", target, "t", 0).simulation
+
+
+@pytest.mark.parametrize(
+    ("phase", "message"),
+    [
+        (torch.full((3, *PANEL), float("nan")), "mine: phase holds 110592 values that are NaN"),
+        (torch.zeros(3, 10, 10), r"mine: phase is \(3, 10, 10\)"),
+        (torch.zeros(3, *PANEL, dtype=torch.complex64), "mine: phase is torch.complex64"),
+    ],
+)
+def test_phase_that_no_display_can_show_is_refused_by_name(bench, target, phase, message):
+    with pytest.raises(CellError, match=message):
+        bench.photograph(phase, target, "t", 0, label="mine")
+
+
+def test_method_cannot_reach_the_scored_target_or_its_own_account(bench, target):
+    handle = bench.for_method(Camera(), "m", target, "t", 0)
+    handle._target.zero_()
+    assert float(target.max()) > 0.5
+    for name in ("captures", "spec", "simulation"):
+        with pytest.raises(AttributeError):
+            setattr(handle, name, 0)
+
+
+def test_random_numbers_depend_on_target_repeat_and_name(bench, target):
+    def draw(item, repeat, name):
+        return torch.rand(3, generator=bench.for_method(object(), "m", target, item, repeat).generator(name)).tolist()
+
+    assert draw("a", 0, "x") == draw("a", 0, "x")
+    assert len({tuple(draw(*names)) for names in (("a", 0, "x"), ("b", 0, "x"), ("a", 1, "x"), ("a", 0, "y"))}) == 4
+
+
+def test_efficiency_counts_the_light_in_the_region(bench, target):
+    """A flat phase sends the light straight through: the region gets its share of the panel."""
+    shot = bench.photograph(torch.zeros(3, *PANEL), target, "t", 0)
+    region = bench.spec.region
+    assert shot.efficiency == pytest.approx(region.height * region.width / (PANEL[0] * PANEL[1]), rel=0.05)
+    assert shot.saturated == 0
+
+
+def test_exposure_is_equal_for_all_methods_unless_brightness_is_matched(bench, target):
+    first = bench.photograph(torch.zeros(3, *PANEL), target, "t", 0)
+    bright = bench.photograph(torch.zeros(3, *PANEL), target, "t", 0, exposure="matched")
+    assert first.exposure == bench.exposure(target)
+    assert bright.exposure != first.exposure
+    assert torch.allclose(bright.image, first.image, atol=0.05)
+
+
+def test_dark_targets_have_a_finite_exposure(bench):
+    assert torch.isfinite(concentration(torch.zeros(3, 8, 8), bench.spec)).all()
+
+
+def test_handle_is_what_the_methods_expect(bench, target):
+    handle = bench.for_method(object(), "m", target, "t", 0)
+    assert isinstance(handle, MeteredBench)
+    assert handle.spec is bench.spec
+
+
+def test_simulation_is_the_noise_free_capture_in_the_target_frame(target):
+    aged = open_bench(load_profile("leto-aged"), PANEL)
+    flat = torch.zeros(3, *PANEL)
+    light = concentration(target, aged.spec)[:, None, None]
+    simulated = aged.simulation.image(flat) / light
+    captured = aged.photograph(flat, target, "t", 0).image
+    assert float((simulated - captured).norm() / captured.norm()) < 0.1

@@ -1,0 +1,167 @@
+import pytest
+import torch
+
+from holobench_eval.core.errors import BudgetError, CellError
+from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display.training import TrainingBench, TrainingImage
+
+PANEL = (128, 128)
+
+
+class DictMemory:
+    """Values and log in the process."""
+
+    def __init__(self):
+        self.values, self.rows = {}, []
+
+    def load(self, name):
+        return self.values.get(name)
+
+    def save(self, name, value):
+        self.values[name] = value
+
+    def log(self, row):
+        self.rows.append(dict(row))
+
+
+@pytest.fixture(scope="module")
+def workbench():
+    return open_bench(load_profile("leto-mild"), PANEL, seed=3)
+
+
+@pytest.fixture(scope="module")
+def images(workbench):
+    draw = torch.Generator().manual_seed(1)
+    shape = (3, *workbench.spec.region.shape)
+    return [TrainingImage(f"image {i}", torch.rand(shape, generator=draw)) for i in range(3)]
+
+
+@pytest.fixture
+def memory():
+    return DictMemory()
+
+
+@pytest.fixture
+def begin(workbench, images, memory):
+    """A training, or the same one going on after a kill: the memory is all that stays."""
+    return lambda budget=None, seed=3: TrainingBench(workbench, "mine", images[:2], images[2:], memory, budget, seed)
+
+
+PHASE = 6 * torch.rand(3, *PANEL, generator=torch.Generator().manual_seed(2))
+
+
+def test_a_capture_is_the_images_frame_and_as_bright_as_a_scored_one(begin, workbench, images):
+    bench = begin()
+    capture = bench.photograph(PHASE, images[0], 0)
+    scored = workbench.photograph(PHASE, images[0].target, "image 0", 0).image
+    assert capture.shape == images[0].target.shape
+    assert float((capture - scored).norm() / scored.norm()) < 0.1
+    assert bench.spec is workbench.spec
+    assert [image.item for image in (*bench.images, *bench.held_out)] == ["image 0", "image 1", "image 2"]
+    assert bench.light(images[0]).shape == (3,)
+
+
+def test_noise_depends_on_seed_image_and_names_and_on_nothing_else(begin, images):
+    bench = begin()
+    first = bench.photograph(PHASE, images[0], "round", 0)
+    bench.photograph(PHASE, images[1], "round", 0)
+    assert torch.equal(bench.photograph(PHASE, images[0], "round", 0), first)
+    assert torch.equal(begin().photograph(PHASE, images[0], "round", 0), first)
+    assert not torch.equal(bench.photograph(PHASE, images[0], "round", 1), first)
+    assert not torch.equal(begin(seed=4).photograph(PHASE, images[0], "round", 0), first)
+
+
+def test_training_noise_is_not_the_noise_of_the_score(begin, workbench, images):
+    scored = workbench.photograph(PHASE, images[0].target, "image 0", 0).image
+    assert not torch.equal(begin().photograph(PHASE, images[0], 0, "score"), scored)
+
+
+def test_random_numbers_depend_on_seed_and_names(begin):
+    def draw(seed, name):
+        return float(torch.rand(1, generator=begin(seed=seed).generator(name)))
+
+    assert draw(3, "a") == draw(3, "a")
+    assert len({draw(3, "a"), draw(3, "b"), draw(4, "a")}) == 3
+
+
+def test_captures_are_counted_and_stop_at_the_budget(begin, images):
+    bench = begin(budget=2)
+    for number in range(2):
+        bench.photograph(PHASE, images[number], number)
+    with pytest.raises(BudgetError, match="mine has used its 2 captures for training"):
+        bench.photograph(PHASE, images[2], "held out")
+    assert bench.captures == 2
+
+
+def test_a_phase_that_cannot_be_shown_costs_no_capture(begin, images):
+    bench = begin()
+    with pytest.raises(CellError, match="mine: phase"):
+        bench.photograph(PHASE[:, :5], images[0])
+    assert bench.captures == 0
+
+
+def test_a_capture_carries_no_gradient(begin, images):
+    assert not begin().photograph(PHASE.clone().requires_grad_(), images[0]).requires_grad
+
+
+def train(bench, images, rounds, stop_after=None):
+    """Rounds of one capture each; stops as a kill would, in the middle of a round that is not kept."""
+    kept = []
+    for number in range(rounds):
+
+        def make(number=number):
+            capture = bench.photograph(PHASE + number, images[number % 2], number)
+            if stop_after == number:
+                raise KeyboardInterrupt
+            return {"capture": capture}
+
+        kept.append(bench.kept(f"round {number}", make)["capture"])
+    return torch.stack(kept)
+
+
+def test_a_training_that_was_stopped_goes_on_where_it_was_and_counts_every_kept_capture_once(begin, images, memory):
+    with pytest.raises(KeyboardInterrupt):
+        train(begin(budget=4), images, 4, stop_after=2)
+    resumed = begin(budget=4)
+    found = train(resumed, images, 4)
+    assert resumed.captures == 4
+    memory.values.clear()
+    whole = begin(budget=4)
+    assert torch.equal(train(whole, images, 4), found)
+    assert whole.captures == 4
+
+
+def test_values_loaded_in_any_order_do_not_lower_the_count(begin, images):
+    train(begin(), images, 3)
+    resumed = begin()
+    for name in ("round 2", "round 0", "round 1"):
+        assert resumed.load(name) is not None
+    assert resumed.captures == 3
+    assert resumed.load("absent") is None
+
+
+def test_time_before_an_interruption_counts_once(begin, memory):
+    first = begin()
+    first.save("a", {})
+    memory.values["a"]["seconds"] = 100.0
+    memory.values["b"] = {**memory.values["a"], "seconds": 40.0}
+    resumed = begin()
+    for name in ("b", "a", "a"):
+        resumed.load(name)
+    assert 100 <= resumed.seconds < 110
+
+
+def test_a_kept_value_is_made_once_and_a_saved_one_replaced(begin):
+    bench, made = begin(), []
+    for _ in range(2):
+        assert bench.kept("x", lambda: {"n": len(made.append(1) or made)}) == {"n": 1}
+    bench.save("x", {"n": 5})
+    assert begin().load("x") == {"n": 5}
+
+
+def test_a_logged_row_tells_captures_and_time(begin, images, memory):
+    bench = begin()
+    bench.photograph(PHASE, images[0])
+    bench.log(round=1, l1=0.5)
+    (row,) = memory.rows
+    assert row | {"seconds": 0} == {"round": 1, "l1": 0.5, "captures": 1, "seconds": 0}

@@ -1,0 +1,157 @@
+"""A target is found in its capture by the two alone, and in no capture of anything else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from holobench_eval.core.errors import CellError
+from holobench_eval.imaging import align as aligning
+from holobench_eval.imaging.align import Alignment, align, confirmed
+from holobench_eval.imaging.shared_pose import sampled, shared
+from holobench_eval.imaging.warp import Warp
+from tests.support import photographed
+from tests.support.photographed import Array, Picture, captured, corners, mapped, photograph, pose
+
+SHAPE = (200, 250)
+REAL = Path(__file__).resolve().parents[2] / "../shared/captures/stanford-2021"
+
+
+def plane(homography: Array, shape: tuple[int, int] = SHAPE) -> Warp:
+    return Warp(shape, np.asarray(homography, dtype=np.float64), np.zeros((6, 2)))
+
+
+def made(name: str, seed: int, contrast: float, **where: float) -> tuple[Picture, Picture, Array]:
+    draw = np.random.default_rng(seed)
+    target = photograph(name, SHAPE)
+    homography, size = pose(draw, SHAPE, **where)
+    return captured(target, homography, size, draw, contrast=contrast), target, homography
+
+
+@pytest.mark.parametrize(
+    ("name", "contrast", "where"),
+    [
+        ("astronaut", 0.0, {"scale": 0.5, "perspective": 0.08}),
+        ("coffee", 0.5, {"scale": 1.3, "turns": 1, "mirrored": True}),
+        ("astronaut", 0.7, {"scale": 2.5, "turns": 2, "room": 1.6}),
+        ("camera", 0.5, {"scale": 1.1, "turns": 3, "tilt": 8.0}),
+        ("gravel", 0.3, {"scale": 0.9, "mirrored": True}),
+        ("astronaut", 1.0, {"scale": 0.6, "turns": 2, "mirrored": True}),
+    ],
+)
+def test_a_target_is_found_through_turns_mirrors_perspective_and_speckle(name, contrast, where):
+    capture, target, homography = made(name, 5, contrast, **where)
+    found = align(capture, target)
+    off = np.linalg.norm(found.warp.corners() - mapped(homography, corners(SHAPE)), axis=1) / found.warp.scale()
+    assert off.max() < (1.0 if contrast < 1 else 2.0)
+    assert found.correlation > aligning.ALIKE
+
+
+def test_templates_find_what_features_do_not(monkeypatch):
+    monkeypatch.setattr(aligning, "by_features", lambda *_: iter(()))
+    capture, target, homography = made("astronaut", 3, 1.0, scale=0.8, turns=1, mirrored=True)
+    found = align(capture, target)
+    assert np.abs(found.warp.corners() - mapped(homography, corners(SHAPE))).max() < 2 * found.warp.scale()
+
+
+def half_replaced(target: Picture) -> Picture:
+    return np.concatenate([target[..., :125], photograph("coffee", SHAPE)[..., 125:]], axis=2)
+
+
+def shuffled(target: Picture) -> Picture:
+    quarters = target.reshape(3, 2, 100, 2, 125).transpose(1, 3, 0, 2, 4).reshape(4, 3, 100, 125)[[2, 0, 3, 1]]
+    return np.ascontiguousarray(quarters.reshape(2, 2, 3, 100, 125).transpose(2, 0, 3, 1, 4).reshape(3, *SHAPE))
+
+
+@pytest.mark.parametrize("change", [half_replaced, shuffled, lambda t: 1 - t, lambda _: photograph("chelsea", SHAPE)])
+def test_another_or_an_altered_target_is_refused(change):
+    capture, target, _ = made("astronaut", 7, 0.3, scale=1.2)
+    assert align(capture, target).correlation > aligning.ALIKE
+    with pytest.raises(CellError, match="not found in the capture"):
+        align(capture, np.ascontiguousarray(change(target)))
+
+
+STRIPES = np.broadcast_to(0.5 + 0.5 * np.sin(np.arange(250) / 4), (3, *SHAPE)).astype(np.float32)
+DISC = np.broadcast_to(np.hypot(*np.mgrid[-100:100, -125:125]) < 20, (1, *SHAPE)).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("target", "why"),
+    [
+        (np.zeros((3, *SHAPE), np.float32), "structure in 0 of its 9 parts"),
+        (np.full((1, *SHAPE), 0.5, np.float32), "structure in 0 of its 9 parts"),
+        (DISC, "too little to find it by|not found"),
+        (STRIPES, "one direction only"),
+    ],
+)
+def test_a_target_without_enough_structure_is_refused(target, why):
+    capture, _, _ = made("astronaut", 1, 0.3)
+    with pytest.raises(CellError, match=why):
+        align(capture, target)
+
+
+def test_a_target_that_is_cut_off_is_refused():
+    capture, target, homography = made("coffee", 2, 0.2, scale=1.2, tilt=0.0)
+    left = round(float(mapped(homography, corners(SHAPE))[:, 0].min()))
+    with pytest.raises(CellError, match=r"beyond the capture|not found"):
+        align(np.ascontiguousarray(capture[:, :, left + 25 :]), target)
+
+
+def test_a_given_warp_is_confirmed_only_where_it_fits():
+    capture, target, homography = made("astronaut", 4, 0.7, scale=1.2)
+    assert confirmed(capture, target, plane(homography)) is not None
+    assert confirmed(capture, photograph("coffee", SHAPE), plane(homography)) is None
+    moved = np.array([[1, 0, 60], [0, 1, 0], [0, 0, 1.0]])
+    assert confirmed(capture, target, plane(moved @ homography)) is None
+
+
+def test_alignments_that_agree_become_one_and_others_stay_alone():
+    base = np.array([[1.2, 0, 40], [0, 1.2, 30], [0, 0, 1.0]])
+
+    def shifted(by: float, correlation: float) -> Alignment:
+        return Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1]]) @ base), correlation)
+
+    found = {"a": shifted(-0.4, 0.9), "b": shifted(0.4, 0.9), "far": shifted(9.0, 0.99)}
+    common = shared(found)
+    assert common is not None
+    assert common[1] == {"a", "b"}
+    assert np.abs(common[0].corners() - plane(base).corners()).max() < 0.01
+    assert shared({"a": shifted(0, 0.9), "far": shifted(9.0, 0.9)}) is None
+    assert shared({"a": shifted(0, 0.9)}) is None
+
+
+def test_the_better_correlated_alignment_counts_more():
+    better, worse = (
+        Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1.0]])), c) for by, c in ((0.0, 0.99), (0.9, 0.6))
+    )
+    common = shared({"better": better, "worse": worse})
+    assert common is not None
+    assert 0 < common[0].corners()[0, 0] < 0.1
+
+
+def test_a_finer_capture_is_averaged_over_each_target_pixel():
+    fine = np.random.default_rng(0).random((1, 80, 120)).astype(np.float32)
+    twice = np.array([[2, 0, 0.5], [0, 2, 0.5], [0, 0, 1.0]])
+    expected = fine.reshape(1, 40, 2, 60, 2).mean(axis=(2, 4))
+    assert sampled(fine, plane(twice, (40, 60))) == pytest.approx(expected, abs=1e-4)
+    assert sampled(fine, plane(np.eye(3), (80, 120))) == pytest.approx(fine, abs=1e-6)
+
+
+def test_an_alignment_survives_its_plain_form():
+    found = Alignment(plane(np.array([[1.234567890123, 0, 3], [0.1, 1, 2], [1e-5, 0, 1]])), 0.9)
+    again = Alignment.from_dict(found.to_dict())
+    assert (again.warp.homography == found.warp.homography).all()
+    assert (again.warp.shape, again.correlation) == (SHAPE, 0.9)
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="the real captures are not here")
+def test_a_real_capture_shows_no_other_picture():
+    pixels = cv2.imread(str(REAL / "sgd-ours.png"))
+    assert pixels is not None
+    capture = np.ascontiguousarray(pixels[..., ::-1].transpose(2, 0, 1), dtype=np.float32) / 255
+    for name in ("astronaut", "coffee"):
+        with pytest.raises(CellError, match="not found"):
+            align(capture, photographed.photograph(name, (400, 400)))

@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+import torch
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.imaging import fiducial
+
+SHAPES = [(96, 96), (160, 160), (160, 288), (300, 200), (1080, 1920)]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_circles_lie_where_the_centres_say(shape):
+    grid = fiducial(shape)
+    image = grid.image.numpy().astype(np.float64)
+    reach = int(grid.spacing / 2)
+    for x, y in grid.centres[:: max(1, len(grid.centres) // 20)]:
+        row, column = round(y), round(x)
+        patch = image[row - reach : row + reach + 1, column - reach : column + reach + 1]
+        down, across = np.mgrid[row - reach : row + reach + 1, column - reach : column + reach + 1]
+        assert (patch * across).sum() / patch.sum() == pytest.approx(x, abs=0.01)
+        assert (patch * down).sum() / patch.sum() == pytest.approx(y, abs=0.01)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_image_is_linear_light_of_the_region_with_a_dark_border(shape):
+    grid = fiducial(shape)
+    assert grid.image.shape == shape == grid.shape
+    assert grid.image.dtype == torch.float32
+    assert float(grid.image.min()) == 0.0
+    assert float(grid.image.max()) == 1.0
+    border = torch.ones(shape, dtype=torch.bool)
+    border[4:-4, 4:-4] = False
+    assert float(grid.image[border].max()) == 0.0
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_marks_equal_none_of_their_mirrors_and_turns(shape):
+    grid = fiducial(shape)
+    marks = grid.marks.reshape(grid.rows, grid.columns)
+    turned = [np.rot90(each, quarter) for each in (marks, marks[:, ::-1]) for quarter in range(4)]
+    others = [other for other in turned[1:] if other.shape == marks.shape]
+    assert all((other != marks).sum() >= 4 for other in others)
+
+
+def test_number_of_circles_stays_within_what_the_detector_can_order():
+    counts = [len(fiducial(shape).centres) for shape in SHAPES]
+    assert min(counts) >= 16
+    assert max(counts) <= 400
+
+
+def test_a_region_too_small_for_a_grid_is_refused():
+    with pytest.raises(UserError, match="too small"):
+        fiducial((160, 80))

@@ -1,0 +1,140 @@
+"""Devices by the name of their driver: bad names and values are one line, and looking for devices never fails."""
+
+import builtins
+import importlib.metadata
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.drivers import catalogue as drivers
+from holobench_eval.lab.drivers.catalogue import (
+    CAMERA_DRIVERS,
+    SLM_DRIVERS,
+    checked_params,
+    found,
+    open_camera,
+    open_slm,
+)
+
+MONITOR = {"name": "HDMI-1", "resolution": [1920, 1080]}
+
+
+def test_importing_the_drivers_imports_none_of_their_packages() -> None:
+    packages = "{'pyglet', 'slmsuite', 'gphoto2', 'rawpy', 'pymmcore_plus'}"
+    code = f"import sys, holobench_eval.lab.drivers.catalogue; print(sorted({packages} & set(sys.modules)))"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "driver", "params", "message"),
+    [
+        ("slm", "moniter", {}, "unknown slm driver 'moniter'; did you mean 'monitor'. allowed: monitor, slmsuite"),
+        ("camera", "gphoto", {}, "unknown camera driver 'gphoto'; did you mean 'gphoto2'"),
+        (
+            "slm",
+            "monitor",
+            {**MONITOR, "index": 1},
+            "slm driver 'monitor' has no parameter 'index'; allowed: check, name",
+        ),
+        ("slm", "monitor", {"name": "HDMI-1"}, "slm driver 'monitor' needs the parameter 'resolution'"),
+        (
+            "slm",
+            "monitor",
+            {**MONITOR, "resolution": [1920]},
+            "slm driver 'monitor' needs the parameter 'resolution.1'",
+        ),
+        ("slm", "monitor", {**MONITOR, "resolution": [0, 1080]}, "parameter 'resolution.0': .* got 0"),
+        ("slm", "monitor", {**MONITOR, "check": "no"}, "parameter 'check': .* got 'no'"),
+        ("slm", "monitor", {**MONITOR, "name": 1}, "parameter 'name': .*string, got 1"),
+        ("slm", "monitor", {**MONITOR, "name": {1, 2}}, "slm driver 'monitor': .*set"),
+        ("camera", "opencv", {"device": 0, "resolution": [64, 48], "exposures": [1, float("nan")]}, "exposures.1"),
+        ("camera", "opencv", {"device": 0, "resolution": [64, 48], "exposures": [1, 0.1]}, "shortest and the longest"),
+        (
+            "camera",
+            "opencv",
+            {"device": 0, "resolution": [64, 48], "exposures": [0.1, 1], "bits": 12},
+            "GREY has 8 bits",
+        ),
+        ("camera", "micromanager", {"config": ""}, "parameter 'config'"),
+        ("camera", "gphoto2", {"iso": 100}, "parameter 'iso': .*string, got 100"),
+    ],
+)
+def test_a_wrong_bench_file_is_one_line_before_any_device_moves(
+    kind: Any, driver: str, params: dict[str, Any], message: str
+) -> None:
+    for check in (lambda: checked_params(kind, driver, params), lambda: _open(kind, driver, params)):
+        with pytest.raises(UserError, match=message) as caught:
+            check()
+        assert "\n" not in str(caught.value)
+
+
+def _open(kind: str, driver: str, params: dict[str, Any]) -> Any:
+    return open_slm(driver, params) if kind == "slm" else open_camera(driver, params)
+
+
+@pytest.mark.parametrize(
+    ("kind", "driver", "params", "package", "extra"),
+    [
+        ("slm", "monitor", MONITOR, "pyglet", "monitor"),
+        ("slm", "slmsuite", {"device": "holoeye.Holoeye"}, "slmsuite", "slmsuite"),
+        ("camera", "slmsuite", {"device": "basler.Basler"}, "slmsuite", "slmsuite"),
+        ("camera", "gphoto2", {}, "gphoto2", "gphoto2"),
+        ("camera", "gphoto2", {}, "rawpy", "raw"),
+        ("camera", "micromanager", {"config": __file__}, "pymmcore_plus", "micromanager"),
+    ],
+)
+def test_a_missing_package_is_told_with_the_command_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch, kind: str, driver: str, params: dict[str, Any], package: str, extra: str
+) -> None:
+    _hide(monkeypatch, package)
+    if package == "rawpy":
+        pytest.importorskip("gphoto2")
+    with pytest.raises(UserError, match=rf"pip install 'holobench_eval\[{extra}\]'"):
+        _open(kind, driver, params)
+
+
+def _hide(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == package]:
+        monkeypatch.delitem(sys.modules, name)
+    import_ = builtins.__import__
+
+    def absent(name: str, *rest: Any, **keywords: Any) -> Any:
+        if name.split(".")[0] == package:
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+        return import_(name, *rest, **keywords)
+
+    monkeypatch.setattr(builtins, "__import__", absent)
+    monkeypatch.setitem(sys.modules, package, None)  # for importlib
+
+
+def test_every_driver_is_listed_with_its_version_and_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    listed = found()
+    assert [(one.kind, one.driver) for one in listed] == [("slm", name) for name in SLM_DRIVERS] + [
+        ("camera", name) for name in CAMERA_DRIVERS
+    ]
+    assert all(one.devices or one.why for one in listed)
+    assert all("\n" not in one.why for one in listed)
+    opencv = next(one for one in listed if one.driver == "opencv")
+    assert opencv.version == importlib.metadata.version("opencv-python-headless")
+
+
+def test_looking_for_devices_survives_broken_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent(_: str) -> str:
+        raise importlib.metadata.PackageNotFoundError
+
+    monkeypatch.setattr(drivers.importlib.metadata, "version", absent)
+    assert all(one.version is None and "pip install" in one.why for one in found())
+    monkeypatch.setattr(drivers.importlib.metadata, "version", lambda _: "1.0")
+
+    def broken() -> list[str]:
+        raise OSError("libusb\nis missing")
+
+    for table in (SLM_DRIVERS, CAMERA_DRIVERS):
+        for name, driver in list(table.items()):
+            monkeypatch.setitem(table, name, drivers.Driver(driver.settings, driver.opens, "a", "b", broken))  # type: ignore[arg-type]
+    assert {one.why for one in found()} == {"OSError: libusb is missing"}

@@ -1,0 +1,78 @@
+"""Photographs as people save them: linear counts out of every kind of file, and one line for what is none."""
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.session.frames import facts, find, read_frame
+
+
+@pytest.fixture
+def counts():
+    return np.random.default_rng(0).integers(0, 4096, (24, 32), dtype=np.uint16)
+
+
+@pytest.mark.parametrize("ending", [".png", ".tif", ".TIFF"])
+def test_sixteen_bits_come_back_as_they_were_counted(tmp_path, counts, ending):
+    path = tmp_path / f"0001{ending}"
+    Image.fromarray(counts).save(path)
+    frame = read_frame(find(tmp_path, "0001"), colour=0)
+    assert np.array_equal(frame.counts, counts)
+    assert frame.linear
+    assert frame.top == 65535
+
+
+def test_a_colour_photograph_gives_the_channel_of_its_laser(tmp_path):
+    picture = np.zeros((8, 8, 3), np.uint8)
+    picture[...] = (10, 20, 30)
+    Image.fromarray(picture).save(tmp_path / "0001.png")
+    assert [read_frame(tmp_path / "0001.png", colour).counts[0, 0] for colour in range(3)] == [10, 20, 30]
+
+
+def test_twelve_bits_at_the_upper_end_have_steps_of_sixteen(tmp_path, counts):
+    cv2.imwrite(str(tmp_path / "0001.png"), counts << 4)
+    assert facts(read_frame(tmp_path / "0001.png", 0)).step == 16
+    cv2.imwrite(str(tmp_path / "0001.png"), counts)
+    assert facts(read_frame(tmp_path / "0001.png", 0)).step == 1
+
+
+def test_camera_raw_gives_the_sites_of_its_colour(tmp_path, bayer_dng):
+    mosaic = np.tile(np.array([[100, 200], [200, 300]], np.uint16), (16, 16))
+    (tmp_path / "0001.dng").write_bytes(bayer_dng(mosaic))
+    seen = [read_frame(tmp_path / "0001.dng", colour).counts for colour in range(3)]
+    assert [float(plane.mean()) for plane in seen] == [100, 200, 300]
+    assert seen[0].shape == (16, 16)
+
+
+def test_a_jpeg_is_decoded_and_called_not_linear(tmp_path):
+    Image.fromarray(np.full((16, 16), 188, np.uint8)).save(tmp_path / "0001.jpg", quality=100)
+    frame = read_frame(tmp_path / "0001.jpg", 0)
+    assert not frame.linear
+    assert float(frame.counts.mean()) == pytest.approx(0.503 * 255, rel=0.01)
+
+
+def test_what_is_no_photograph_is_one_line(tmp_path):
+    (tmp_path / "text.png").write_text("not a picture")
+    Image.new("RGBA", (8, 8)).save(tmp_path / "alpha.png")
+    Image.new("L", (20_000, 20_000)).save(tmp_path / "huge.png")
+    frames = [Image.new("L", (8, 8), value) for value in (1, 2)]
+    frames[0].save(tmp_path / "many.tif", save_all=True, append_images=frames[1:])
+    for name, said in (
+        ("text", "not a picture"),
+        ("alpha", "4 channels"),
+        ("huge", "too many|exceeds limit"),
+        ("many", "several"),
+    ):
+        with pytest.raises(UserError, match=said) as caught:
+            read_frame(find(tmp_path, name), 0)
+        assert "\n" not in str(caught.value)
+
+
+def test_two_files_for_one_photograph_are_refused_and_none_is_none(tmp_path):
+    for ending in (".png", ".tif"):
+        Image.new("L", (8, 8)).save(tmp_path / f"0001{ending}")
+    with pytest.raises(UserError, match="keep one of these"):
+        find(tmp_path, "0001")
+    assert find(tmp_path, "0002") is None

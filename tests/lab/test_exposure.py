@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.devices import DeviceError
+from holobench_eval.lab.exposure import Averaged, Dark, auto_exposure, averaged, combined, dark_frames, dark_level
+from holobench_eval.lab.settings import Procedure
+from tests.support.simulated_devices import SimulatedCamera, Still
+
+
+def speckle(mean=1.0, shape=(60, 80)):
+    return mean * np.random.default_rng(3).exponential(size=shape)
+
+
+def camera(picture=None, **settings):
+    return SimulatedCamera(Still(speckle() if picture is None else picture), **settings)
+
+
+@pytest.mark.parametrize("light", [0.003, 0.1, 1.0, 30.0, 300.0])
+def test_auto_exposure_fills_the_range_without_saturating_it(light):
+    device = camera(speckle(light), noise=2.0)
+    seconds = auto_exposure(device, 0)
+    taken = averaged(device, seconds, 1, 0)
+    fill = (np.percentile(taken.counts, 99.9) - 64) / (device.white - 64)
+    assert 0.4 < fill < 0.95
+    assert taken.saturated.mean() <= 0.001
+    assert device.frames < 12
+
+
+def test_auto_exposure_copes_with_shutters_that_know_only_full_stops():
+    class Stops(SimulatedCamera):
+        def expose(self, seconds):
+            return super().expose(2.0 ** round(np.log2(seconds)))
+
+    for light in (1.0, 1.2, 1.4, 1.7):
+        device = Stops(Still(speckle(light)))
+        assert np.log2(auto_exposure(device, 0)) % 1 == 0
+
+
+@pytest.mark.parametrize(
+    ("light", "settings", "line"),
+    [
+        (1e9, {}, "too much light even at its shortest exposure"),
+        (1e-6, {}, "too little light at its longest exposure"),
+        (1.0, {"deaf": True, "gain": 1e8}, "too much light"),
+    ],
+)
+def test_auto_exposure_says_why_there_is_none(light, settings, line):
+    with pytest.raises(DeviceError, match=line) as error:
+        auto_exposure(camera(speckle(light), **settings), 0)
+    assert "\n" not in str(error.value)
+
+
+def test_the_average_is_a_mean_that_neither_clips_nor_rounds():
+    device = camera(np.full((40, 40), 1.0), bits=16, gain=3e6, noise=3.0, dark=0.0)
+    taken = averaged(device, 0.02, 64, 0)  # about 60,000 counts, whose sum no 16 bits hold
+    assert taken.counts.dtype == np.float64
+    assert abs(taken.counts.mean() - 60_000) < 0.5
+    assert 0.2 < taken.counts.std() < 0.6  # 3 / sqrt(64)
+
+
+def test_a_sample_is_saturated_when_any_averaged_frame_is():
+    device = camera(np.full((50, 50), 1.0), noise=100.0, gain=4000.0)
+    taken = averaged(device, 0.97, 16, 0)
+    assert taken.saturated.mean() > 0.5
+    assert taken.counts.max() < device.white
+
+
+def test_only_the_lasers_plane_of_a_colour_camera_counts():
+    still = Still(speckle())
+    still.channel = 2
+    device = SimulatedCamera(still, colour=True)
+    blue, red = (averaged(device, 0.01, 1, plane).counts.mean() for plane in (2, 0))
+    assert blue - 64 > 8 * (red - 64)
+
+
+def test_dark_counts_are_subtracted_at_the_photographs_own_exposure():
+    """Raw counts below the dark level become negative light, not 65,000."""
+    still = Still(speckle(0.05))
+    device = SimulatedCamera(still, bits=16, dark=40.0, dark_rate=300.0, hot=30.0, noise=1.0)
+    still.channel = None
+    dark = dark_frames(device, 16, (0.01, 0.5), 0)
+    still.channel = 0
+    for seconds in (0.02, 0.1, 0.8):
+        light, lost = combined([averaged(device, seconds, 4, 0)], dark)
+        assert lost == 0
+        assert abs(light.mean() - 1000 * speckle().mean()) < 0.02 * 1000 + 0.2 / seconds
+    nothing, _ = combined([Averaged(np.array([[30.0]]), np.array([[False]]), 1.0)], dark_level(64.0))
+    assert nothing[0, 0] == -34.0
+
+
+def test_dark_frames_that_are_bright_are_refused():
+    with pytest.raises(DeviceError, match="is the laser really off"):
+        dark_frames(camera(np.full((20, 20), 1.0)), 2, (0.01, 0.3), 0)
+
+
+def test_a_bracket_measures_what_one_exposure_cannot():
+    """Against the truth: dim samples about as exact as in the long exposure, bright ones as in the short."""
+    picture = np.concatenate([speckle(0.02), speckle(3.0)], axis=1)
+    device = camera(picture, noise=4.0)
+    dark = Dark(np.array(64.0), np.array(0.0))
+    long, short = averaged(device, 0.4, 4, 0), averaged(device, 0.4 / 64, 4, 0)
+    both, lost = combined([long, short], dark)
+    truth = picture * device.gain
+    assert long.saturated.mean() > 0.3
+    assert lost < 0.001
+    dim = truth < 0.02 * device.gain
+    error = (both - truth)[dim].std()
+    assert error < 1.5 * (combined([long], dark)[0] - truth)[dim].std()
+    assert error < 0.05 * (combined([short], dark)[0] - truth)[dim].std()
+    bright = truth > 5 * device.gain
+    assert np.abs(both / truth - 1)[bright & ~short.saturated].max() < 0.02
+
+
+def test_samples_saturated_in_every_exposure_count_as_saturated():
+    device = camera(np.pad(np.full((10, 10), 1e6), 20))
+    bracket = [averaged(device, seconds, 1, 0) for seconds in (0.1, 0.01)]
+    light, lost = combined(bracket, dark_level(64.0))
+    assert lost == pytest.approx(100 / 2500)
+    assert np.isfinite(light).all()
+    assert light[25, 25] == pytest.approx((4095 - 64) / 0.01)
+
+
+def test_a_procedure_needs_dark_frames_or_a_dark_level():
+    assert Procedure().dark > 0
+    assert Procedure(dark=0, dark_level=64.0).dark_level == 64.0
+    for wrong in ({"dark": 0}, {"dark": 4, "dark_level": 64.0}):
+        with pytest.raises(UserError, match="either dark frames"):
+            Procedure(**wrong)
+
+
+def test_exposures_are_one_for_all_channels_or_one_for_each():
+    assert Procedure().exposures(3) is None
+    assert Procedure(exposure=0.1).exposures(3) == (0.1, 0.1, 0.1)
+    assert Procedure(exposure=(0.1, 0.2)).exposures(2) == (0.1, 0.2)
+    with pytest.raises(UserError, match="2 values, but the panel has 3"):
+        Procedure(exposure=(0.1, 0.2)).exposures(3)
+
+
+@pytest.mark.parametrize("wrong", [{"exposure": -1.0}, {"exposure": (0.1, 0.0)}, {"exposure": 1e9}, {"settle": -0.1}])
+def test_times_out_of_range_are_one_line_that_names_the_key(wrong):
+    with pytest.raises(UserError, match=rf"capture\.{next(iter(wrong))} should be auto, or"):
+        Procedure(**wrong)

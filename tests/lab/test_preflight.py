@@ -1,0 +1,184 @@
+"""The gates on a simulated bench: what each mistake does to the picture, and what is told of it."""
+
+from functools import partial
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from holobench_eval.imaging.convention import Convention
+from holobench_eval.lab.exposure import averaged, dark_level
+from holobench_eval.lab.preflight import full_turn, linearity, phase_sign
+from holobench_eval.lab.test_pattern import find_letter, letter
+from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, Still, bench, letter_phase
+
+
+def photographer(**truth):
+    """A picture of the green channel's light, straight from the scene; the phase is ``(1, H, W)``."""
+    scene = Scene(bench(), **truth)
+    panel = SimulatedSlm(scene)
+    scene.channel = GREEN
+
+    def show(phase, convention):
+        panel.show(convention.levels(phase[0]))
+        return torch.from_numpy(scene.light().copy())[None]
+
+    return show
+
+
+def green(initial_phase="random"):
+    return letter_phase(initial_phase=initial_phase)[GREEN : GREEN + 1]
+
+
+def check_linearity(exposure=0.02, picture=None, **camera):
+    still = Still(np.random.default_rng(0).exponential(size=(100, 100)) if picture is None else picture)
+    device = SimulatedCamera(still, **{"noise": 2.0, "bits": 14, **camera})
+    return linearity(partial(averaged, device, count=2, plane=0), exposure, dark_level(64.0))
+
+
+def test_a_linear_camera_passes():
+    gate = check_linearity()
+    assert gate.passed
+    assert gate.line.startswith("linearity: r^2 1.0000")
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        ({"gamma": 1 / 2.2}, "is there gamma"),
+        ({"gamma": 0.9}, "is there gamma"),
+        ({"gamma": 1.1}, "is there gamma"),
+        ({"deaf": True}, "automatic gain"),
+        ({"dark": 500.0}, "offset"),
+        ({"exposure": 1.0}, "of the samples are saturated; shorten"),
+        ({"limits": (0.015, 1.0)}, "needs a factor of eight"),
+        ({"gain": 0.0}, "is there"),
+    ],
+)
+def test_a_camera_that_is_not_linear_is_refused_in_one_line(settings, line):
+    gate = check_linearity(**settings)
+    assert not gate.passed
+    assert line in gate.line
+    assert "\n" not in gate.line
+
+
+def test_the_right_convention_gives_an_upright_letter():
+    gate = phase_sign(photographer(), green(), Convention())
+    assert gate.passed
+    assert gate.line.startswith("phase convention: upright")
+
+
+def test_a_reversed_sign_is_seen_and_named():
+    gate = phase_sign(photographer(sign=-1), green(), Convention())
+    assert not gate.passed
+    assert "set phase.sign: -1" in gate.line
+    assert phase_sign(photographer(sign=-1), green(), Convention(sign=-1)).passed
+    gate = phase_sign(photographer(), green(), Convention(sign=-1))
+    assert not gate.passed
+    assert "set phase.sign: 1 " in gate.line
+
+
+def test_a_mirrored_panel_and_a_mirrored_camera_look_the_same_and_are_only_told():
+    camera, panel = (
+        phase_sign(photographer(**{kind: True}), green(), Convention()) for kind in ("mirrored", "flipped")
+    )
+    assert camera.passed
+    assert panel.passed
+    for gate in (camera, panel):
+        assert "mirrored left-right" in gate.line
+        assert "set phase.flip_horizontal: true" in gate.line
+    flipped = phase_sign(photographer(flipped=True), green(), Convention(flip_horizontal=True))
+    assert flipped.line.startswith("phase convention: upright")
+
+
+@pytest.mark.parametrize(
+    ("turns", "mirrored", "words"),
+    [
+        (1, False, "turned by 90 degrees anticlockwise"),
+        (2, False, "turned by 180 degrees"),
+        (3, False, "turned by 270 degrees"),
+        (2, True, "mirrored upside down"),
+        (1, True, "mirrored left-right and turned by 90"),
+    ],
+)
+def test_turned_and_mirrored_cameras_pass_and_are_told(turns, mirrored, words):
+    plain = photographer()
+
+    def show(phase, convention):
+        seen = plain(phase, convention)
+        return torch.rot90(seen.flip(-1) if mirrored else seen, turns, (1, 2))
+
+    gate = phase_sign(show, green(), Convention())
+    assert gate.passed
+    assert words in gate.line
+
+
+def test_a_picture_without_the_letter_is_refused():
+    draw = np.random.default_rng(1)
+
+    def show(phase, convention):
+        return torch.from_numpy(draw.exponential(size=(1, 150, 180)))
+
+    gate = phase_sign(show, green(), Convention())
+    assert not gate.passed
+    assert "no letter F with either sign" in gate.line
+
+
+def test_the_letter_is_shown_with_random_phase_since_a_smooth_one_leaves_a_ghost_on_the_wrong_side():
+    wrong = photographer(sign=-1)
+    rough, smooth = (
+        find_letter(wrong(green(start), Convention())[0].numpy()).correlation for start in ("random", "constant")
+    )
+    assert rough < 0.6 < smooth
+
+
+@pytest.mark.parametrize("channels_differ", [False, True])
+def test_every_channel_has_its_say(channels_differ):
+    good, other = photographer(), photographer(sign=-1 if channels_differ else 1)
+
+    def show(phase, convention):
+        return torch.cat([good(phase[:1], convention), other(phase[1:], convention)])
+
+    assert phase_sign(show, green().expand(2, -1, -1), Convention()).passed is not channels_differ
+
+
+def test_the_right_level_of_a_full_turn_passes():
+    gate = full_turn(photographer(two_pi_level=200.0), green(), Convention(two_pi_level=200.0))
+    assert gate.passed
+    assert "200 gives" in gate.line
+
+
+def test_a_level_that_costs_much_light_is_refused_and_the_best_is_named():
+    gate = full_turn(photographer(two_pi_level=175.0), green(), Convention())
+    assert not gate.passed
+    named = float(gate.line.split("light of ")[1].split(";")[0])
+    assert abs(named - 175) < 0.08 * 175
+    assert full_turn(photographer(two_pi_level=175.0), green(), Convention(two_pi_level=named)).passed
+
+
+def test_a_level_that_costs_little_light_is_only_remarked_on():
+    gate = full_turn(photographer(two_pi_level=205.0), green(), Convention())
+    assert gate.passed
+    assert "consider that" in gate.line
+
+
+@pytest.mark.parametrize("size", [0.35, 0.6, 0.95])
+@pytest.mark.parametrize("turn", [0, 7, 95, -140])
+def test_the_letter_is_found_at_any_size_place_and_angle_under_speckle(size, turn):
+    picture = letter((200, 240)).numpy()
+    pose = cv2.getRotationMatrix2D((119.5, 99.5), turn, size)
+    pose[:, 2] += (150 - 119.5 + 9, 120 - 99.5 - 5)
+    seen = cv2.warpAffine(picture, pose, (300, 240))
+    speckle = np.random.default_rng(5).exponential(size=seen.shape)
+    found = find_letter(((seen + 0.02) * speckle).astype(np.float32))
+    assert found.correlation > 0.8
+    assert not found.mirrored
+    assert abs((found.turn - turn + 180) % 360 - 180) < 4
+    assert np.corrcoef(found.where.ravel(), seen.ravel())[0, 1] > 0.8
+
+
+def test_light_of_the_letter_is_that_of_its_strokes_above_the_ground():
+    picture = 3 * letter((120, 120)).numpy() + 1
+    found = find_letter(picture)
+    assert found.light(picture) == pytest.approx(3, rel=0.08)

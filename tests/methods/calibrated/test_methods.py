@@ -1,0 +1,272 @@
+"""What calibrated methods promise: phases for any target without a capture, a training that a kill does not change,
+and plain Wirtinger holography on a display that has nothing to correct."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, cast
+
+import pytest
+import torch
+from torch import Tensor
+
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.display.api import Capture
+from holobench_eval.display.training import TrainingBench, TrainingImage
+from holobench_eval.methods.calibrated import method as shared
+from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
+from holobench_eval.methods.calibrated.hybrid import HybridModel
+from holobench_eval.methods.calibrated.kernel import LearnedKernel
+from holobench_eval.methods.calibrated.method import Calibrated, LargeSteps, Search
+from holobench_eval.methods.calibrated.parametric import ParametricModel
+from holobench_eval.methods.hil.loop import Rounds
+from holobench_eval.methods.hil.retrieval import Image
+from holobench_eval.methods.wirtinger import Wirtinger
+from tests.support.small_training import (
+    BentDisplay,
+    Fate,
+    Killed,
+    Memory,
+    pictures,
+    same,
+    small_spec,
+    solving_bench,
+    through_a_file,
+    training_bench,
+)
+
+SPEC = small_spec(32, 24, colours=3)
+SHORT: dict[str, Any] = {
+    "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
+    "retrieval": LargeSteps(iterations=3),
+    "search": Search(iterations=2),
+    "start": Wirtinger(iterations=2),
+    "patterns": 2,
+}
+METHODS: dict[str, Calibrated] = {
+    "parametric_model": ParametricModel(**SHORT),
+    "learned_kernel": LearnedKernel(**SHORT),
+    "cnn_prop_cnn": CNNPropCNN(width=3, **SHORT),
+    "hybrid_model": HybridModel(width=4, **SHORT),
+}
+names = pytest.mark.parametrize("name", METHODS)
+
+
+def train(method: Calibrated, seed: int = 3) -> Mapping[str, Any]:
+    """What ``prepare`` gives, as it comes back from its file."""
+    return through_a_file(dict(method.prepare(training_bench(SPEC, Memory(), images=2, seed=seed))))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _quick_way_back() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Calibrated, "NOMINAL", Wirtinger(iterations=2))
+        yield
+
+
+@pytest.fixture(scope="module")
+def learned() -> dict[str, Mapping[str, Any]]:
+    """As trained, but for the way back: so few steps teach nothing that would be kept."""
+    return {name: {**train(method), "nominal": 0} for name, method in METHODS.items()}
+
+
+@names
+def test_a_phase_has_the_shape_of_the_panel_is_finite_and_costs_no_capture(
+    name: str, learned: dict[str, Mapping[str, Any]]
+) -> None:
+    targets = pictures(SPEC, 2, first=20)
+    before = targets.clone()
+    bench = solving_bench(METHODS[name], targets[0], SPEC, learned[name])
+    phase = METHODS[name].solve(targets, bench)
+    assert phase.shape == (2, 3, *SPEC.shape)
+    assert phase.dtype == torch.float32
+    assert phase.isfinite().all()
+    assert not phase.requires_grad
+    assert torch.equal(targets, before)
+    assert bench.captures == 0
+    with pytest.raises(CellError, match="declares no camera"):
+        bench.capture(phase[0])
+
+
+@names
+def test_a_solution_is_repeatable_and_is_not_that_of_the_start(
+    name: str, learned: dict[str, Mapping[str, Any]]
+) -> None:
+    target, phases = pictures(SPEC, first=20), []
+    bench = solving_bench(METHODS[name], target[0], SPEC, learned[name])
+    for seed in (1, 2):
+        torch.manual_seed(seed)
+        phases.append(METHODS[name].solve(target, bench))
+    assert torch.equal(*phases)
+    assert not torch.equal(phases[0], METHODS[name].start.solve(target, bench))
+
+
+@names
+def test_a_prediction_is_what_retrieval_saw(
+    name: str, learned: dict[str, Mapping[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    retrieve, seen = shared.retrieve, []
+
+    def watched(display: Image, target: Tensor, start: Tensor, *settings: Any) -> Tensor:
+        phase = retrieve(display, target, start, *settings)
+        seen.append(display(phase))
+        return phase
+
+    monkeypatch.setattr(shared, "retrieve", watched)
+    target = pictures(SPEC, first=20)
+    bench = solving_bench(METHODS[name], target[0], SPEC, learned[name])
+    predicted = METHODS[name].predict(METHODS[name].solve(target, bench), bench)
+    assert predicted.shape == target.shape
+    assert not predicted.requires_grad
+    assert torch.allclose(predicted[0], seen[0], atol=1e-5)
+
+
+@names
+def test_training_is_decided_by_the_seeds_alone(name: str) -> None:
+    torch.manual_seed(8)
+    once = train(METHODS[name])
+    torch.manual_seed(9)
+    assert same(train(METHODS[name]), once)
+    assert not same(train(METHODS[name], seed=4), once)
+    drawn = name in ("cnn_prop_cnn", "hybrid_model")
+    assert same(train(replace(METHODS[name], seed=1)), once) != drawn
+
+
+@names
+def test_captures_are_patterns_images_rounds_and_held_out_images_shown_once_a_round_and_twice_in_the_end(
+    name: str,
+) -> None:
+    for patterns, rounds, held_out in ((2, 2, 1), (0, 1, 2)):
+        memory = Memory()
+        bench = training_bench(SPEC, memory, images=3, held_out=held_out)
+        method = replace(METHODS[name], patterns=patterns, training=replace(SHORT["training"], rounds=rounds))
+        method.prepare(bench)
+        assert bench.captures == patterns + 3 + (rounds - 1) + rounds * held_out + 2 * held_out
+        assert memory.fate.passed.count("after a photograph") == bench.captures
+
+
+@names
+def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
+    memory = Memory(as_files=True)
+    bench = training_bench(SPEC, memory, images=2)
+    learned = METHODS[name].prepare(bench)
+    moments = memory.fate.passed
+    photographs = [at for at, moment in enumerate(moments) if moment == "after a photograph"]
+    kept = [at for at, moment in enumerate(moments) if moment == "after keeping approximator"]
+    for at in (*photographs[1::4], *kept[::2]):
+        memory = Memory(as_files=True)
+        torch.manual_seed(at)
+        with pytest.raises(Killed):
+            METHODS[name].prepare(training_bench(SPEC, memory, Fate(at), images=2))
+        torch.manual_seed(at + 1)
+        again = training_bench(SPEC, memory, images=2)
+        assert same(METHODS[name].prepare(again), learned), (at, moments[at])
+        assert again.captures == bench.captures, (at, moments[at])
+
+
+@names
+def test_the_weights_of_another_method_are_refused_in_one_line(
+    name: str, learned: dict[str, Mapping[str, Any]]
+) -> None:
+    (target,) = pictures(SPEC, first=20)
+    others = [other for other in METHODS if other != name and {name, other} != {"parametric_model", "hybrid_model"}]
+    for other in others:
+        with pytest.raises(UserError, match="not the weights of this") as caught:
+            METHODS[name].solve(target[None], solving_bench(METHODS[name], target, SPEC, learned[other]))
+        assert "\n" not in str(caught.value)
+
+
+class PlainDisplay(BentDisplay):
+    """The nominal model as a display, without noise."""
+
+    def session(self, names: tuple[object, ...], target: Tensor) -> PlainDisplay:
+        return PlainDisplay(self.spec, self.fate, names)
+
+    def announce(self, phases):
+        pass
+
+    def capture(self, phase: Tensor) -> Capture:
+        fields = [
+            self.spec.propagator(channel).forward(torch.polar(torch.ones_like(one), one))
+            for channel, one in enumerate(phase)
+        ]
+        frame = self.spec.region.crop(torch.stack(fields)).abs().square()
+        return Capture(frame, dark=0.0, white=float("inf"), gain=(1.0,) * len(frame))
+
+
+ONE = small_spec(48, 36)
+LEARNS: dict[str, Any] = {
+    "training": Rounds(1, steps=60),
+    "retrieval": LargeSteps(iterations=60),
+    "search": Search(iterations=5),
+    "patterns": 4,
+}
+
+
+def calibrated_on(display: BentDisplay, method: Calibrated) -> Mapping[str, Any]:
+    given = [TrainingImage(f"picture {number}", one) for number, one in enumerate(pictures(ONE, 6))]
+    return method.prepare(TrainingBench(cast(Any, display), "small", given[:4], given[4:], Memory(), None, 3))
+
+
+@pytest.mark.parametrize("method", [ParametricModel(**LEARNS), LearnedKernel(**LEARNS)])
+def test_a_display_without_faults_is_left_to_wirtinger_holography(
+    method: Calibrated, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Calibrated, "NOMINAL", Wirtinger())
+    learned = calibrated_on(PlainDisplay(ONE), method)
+    assert learned["nominal"] == 1
+    target = pictures(ONE, first=30)
+    bench = solving_bench(method, target[0], ONE, learned)
+    assert torch.equal(method.solve(target, bench), Wirtinger().solve(target, bench))
+
+
+def test_a_display_with_faults_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Calibrated, "NOMINAL", Wirtinger())
+    method = ParametricModel(**LEARNS | {"training": Rounds(1, steps=120)})
+    learned = calibrated_on(BentDisplay(ONE), method)
+    assert learned["nominal"] == 0
+    (target,) = pictures(ONE, first=30)
+    bench, display = solving_bench(method, target, ONE, learned), BentDisplay(ONE)
+    errors = []
+    for way in (method, Wirtinger()):
+        shown = display.rectified(display.capture(way.solve(target[None], bench)[0]), target)
+        shown = shown * (shown * target).sum() / shown.square().sum()
+        errors.append(float((shown - target).square().mean()))
+    assert errors[0] < errors[1] / 5
+
+
+def test_the_way_back_is_taken_by_the_mean_over_the_held_out_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    scores = iter([20.0, 25.0, 21.0, 23.0, 20.0, 21.0, 22.0, 20.0])
+    monkeypatch.setattr(shared, "matched_psnr", lambda shown, target: next(scores))
+    for expected in (0, 1):
+        bench = training_bench(SPEC, Memory(), images=2, held_out=2)
+        assert METHODS["parametric_model"].prepare(bench)["nominal"] == expected
+
+
+@names
+def test_a_trained_method_says_so_and_has_neither_camera_nor_privilege(name: str) -> None:
+    cls = plugins.find("methods", name)
+    assert cls is type(METHODS[name])
+    assert cls.trains
+    assert cls.version >= 1
+    assert not cls.camera
+    assert not cls.privileged
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "word"),
+    [
+        ("parametric_model", {"patterns": -1}, "patterns"),
+        ("parametric_model", {"search": {"adversarial": 0.5}}, "adversarial"),
+        ("hybrid_model", {"width": 1}, "width"),
+        ("cnn_prop_cnn", {"width": 0}, "width"),
+        ("learned_kernel", {"kernel": 3}, "kernel"),
+        ("learned_kernel", {"training": {"step": 3}}, "steps"),
+    ],
+)
+def test_a_wrong_parameter_is_one_line_that_names_it(name: str, params: dict[str, Any], word: str) -> None:
+    with pytest.raises(UserError, match=word) as caught:
+        plugins.build("methods", name, params)
+    assert "\n" not in str(caught.value)

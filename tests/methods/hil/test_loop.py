@@ -1,0 +1,358 @@
+"""Algorithm 1: who is captured when, and that a training killed anywhere ends as one that was not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from torch import Tensor
+
+from holobench_eval.display.training import TrainingBench, TrainingImage
+from holobench_eval.methods.hil import loop
+from holobench_eval.methods.hil.hil import HIL
+from holobench_eval.methods.hil.loop import Rounds, Sample, fidelity, train_in_the_loop
+from holobench_eval.methods.hil.networks import Network
+from holobench_eval.methods.hil.nh3d import HILNH3D
+from holobench_eval.methods.hil.objective import Objective
+from holobench_eval.methods.hil.plus import HILPlus
+from holobench_eval.methods.hil.retrieval import Image, Retrieval
+from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.study.artifacts import FolderMemory
+from tests.support.small_training import Fate, Killed, Memory, same, small_spec, training_bench
+
+SPEC = small_spec(size=24, region=16)
+
+
+class Scale:
+    """An approximator of two numbers, whose every step depends on all before it."""
+
+    def __init__(self, fate: Fate) -> None:
+        self.fate, self.weight, self.moment = fate, torch.zeros(()), torch.zeros(())
+        self.unit = torch.ones(())
+        self.exposed: list[int] = []
+        self.trained_on: list[tuple[float, float]] = []
+
+    def expose(self, samples: Sequence[Sample]) -> None:
+        self.exposed.append(len(samples))
+        self.unit = torch.stack([sample.capture.mean() for sample in samples]).mean()
+
+    def step(self, sample: Sample, progress: float) -> dict[str, float]:
+        self.fate.meets("a step")
+        error = sample.capture.mean() / self.unit - self.weight
+        self.moment = 0.7 * self.moment + (1 - progress) * error
+        self.weight = self.weight + 0.2 * self.moment
+        self.trained_on.append((float(sample.capture.double().sum()), progress))
+        return {"error": abs(float(error)), "nothing": 0.0}
+
+    def image(self, light: Tensor) -> Image:
+        weight = self.weight.clone()
+        return lambda phase: weight * SPEC.region.crop(1 + torch.cos(phase)) / light.view(-1, 1, 1)
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"weight": self.weight, "moment": self.moment, "unit": self.unit}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        self.weight, self.moment, self.unit = state["weight"], state["moment"], state["unit"]
+
+
+def begin(image: TrainingImage) -> Tensor:
+    return torch.full((1, *SPEC.shape), float(image.target.mean()))
+
+
+def search(display: Image, target: Tensor, phase: Tensor) -> Tensor:
+    return phase + 0.1 + (display(phase).mean() - target.mean())
+
+
+def run(bench: TrainingBench, rounds: Rounds, memory: Memory) -> Scale:
+    approximator = Scale(memory.fate)
+    train_in_the_loop(bench, approximator, begin, search, rounds)
+    return approximator
+
+
+@pytest.fixture(autouse=True)
+def _saves_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+
+
+@pytest.mark.parametrize("refine_images", [None, 1, 2, 9])
+@pytest.mark.parametrize("used", [None, 2])
+@pytest.mark.parametrize("held_out", [1, 2])
+def test_captures_are_all_images_then_some_a_round_and_those_held_out(
+    refine_images: int | None, used: int | None, held_out: int
+) -> None:
+    memory = Memory()
+    bench = training_bench(SPEC, memory, images=3, held_out=held_out)
+    run(bench, Rounds(3, used, refine_images, steps=4, refine_steps=2), memory)
+    images = used or 3
+    assert bench.captures == images + 2 * min(refine_images or images, images) + 3 * held_out
+    assert memory.fate.passed.count("after a photograph") == bench.captures
+
+
+def test_every_round_is_captured_under_noise_of_its_own() -> None:
+    memory = Memory()
+    run(training_bench(SPEC, memory), Rounds(3, steps=2, refine_steps=2), memory)
+    captures = [kept["value"]["capture"] for name, kept in memory.kept.items() if "capture" in kept["value"]]
+    assert len({float(capture.double().sum()) for capture in captures}) == len(captures) == 12
+
+
+def test_images_of_later_rounds_go_round_in_turn() -> None:
+    memory = Memory()
+    images = training_bench(SPEC, memory, images=5).images
+    rounds = Rounds(5, images=4, refine_images=3)
+    shown = [[image.item[-1] for image in rounds.shown(images, number)] for number in range(1, 6)]
+    assert ["".join(items) for items in shown] == ["0123", "012", "301", "230", "123"]
+    everything = Rounds(3, refine_images=None)
+    assert [len(everything.shown(images, number)) for number in (1, 2, 3)] == [5, 5, 5]
+
+
+@pytest.mark.parametrize(("keep_captures", "seen"), [(True, [3, 5, 7]), (False, [3, 2, 2])])
+def test_a_round_learns_from_all_captures_so_far_or_from_its_own(keep_captures: bool, seen: list[int]) -> None:
+    memory = Memory()
+    rounds = Rounds(3, refine_images=2, steps=21, refine_steps=21, keep_captures=keep_captures)
+    approximator = run(training_bench(SPEC, memory), rounds, memory)
+    captures = [{value for value, _ in approximator.trained_on[start : start + 21]} for start in (0, 21, 42)]
+    assert [len(round_) for round_ in captures] == seen
+    assert (captures[0] <= captures[1] <= captures[2]) == keep_captures
+
+
+@pytest.mark.parametrize("keep_captures", [True, False])
+def test_samples_from_before_are_learned_from_in_every_round(keep_captures: bool) -> None:
+    memory = Memory()
+    bench, approximator = training_bench(SPEC, memory), Scale(memory.fate)
+    earlier = [
+        Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (5.0, 6.0)
+    ]
+    rounds = Rounds(2, refine_images=1, steps=5, refine_steps=10, keep_captures=keep_captures)
+    train_in_the_loop(bench, approximator, begin, search, rounds, earlier)
+    assert approximator.exposed == [5]
+    learned_from = [value for value, _ in approximator.trained_on]
+    for seen in (learned_from[:5], learned_from[5:]):
+        assert {20.0, 24.0} <= set(seen)
+    assert len(set(learned_from[5:])) == (6 if keep_captures else 3)
+    assert bench.captures == 3 + 1 + 2
+
+
+def test_every_capture_is_learned_from_equally_often_and_not_in_the_order_it_was_taken() -> None:
+    memory = Memory()
+    approximator = run(training_bench(SPEC, memory, images=6), Rounds(1, steps=18), memory)
+    passes = [[value for value, _ in approximator.trained_on[start : start + 6]] for start in (0, 6, 12)]
+    assert len({tuple(sorted(one)) for one in passes}) == 1
+    assert len({tuple(one) for one in passes}) == 3
+    assert [progress for _, progress in approximator.trained_on] == [step / 18 for step in range(18)]
+
+
+def test_the_order_depends_on_the_study_and_on_the_round() -> None:
+    def order(seed: int) -> list[list[float]]:
+        memory = Memory()
+        rounds = Rounds(2, refine_images=1, steps=6, refine_steps=6, keep_captures=True)
+        known = run(training_bench(SPEC, memory, images=6, seed=seed), rounds, memory).trained_on
+        first = [value for value, _ in known[:6]]
+        ranks = {value: rank for rank, value in enumerate(sorted(first))}
+        return [[ranks[value] for value in first], [ranks.get(value, -1) for value, _ in known[6:]]]
+
+    assert order(3) == order(3)
+    assert order(3)[0] != order(4)[0]
+    assert order(3)[0] != order(3)[1]
+
+
+def test_the_unit_of_captures_is_chosen_from_the_first_round_alone() -> None:
+    memory = Memory()
+    approximator = run(training_bench(SPEC, memory), Rounds(3, steps=2, refine_steps=2), memory)
+    assert approximator.exposed == [3]
+
+
+def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None:
+    memory = Memory()
+    bench = training_bench(SPEC, memory)
+    run(bench, Rounds(2, steps=2, refine_steps=2), memory)
+    start, first, second = (
+        memory.load(f"{name} picture 0") for name in ("start", "phase of round 1", "phase of round 2")
+    )
+    assert start is not None
+    assert first is not None
+    assert second is not None
+    assert torch.equal(start["value"]["phase"], begin(bench.images[0]))
+    assert torch.equal(first["value"]["phase"], start["value"]["phase"])
+    assert not torch.equal(second["value"]["phase"], start["value"]["phase"])
+
+
+RESUMED = Rounds(3, images=2, refine_images=1, steps=4, refine_steps=4)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A training's end: what it kept, its approximator, and the captures it counted."""
+
+    memory: Memory
+    approximator: Scale
+    captures: int
+
+    def values(self) -> dict[str, Any]:
+        return {name: kept["value"] for name, kept in self.memory.kept.items()}
+
+
+def finished(memory: Memory) -> Outcome:
+    """A training that goes on from what the memory holds, to its end."""
+    bench = training_bench(SPEC, memory)
+    return Outcome(memory, run(bench, RESUMED, memory), bench.captures)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Outcome:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+        return finished(Memory())
+
+
+@pytest.fixture(scope="module")
+def resumed(whole: Outcome) -> dict[int, Outcome]:
+    """Trainings that were killed at each moment of an undisturbed one, and started again."""
+    moments, outcomes = whole.memory.fate.passed, {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+        for at in range(len(moments)):
+            memory, fate = Memory(), Fate(at)
+            with pytest.raises(Killed):
+                run(training_bench(SPEC, memory, fate), RESUMED, memory)
+            assert fate.passed == moments[: at + 1]
+            outcomes[at] = finished(memory)
+    return outcomes
+
+
+def test_a_training_killed_at_any_moment_ends_with_the_same_state_captures_and_values(
+    whole: Outcome, resumed: dict[int, Outcome]
+) -> None:
+    """Between photographs, in and between steps, around every save and row, in every round and with images held out."""
+    assert len(resumed) > 60
+    for at, outcome in resumed.items():
+        moment = (at, whole.memory.fate.passed[at])
+        assert same(outcome.approximator.state_dict(), whole.approximator.state_dict()), moment
+        assert outcome.captures == whole.captures, moment
+        assert outcome.values().keys() == whole.values().keys(), moment
+        assert all(same(value, whole.values()[name]) for name, value in outcome.values().items()), moment
+
+
+def kept_but_not_logged(whole: Outcome) -> set[int]:
+    """Moments between the keeping of the approximator and the row about its steps."""
+    moments = whole.memory.fate.passed
+    kept = {at for at, moment in enumerate(moments) if moment == "after keeping approximator"}
+    return kept | {at + 1 for at in kept}
+
+
+def in_order(memory: Memory) -> list[dict[str, float | int | str]]:
+    return sorted(memory.story, key=lambda row: (row["round"], row["step"]))
+
+
+def test_a_training_killed_at_any_other_moment_has_the_same_rows(whole: Outcome, resumed: dict[int, Outcome]) -> None:
+    assert in_order(whole.memory) == whole.memory.story
+    for at in resumed.keys() - kept_but_not_logged(whole):
+        assert in_order(resumed[at].memory) == whole.memory.story, whole.memory.fate.passed[at]
+
+
+def test_a_training_killed_between_keeping_the_approximator_and_its_row_has_the_same_rows(
+    whole: Outcome, resumed: dict[int, Outcome]
+) -> None:
+    assert all(in_order(resumed[at].memory) == whole.memory.story for at in kept_but_not_logged(whole))
+
+
+def test_the_rows_of_a_resumed_training_are_in_order(whole: Outcome, resumed: dict[int, Outcome]) -> None:
+    assert all(in_order(outcome.memory) == outcome.memory.story for outcome in resumed.values())
+
+
+def test_a_training_killed_again_and_again_ends_the_same(whole: Outcome) -> None:
+    memory, kills = Memory(), 0
+    while kills < 40:
+        bench = training_bench(SPEC, memory, Fate(14))
+        try:
+            approximator = run(bench, RESUMED, memory)
+            break
+        except Killed:
+            kills += 1
+    assert 3 < kills < 40
+    assert same(approximator.state_dict(), whole.approximator.state_dict())
+    assert bench.captures == whole.captures
+
+
+def test_the_log_in_a_folder_has_the_losses_and_the_fidelity_of_every_round(tmp_path: Path) -> None:
+    memory = FolderMemory(tmp_path)
+    bench = training_bench(SPEC, Memory())
+    bench._memory = memory
+    train_in_the_loop(bench, Scale(Fate()), begin, search, Rounds(2, steps=3, refine_steps=3))
+    rows = memory.rows()
+    assert sum(bool(row.get("fidelity_psnr")) for row in rows) == 2
+    assert sum(bool(row.get("error")) for row in rows) == 2
+
+
+def test_a_row_tells_the_mean_loss_since_the_row_before() -> None:
+    memory = Memory()
+    bench = training_bench(SPEC, memory)
+    approximator, losses = Scale(Fate()), []
+    step = approximator.step
+
+    def recorded(sample: Sample, progress: float) -> dict[str, float]:
+        losses.append(step(sample, progress)["error"])
+        return {"error": losses[-1], "nothing": 0.0}
+
+    approximator.step = recorded  # type: ignore[method-assign]
+    samples = [
+        Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (1.0, 2.0)
+    ]
+    loop.refine(bench, approximator, samples, 1, range(8))
+    assert [row["step"] for row in memory.rows] == [3, 6, 8]
+    expected = [sum(losses[a:b]) / (b - a) for a, b in ((0, 3), (3, 6), (6, 8))]
+    assert [row["error"] for row in memory.rows] == pytest.approx(expected)
+    assert not any("nothing" in row for row in memory.rows)
+
+
+def test_fidelity_tells_how_good_prediction_and_capture_are_and_how_close() -> None:
+    target = torch.rand(1, *SPEC.region.shape, generator=torch.Generator().manual_seed(0))
+    error = 0.1 * (-1.0) ** torch.arange(SPEC.region.width)
+
+    class Perfect(Scale):
+        def image(self, light: Tensor) -> Image:
+            return lambda phase: 3 * target
+
+    sample = Sample(torch.zeros(1, *SPEC.shape), 0.2 * (target + error), target, torch.ones(1))
+    values = fidelity(Perfect(Fate()), [sample, sample])
+    assert values["predicted_psnr"] > 100
+    assert values["captured_psnr"] == pytest.approx(20, abs=1)
+    assert values["fidelity_psnr"] == pytest.approx(20, abs=1)
+
+
+JUDGED_SPEC = small_spec(size=48, region=40)
+SHORT: dict[str, Any] = {
+    "network": Network(levels=2, width=4),
+    "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
+    "retrieval": Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0),
+    "start": SmoothStart(iterations=2),
+}
+JUDGED = Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.1)
+METHODS: dict[str, Any] = {
+    "hil": HIL(**{**SHORT, "retrieval": JUDGED}, loss=Objective(perceptual=0.0), offsets=2),
+    "hil_nh3d": HILNH3D(**{**SHORT, "network": Network("unet", levels=2, width=4)}),
+    "hil_plus": HILPlus(**SHORT),
+}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
+    method = METHODS[name]
+    memory = Memory(as_files=True)
+    bench = training_bench(JUDGED_SPEC, memory, images=2)
+    learned = method.prepare(bench)
+    moments = memory.fate.passed
+    kinds = ("after a photograph", "after keeping approximator", "before a row")
+    last = {kind: len(moments) - 1 - moments[::-1].index(kind) for kind in kinds}
+    for at in sorted({*last.values(), len(moments) // 2}):
+        memory = Memory(as_files=True)
+        torch.manual_seed(at)
+        with pytest.raises(Killed):
+            method.prepare(training_bench(JUDGED_SPEC, memory, Fate(at), images=2))
+        torch.manual_seed(at + 1)
+        again = training_bench(JUDGED_SPEC, memory, images=2)
+        assert same(method.prepare(again), learned), moments[at]
+        assert again.captures == bench.captures, moments[at]

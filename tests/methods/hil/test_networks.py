@@ -1,0 +1,126 @@
+"""A network's parameters make the modules they say, and what cannot be made is refused in a line."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+import torch
+from pydantic import TypeAdapter, ValidationError
+from torch import nn
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.methods.hil.baselines import Identity, Pix2PixHD, UNet
+from holobench_eval.methods.hil.discriminator import MultiScaleDiscriminator, PatchDiscriminator
+from holobench_eval.methods.hil.generator import Generator
+from holobench_eval.methods.hil.networks import Network
+
+NAMES = ("proposed", "unet", "pix2pix", "pix2pixhd", "identity")
+
+
+def on_meta(**params: Any) -> tuple[nn.Module, nn.Module | None]:
+    network = Network(**params)
+    with torch.device("meta"):
+        return network.generator(3, 3), network.discriminator(3)
+
+
+def first_filters(module: nn.Module) -> int:
+    return next(layer.out_channels for layer in module.modules() if isinstance(layer, nn.Conv2d))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_name_makes_its_networks(name: Any) -> None:
+    generator, discriminator = on_meta(name=name)
+    kinds = {"unet": UNet, "pix2pixhd": Pix2PixHD, "identity": Identity, "proposed": Generator}
+    assert type(generator).__name__ == "Pix2Pix" if name == "pix2pix" else isinstance(generator, kinds[name])
+    judges = {"proposed": PatchDiscriminator, "pix2pix": PatchDiscriminator, "pix2pixhd": MultiScaleDiscriminator}
+    assert type(discriminator) is judges.get(name, type(None))
+
+
+@pytest.mark.parametrize(
+    ("name", "filters"), [("proposed", 64), ("pix2pix", 64), ("unet", 32), ("pix2pixhd", 32), ("identity", None)]
+)
+def test_the_paper_preset_has_the_published_filters_halved_for_unet_and_pix2pixhd(name: Any, filters: int) -> None:
+    generator, discriminator = on_meta(name=name, preset="paper")
+    if filters is None:
+        return
+    assert first_filters(generator) == filters == Network(name, preset="paper").filters
+    assert discriminator is None or first_filters(discriminator) == filters
+    small, _ = on_meta(name=name)
+    assert first_filters(small) == filters // 4
+
+
+def test_levels_and_width_replace_those_of_the_preset() -> None:
+    generator, _ = on_meta(levels=3, width=10)
+    assert isinstance(generator, Generator)
+    assert generator.levels == 3
+    assert first_filters(generator) == 10
+    paper, _ = on_meta(preset="paper")
+    assert isinstance(paper, Generator)
+    assert paper.levels == 8
+    unet, _ = on_meta(name="unet", preset="paper")
+    assert isinstance(unet, UNet)
+    assert unet.levels == 4
+
+
+def test_switches_reach_the_generator_and_the_discriminator() -> None:
+    plain, seen = on_meta()
+    assert seen is not None
+    assert seen.condition == 3
+    _, unseen = on_meta(conditional=False)
+    assert unseen is not None
+    assert unseen.condition == 0
+    assert isinstance(plain, Generator)
+    for switch, value in {"dropout": True, "full_resolution_stage": False, "plain_ends": False}.items():
+        assert str(on_meta(**{switch: value})[0]) != str(plain)
+    assert plain.skip_after_activation
+    assert not on_meta(skip_after_activation=False)[0].skip_after_activation
+
+
+@pytest.mark.parametrize("switch", ["conditional", "full_resolution_stage", "plain_ends", "skip_after_activation"])
+def test_a_switch_of_the_proposed_network_is_refused_for_another(switch: str) -> None:
+    with pytest.raises(UserError, match=f"network 'unet' has no '{switch}'"):
+        Network("unet", **{switch: False})
+    Network("unet", **{switch: True})
+
+
+@pytest.mark.parametrize(
+    "params",
+    [{"name": "unett"}, {"levels": 0}, {"levels": 11}, {"width": 1}, {"preset": "large"}, {"dropout": "perhaps"}],
+)
+def test_wrong_parameters_are_refused(params: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        TypeAdapter(Network).validate_python(params)
+
+
+def test_the_identity_needs_as_many_inputs_as_outputs() -> None:
+    with pytest.raises(UserError, match="got 4 and 3"):
+        Network("identity").generator(4, 3)
+
+
+@pytest.mark.parametrize("name", ["proposed", "pix2pix", "pix2pixhd"])
+def test_first_weights_have_a_deviation_of_a_fiftieth(name: Any) -> None:
+    torch.manual_seed(0)
+    network = Network(name)
+    for module in (network.generator(3, 3), network.discriminator(3)):
+        assert module is not None
+        weights = [value for value in module.parameters() if value.ndim == 4]
+        flat = torch.cat([weight.flatten() for weight in weights]).detach()
+        assert float(flat.std()) == pytest.approx(0.02, rel=0.01)
+        assert abs(float(flat.mean())) < 1e-4
+
+
+def test_the_first_weights_of_unet_keep_the_size_of_the_signal() -> None:
+    torch.manual_seed(0)
+    for layer in Network("unet").generator(3, 3).modules():
+        if isinstance(layer, nn.Conv2d) and layer.in_channels >= 16:
+            inputs = layer.in_channels * math.prod(layer.kernel_size)
+            assert float(layer.weight.detach().std()) == pytest.approx(math.sqrt(2 / inputs), rel=0.05)
+
+
+def test_weights_lie_channels_last() -> None:
+    generator = Network().generator(3, 3)
+    assert all(
+        value.is_contiguous(memory_format=torch.channels_last) for value in generator.parameters() if value.ndim == 4
+    )

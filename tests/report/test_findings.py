@@ -1,0 +1,131 @@
+import numpy as np
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.report import Results, records_frame
+from holobench_eval.report.sections.findings import findings
+from holobench_eval.study.plan import REFERENCE
+from tests.support import synthetic_study as made
+
+TARGETS = tuple(f"t{index}" for index in range(8))
+NOISE = np.array([0.0, 0.3, -0.2, 0.1, 0.4, -0.1, 0.2, -0.3])
+
+
+def results_of(scores, targets=TARGETS, **changes):
+    """Results of methods given as {label: {score key: values over targets}}; a floor is a label floor_..."""
+    records = []
+    for label, columns in scores.items():
+        condition = REFERENCE if label.startswith("floor_") else "bench"
+        for index, target in enumerate(targets):
+            found = {key: float(values[index]) for key, values in columns.items() if not np.isnan(values[index])}
+            state = {"state": "done"} if found else {"state": "failed", "reason": "lost"}
+            records.append(made.record(label, made.cell(label, target, condition), found, **state))
+    labels = tuple((label, "bench") for label in scores if not label.startswith("floor_"))
+    given = {"pairs": labels, "targets": targets, "baseline": "old", "reported": {}, "privileged": frozenset()}
+    layout = made.layout(**(given | changes))
+    return Results(records_frame(records, layout), layout)
+
+
+def psnr(mean):
+    return {"psnr_linear": mean + NOISE}
+
+
+def sentences(results):
+    return {heading: " ".join(lines) for heading, lines in findings(results)}
+
+
+def test_the_best_method_is_named_with_its_margin_interval_and_p():
+    text = sentences(results_of({"old": psnr(17.0), "new": {"psnr_linear": 19.0 + 2 * NOISE}}))["bench"]
+    assert "Best of the 2 ranked methods: new, PSNR 19.10" in text
+    assert "+2.05 dB [" in text
+    assert "8 of 8 targets, p = 0.008 after Holm" in text
+    assert "at p < 0.05 after Holm: new (1 of 1)" in text
+
+
+def test_when_the_baseline_wins_the_next_method_is_compared_with_it():
+    text = sentences(results_of({"old": psnr(20.0), "mid": psnr(19.0), "low": psnr(15.0)}))["bench"]
+    assert "it is the baseline, and from it the next, mid, differs by -1.00 dB" in text
+
+
+def test_a_privileged_method_is_the_ceiling_and_never_the_best():
+    scores = {"old": psnr(17.0), "new": psnr(18.0), "oracle": psnr(30.0)}
+    text = sentences(results_of(scores, privileged=frozenset({"oracle"})))["bench"]
+    assert "Best of the 2 ranked methods: new" in text
+    assert "The ceiling oracle" in text
+    assert "+12.00 dB from new" in text
+
+
+def test_a_method_that_does_not_beat_a_constant_image_is_named():
+    text = sentences(results_of({"old": psnr(17.0), "bad": psnr(14.0), "floor_constant": psnr(15.5)}))["bench"]
+    assert "a constant image scores 15.55 dB; not better on average: bad." in text
+
+
+def test_a_method_with_a_hole_is_not_ranked_and_said_so():
+    lucky = {"psnr_linear": np.where(np.arange(8) == 3, np.nan, 25.0)}
+    text = sentences(results_of({"old": psnr(17.0), "new": psnr(18.0), "lucky": lucky}))["bench"]
+    assert "Best of the 2 ranked methods: new" in text
+    assert "Not ranked, since they lack targets: lucky (7 of 8)" in text
+
+
+def test_a_baseline_without_a_score_is_not_compared_with():
+    text = sentences(results_of({"old": {"psnr_linear": np.full(8, np.nan)}, "new": psnr(18.0)}))["bench"]
+    assert "new, PSNR 18.05" in text
+    assert "against the baseline" not in text.partition(". ")[0]
+    assert "–" not in text
+    assert "Not ranked, since they lack targets: old (0 of 8)" in text
+
+
+def test_a_ranking_that_blur_flips_is_reported_with_the_width():
+    sharp = {"psnr_linear": 18 + NOISE, "psnr_linear_blur0.5": 19 + NOISE, "psnr_linear_blur1": 20 + NOISE}
+    noisy = {"psnr_linear": 17 + NOISE, "psnr_linear_blur0.5": 18 + NOISE, "psnr_linear_blur1": 22 + NOISE}
+    text = sentences(results_of({"old": sharp, "noisy": noisy}))["bench"]
+    assert "The ranking depends on the blur width: at 1 px noisy above old." in text
+
+
+def test_a_stable_ranking_is_reported_as_stable():
+    both = {label: psnr(mean) | {"psnr_linear_blur1": mean + 3 + NOISE} for label, mean in (("old", 17), ("new", 18))}
+    assert "The order of the 2 ranked methods is the same" in sentences(results_of(both))["bench"]
+
+
+def test_a_metric_that_disagrees_with_the_headline_is_named():
+    scores = {"old": psnr(17) | {"mofd_srgb": 0.1 + NOISE / 100}, "new": psnr(18) | {"mofd_srgb": 0.3 + NOISE / 100}}
+    assert "By MOFD (sRGB) the best is old, not new." in sentences(results_of(scores))["bench"]
+
+
+def test_two_targets_give_no_test_and_say_so():
+    text = sentences(results_of({"old": psnr(17.0), "new": psnr(18.0)}, targets=TARGETS[:2]))["bench"]
+    assert "too few for an interval or a test" in text
+    assert "No test against the baseline: fewer than 3 complete pairs." in text
+    assert "p =" not in text
+
+
+def test_a_test_that_could_not_have_shown_anything_says_so():
+    text = sentences(results_of({"old": psnr(17.0), "new": psnr(18.0)}, targets=TARGETS[:4]))["bench"]
+    assert "could not have shown any difference" in text
+
+
+def test_every_pair_is_tested_and_corrected_within_its_display():
+    results = results_of({"old": psnr(17.0), "mid": psnr(18.0), "new": psnr(19.0)})
+    assert [(t.first, t.second) for t in results.against_baseline] == [("old", "mid"), ("old", "new")]
+    assert len(results.between_all) == 3
+    assert results.between_all[0].p_holm == pytest.approx(3 * 2 / 2**8)
+
+
+def test_a_headline_that_no_record_has_is_an_error_with_a_suggestion():
+    with pytest.raises(UserError, match="did you mean 'psnr_linear'"):
+        _ = results_of({"old": psnr(17.0)}, headline="psnr_liner").headline
+
+
+def test_a_study_without_any_score_has_no_findings_but_its_holes():
+    results = results_of({"old": {"psnr_linear": np.full(8, np.nan)}})
+    assert sentences(results)["bench"].startswith("No method has a score for every target, so none is ranked.")
+    assert len(results.holes) == 8
+
+
+def test_a_floor_without_a_score_is_not_spoken_of():
+    lost = {"psnr_linear": np.full(8, np.nan)}
+    results = results_of({"old": psnr(17.0), "floor_constant": lost, "floor_speckle": psnr(9.0)})
+    assert results.floors == ["floor_speckle"]
+    text = sentences(results)["bench"]
+    assert "constant" not in text
+    assert "pure speckle scores 9.05 dB; all of the 1 with a score are better on average" in text

@@ -1,0 +1,106 @@
+"""Focal stacks in the report: plane by plane, what one hologram of all planes costs, and a sheet a scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from holobench_eval.report import Results, records_frame
+from holobench_eval.report.charts.figures import _sheets
+from holobench_eval.report.data.scores import parse
+from holobench_eval.report.data.text import wording
+from holobench_eval.report.sections.findings import blur_keys
+from holobench_eval.report.sections.focus import by_plane, sentences
+from holobench_eval.report.sections.tables import leading_scores
+from tests.support import synthetic_study as made
+
+PLANES = {
+    f"{scene}@{plane:g}mm": (scene, plane) for scene in ("shapes", "motorcycle", "room") for plane in (-2.0, 0.0, 2.0)
+}
+SECONDS = {"lens": 2.0, "joint": 5.0, "quick": 0.1}
+
+
+def results_of(quality: dict[str, float], noise: float = 0.2, **changes: Any) -> Results:
+    """A study in which every method has a mean quality, less at the outer planes for the joint hologram."""
+    records = []
+    for label, mean in quality.items():
+        for index, (target, (_, plane)) in enumerate(PLANES.items()):
+            value = mean - (abs(plane) if label == "joint" else 0.0) + noise * (index % 3)
+            scores = {
+                "psnr_linear": value + 1,
+                "psnr_linear_blur1": value + 2,
+                "psnr_linear_infocus": value,
+                "ssim_linear_infocus": 0.5,
+            }
+            described = made.cell(label, target, "bench", measure="focus")
+            records.append(made.record(label, described, scores, seconds=SECONDS[label]))
+    given = {
+        "pairs": tuple((label, "bench") for label in quality),
+        "targets": tuple(PLANES),
+        "headline": "psnr_linear_infocus",
+        "baseline": "lens",
+        "measure": "focus",
+        "planes": PLANES,
+        "stacked": frozenset({"joint"}),
+        "privileged": frozenset(),
+        "reported": {},
+    }
+    layout = made.layout(**(given | changes))
+    return Results(records_frame(records, layout), layout)
+
+
+def lines(text: str) -> list[list[str]]:
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
+
+
+def test_a_table_has_a_column_a_plane_and_the_seconds_of_a_hologram_and_of_a_scene() -> None:
+    header, _, lens, joint = lines(by_plane(results_of({"lens": 20.0, "joint": 19.0}, noise=0.0), "bench"))
+    assert header[2:] == ["-2 mm", "0 mm", "2 mm", "all planes", "seconds a hologram", "seconds a scene"]
+    assert lens[:2] + lens[5:] == ["lens", "one plane", "20.00", "2", "6"]
+    assert joint[1] == "all planes"
+    assert [cell[:5] for cell in joint[2:6]] == ["17.00", "19.00", "17.00", "17.67"]
+    assert joint[6:] == ["5", "5"]
+
+
+def test_the_cost_and_the_loss_of_a_hologram_of_all_planes_are_told() -> None:
+    (told,) = sentences(results_of({"lens": 20.0, "joint": 19.0}), "bench")
+    assert "It takes 5 s, 2.5 times what lens takes for one plane and 0.833 times what lens takes for all" in told
+    assert "it loses in focus: -2.33 [" in told
+    assert "-3.00 dB at -2 mm, -1.00 dB at 0 mm and -3.00 dB at 2 mm" in told
+
+
+def test_a_gain_is_called_a_gain() -> None:
+    (told,) = sentences(results_of({"lens": 20.0, "joint": 24.0}), "bench")
+    assert "it gains in focus: +2.67 [" in told
+
+
+@pytest.mark.parametrize("changes", [{"stacked": frozenset()}, {"baseline": "joint"}, {"baseline": None}])
+def test_without_both_there_is_nothing_to_compare(changes: dict[str, Any]) -> None:
+    assert sentences(results_of({"lens": 20.0, "joint": 19.0}, **changes), "bench") == []
+
+
+def test_other_studies_have_no_such_section() -> None:
+    assert by_plane(results_of({"lens": 20.0}, planes={}), "bench") == ""
+
+
+def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
+    assert parse("psnr_linear_infocus").axis == "PSNR in focus, linear light [dB]"
+    leading = [score.key for score in leading_scores(results_of({"lens": 20.0}))]
+    assert leading[:3] == ["psnr_linear_infocus", "ssim_linear_infocus", "psnr_linear"]
+
+
+def test_blur_is_compared_with_whole_pictures() -> None:
+    assert [score.key for score in blur_keys(results_of({"lens": 20.0}))] == ["psnr_linear", "psnr_linear_blur1"]
+
+
+def test_a_sheet_shows_every_plane_of_a_scene() -> None:
+    pictures = {target: np.zeros((8, 8, 3)) for target in PLANES}
+    sheets = _sheets(results_of({"lens": 20.0}), "bench", pictures)
+    assert [len(sheet) for sheet in sheets] == [3, 3, 3]
+    assert sheets[1] == ["motorcycle@-2mm", "motorcycle@0mm", "motorcycle@2mm"]
+
+
+def test_the_words_say_what_the_display_does() -> None:
+    assert "adds the phase of a lens" in wording("focus", "", False).procedure

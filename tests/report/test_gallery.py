@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from holobench_eval.report.charts.comparison import HEADER, SIDE, draw_comparison, tile_size
+from holobench_eval.report.charts.gallery import (
+    Column,
+    Tile,
+    error_ceiling,
+    error_map,
+    halved,
+    load_picture,
+    most_detailed,
+    spread,
+)
+from holobench_eval.report.charts.style import slugs
+from tests.support import synthetic_study as made
+
+
+def noise(size, seed=0):
+    return np.random.default_rng(seed).integers(0, 256, size=(size, size, 3)) / 255
+
+
+def test_the_enlarged_window_is_the_most_detailed_one():
+    target = np.full((64, 64, 3), 0.5)
+    target[40:52, 8:20] = noise(12)
+    crop = most_detailed(target)
+    assert (crop.height, crop.width) == (16, 16)
+    assert crop.top <= 40
+    assert crop.top + 16 >= 52
+    assert crop.left <= 8
+    assert crop.left + 16 >= 20
+
+
+def test_of_equally_detailed_windows_the_first_is_taken():
+    crop = most_detailed(np.full((32, 48, 3), 0.2))
+    assert (crop.top, crop.left) == (0, 0)
+
+
+def test_an_error_map_drawn_at_half_size_keeps_its_mean():
+    error = error_map(noise(32), noise(32, seed=1))
+    assert halved(error).shape == (16, 16)
+    assert halved(error).mean() == pytest.approx(error.mean())
+
+
+def test_the_error_scale_is_a_round_number_above_most_errors():
+    assert error_ceiling([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
+    assert error_ceiling([np.zeros((4, 4))]) == pytest.approx(0.1)
+    assert error_ceiling([np.ones((4, 4))]) == 1.0
+
+
+def test_targets_of_a_large_study_are_spread_from_first_to_last():
+    assert spread([str(n) for n in range(21)], 5) == ["0", "5", "10", "15", "20"]
+
+
+def test_captures_are_in_the_figure_pixel_by_pixel(tmp_path):
+    target, capture = noise(200), noise(200, seed=1)
+    columns = [Column("method", (Tile(capture, "PSNR 7.00 dB"),))]
+    draw_comparison(tmp_path / "page.png", "bench", [("noise", target)], columns, 0.5)
+    page = load_picture(tmp_path / "page.png")
+    left = SIDE + 200 + 8
+    assert np.abs(page[HEADER : HEADER + 200, left : left + 200] - capture).max() < 1 / 255
+
+
+def test_small_captures_are_enlarged_by_a_whole_factor():
+    assert tile_size((64, 64, 3)) == (192, 192)
+    assert tile_size((150, 100)) == (300, 200)
+    assert tile_size((300, 400)) == (300, 400)
+
+
+def test_an_absent_capture_leaves_a_note_in_its_place(tmp_path):
+    columns = [Column("method", (Tile(None, "failed: the registration residual is too large $x$"),))]
+    draw_comparison(tmp_path / "page.png", "bench", [("noise", noise(64))], columns, 0.5)
+    page = load_picture(tmp_path / "page.png")
+    tile = page[HEADER : HEADER + 192, SIDE + 200 : SIDE + 392]
+    assert 0.85 < np.median(tile) < 0.95
+    assert tile.min() < 0.3
+
+
+def test_gray_thumbnails_are_read_as_colour(tmp_path):
+    made.save_picture(tmp_path / "gray.png", np.full((8, 8), 0.5))
+    assert load_picture(tmp_path / "gray.png").shape == (8, 8, 3)
+    assert load_picture(tmp_path / "absent.png") is None
+
+
+def test_displays_keep_figures_of_their_own_whatever_they_are_called():
+    stems = slugs(["a/b", "a-b", "../../x", "***"])
+    assert len(set(stems.values())) == 4
+    assert all("/" not in stem and not stem.startswith(".") for stem in stems.values())

@@ -1,0 +1,74 @@
+import pytest
+
+from holobench_eval.report import layout_of
+from holobench_eval.report.sections.description import describe
+from holobench_eval.study.config import load_study
+
+PLUGINS = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Cards:
+    def items(self):
+        return ["zebra", "apple"]
+    def digest(self, item):
+        return item
+
+@dataclass(frozen=True)
+class Honest:
+    strength: float = 0.5
+    def solve(self, target, bench):
+        return target
+
+@dataclass(frozen=True)
+class Knowing(Honest):
+    privileged: ClassVar[bool] = True
+
+@dataclass(frozen=True)
+class Seeing(Honest):
+    camera: ClassVar[bool] = True
+"""
+CONFIG = """
+title: Two methods
+seed: 7
+display: {profiles: [ideal, leto-aged], panel: [128, 128]}
+targets: {dataset: "plugins.py:Cards"}
+methods:
+  - {name: "plugins.py:Honest", label: honest}
+  - {name: "plugins.py:Knowing", label: knowing, profiles: [leto-aged]}
+  - {name: "plugins.py:Seeing", label: seeing, profiles: [ideal]}
+headline: ssim_linear
+reported: {source: "a paper, table 3", rows: {honest: {psnr: 17.6}}}
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    (tmp_path / "plugins.py").write_text(PLUGINS)
+    (tmp_path / "study.yaml").write_text(CONFIG)
+    return load_study(tmp_path / "study.yaml")
+
+
+def test_a_layout_holds_what_the_config_orders(study):
+    layout = layout_of(study)
+    assert layout.pairs == (("honest", "ideal"), ("honest", "leto-aged"), ("knowing", "leto-aged"), ("seeing", "ideal"))
+    assert layout.targets == ("zebra", "apple")
+    assert (layout.title, layout.seed, layout.baseline, layout.headline) == ("Two methods", 7, "honest", "ssim_linear")
+    assert layout.privileged == {"knowing"}
+    assert layout.camera == {"seeing"}
+    assert [layout.track(label) for label in layout.methods] == ["open loop", "ceiling", "online"]
+    assert layout.reported_metrics == ("psnr",)
+    assert layout.reported_source == "a paper, table 3"
+
+
+def test_displays_are_described_with_version_scaling_and_the_stages_that_differ_from_the_ideal(study):
+    ideal, aged = describe(study).displays
+    assert "Version 1, sha256 " in ideal.heading
+    assert any("128 x 128" in line for line in ideal.lines)
+    assert not any(line.startswith("crosstalk") for line in ideal.lines)
+    assert any(line.startswith("crosstalk") for line in aged.lines)
+
+
+def test_a_config_outside_the_working_folder_is_named_without_its_folder(study):
+    assert describe(study).config_file == "study.yaml"

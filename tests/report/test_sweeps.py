@@ -1,0 +1,149 @@
+"""What sweeps cost, from made-up scores whose answer is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holobench_eval.report.build import write_report
+from holobench_eval.report.data.layout import Layout, Swept
+from holobench_eval.report.data.results import Results
+from holobench_eval.report.data.sweeps import Sweep, sweeps
+from holobench_eval.report.data.tables import records_frame
+from holobench_eval.report.sections import sweeps as section_sweeps
+from holobench_eval.report.sections.description import Description
+from tests.support import synthetic_study as made
+
+TARGETS = ("a", "b", "c", "d")
+DAYS = (30.0, 60.0, 90.0)
+SHIFTS = (-20.0, -10.0, 10.0, 20.0)
+NAMES = {"Wirtinger": "wirtinger", "HIL": "hil"}
+
+
+def title(kind: str, value: float | str) -> str:
+    return f"leto-aged, {kind} {value}"
+
+
+def psnr(label: str, target: str, kind: str = "", value: float | str = 0.0) -> float:
+    """HIL begins 4 dB above Wirtinger; drift costs it 0.1 dB a day, a shift 0.05 dB a mm, glasses 8 dB."""
+    base = 15.0 + TARGETS.index(target)
+    if label == "Wirtinger":
+        return base
+    lost = {"": 0.0, "drift": 0.1, "camera_shift_x": 0.05}.get(kind, 0.0) * abs(float(value) if kind != "eye" else 0)
+    return base + 4.0 - lost - (8.0 if kind == "eye" else 1.0 if kind == "known_eye" else 0.0)
+
+
+def layout() -> Layout:
+    kinds = {"drift": DAYS, "camera_shift_x": SHIFTS, "eye": ("-2",), "known_eye": ("-2",)}
+    swept = tuple(
+        Swept(kind, "leto-aged", tuple((value, title(kind, value)) for value in values))
+        for kind, values in kinds.items()
+    )
+    conditions = ["leto-aged", *(name for one in swept for _, name in one.points)]
+    return made.layout(
+        pairs=tuple((label, condition) for label in NAMES for condition in conditions),
+        targets=TARGETS,
+        privileged=frozenset(),
+        reported={},
+        sweeps=swept,
+    )
+
+
+def records() -> list[made.Record]:
+    found = []
+    points = [("", 0.0, "leto-aged")]
+    points += [(one.kind, value, name) for one in layout().sweeps for value, name in one.points]
+    for label, name in NAMES.items():
+        for target in TARGETS:
+            for kind, value, condition in points:
+                described = made.cell(name, target, condition, profile="leto-aged")
+                scores = {"psnr_linear": psnr(label, target, kind, value)}
+                found.append(made.record(label, described, scores))
+    return found
+
+
+@pytest.fixture
+def results() -> Results:
+    return Results(records_frame(records(), layout()), layout())
+
+
+def of(results: Results, kind: str) -> Sweep:
+    return next(sweep for sweep in sweeps(results) if sweep.swept.kind == kind)
+
+
+def test_changed_displays_have_no_tables_of_their_own(results: Results) -> None:
+    assert results.conditions == ["leto-aged"]
+
+
+def test_losses_are_told_target_by_target_and_by_unit(results: Results) -> None:
+    drift = of(results, "drift")
+    value, loss = drift.worst("HIL") or pytest.fail("no loss")
+    assert (value, loss.mean, loss.low, loss.high) == pytest.approx((90, 9, 9, 9))
+    assert drift.sides == [1]
+    slope = drift.slope("HIL", 1)
+    assert slope is not None
+    assert slope.mean == pytest.approx(3)  # dB in 30 days
+    assert (drift.slope("Wirtinger", 1) or slope).mean == pytest.approx(0)
+    shift = of(results, "camera_shift_x")
+    assert shift.sides == [-1, 1]
+    assert "loss per 1 mm below [dB]" in section_sweeps.losses(shift)
+
+
+def test_an_advantage_ends_between_the_points_on_either_side(results: Results) -> None:
+    assert of(results, "drift").break_even("HIL") == [pytest.approx(40)]
+    assert of(results, "camera_shift_x").break_even("HIL") == []
+    assert "40 days" in section_sweeps.losses(of(results, "drift"))
+    assert "nowhere in this range" in section_sweeps.losses(of(results, "camera_shift_x"))
+
+
+def test_the_range_of_small_losses_reaches_to_the_last_point_within_it(results: Results) -> None:
+    assert of(results, "camera_shift_x").small_range("HIL") == (-20, 20)
+    assert of(results, "drift").small_range("HIL") == (0, 0)
+
+
+def test_points_stand_in_order_with_the_unchanged_display_among_them(results: Results) -> None:
+    assert [value for value, _ in of(results, "camera_shift_x").points] == [-20, -10, 0, 10, 20]
+
+
+def test_what_a_remedy_gets_back_is_told_as_a_share(results: Results) -> None:
+    (share,) = of(results, "eye").recovered("HIL", of(results, "known_eye")).values()
+    assert share.mean == pytest.approx(7 / 8)
+    assert of(results, "eye").recovered("Wirtinger", of(results, "known_eye")) == {}  # it lost nothing
+    told = section_sweeps.sentences(of(results, "eye"), sweeps(results))
+    assert any("88 %" in sentence for sentence in told)
+
+
+def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> None:
+    told = section_sweeps.claims(results, sweeps(results))
+    assert "three months does not hold here for HIL" in told
+    assert "4 cm for HIL cannot be told (camera moved sideways): the sweep does not go so far" in told
+    assert "goes from +4.00 to -5.00 dB" in told
+    without = Results(results.frame[results.frame["name"] != "hil"], replace(layout(), pairs=()))
+    assert section_sweeps.claims(without, sweeps(without)) == ""
+
+
+def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Results) -> None:
+    frame = results.frame.copy()
+    hole = (frame["method"] == "HIL") & (frame["condition"] == title("drift", 90.0)) & (frame["target"] == "b")
+    frame.loc[hole, "state"] = "failed"
+    frame.loc[hole, "psnr_linear"] = np.nan
+    holed = Results(frame, layout())
+    drift = of(holed, "drift")
+    assert drift.slope("HIL", 1) is None
+    assert drift.break_even("HIL") is None
+    assert of(holed, "camera_shift_x").slope("HIL", 1) is not None
+    assert "three months for HIL cannot be told" in section_sweeps.claims(holed, sweeps(holed))
+    assert "–" in section_sweeps.scores(drift)
+
+
+def test_a_report_with_sweeps_has_curves_and_tables(tmp_path: Path, results: Results) -> None:
+    path = write_report(layout(), records(), tmp_path, {}, Description())
+    text = path.read_text()
+    assert "## Changes of the displays" in text
+    assert "### Drift since calibration: leto-aged" in text
+    assert "loss per 30 days [dB]" in text
+    for kind in ("drift", "camera_shift_x", "eye", "known_eye"):
+        assert (tmp_path / "figures" / f"quality-sweep-{kind}.png").stat().st_size > 5000

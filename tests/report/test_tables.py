@@ -1,0 +1,187 @@
+import io
+import random
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.report import Results, csv_text, read_records, recompute_table, records_frame, table_from_records
+from holobench_eval.report.sections.tables import timing
+from holobench_eval.study.plan import FLOORS, REFERENCE
+from tests.support import synthetic_study as made
+
+PLAIN = made.layout(
+    pairs=(("b", "bench"), ("a", "bench")), targets=("t2", "t1"), baseline="b", reported={}, privileged=frozenset()
+)
+
+
+def rows(values, label="a", repeats=1, **changes):
+    """Done records of a method, a value of psnr_linear per target and repeat."""
+    return [
+        made.record(label, made.cell(label, target, "bench", repeat=repeat), {"psnr_linear": value + repeat}, **changes)
+        for target, value in values.items()
+        for repeat in range(repeats)
+    ]
+
+
+def row_of(table, label):
+    return table[table["method"] == label].iloc[0]
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    return made.study(tmp_path_factory.mktemp("study"), size=32, targets=made.TARGETS[:3])
+
+
+def test_equal_records_give_equal_bytes_in_any_order(records):
+    shuffled = random.Random(0).sample(records, len(records))
+    frame, again = (records_frame(order, made.layout()) for order in (records, shuffled))
+    assert csv_text(frame) == csv_text(again)
+    assert csv_text(table_from_records(frame, made.layout())) == csv_text(table_from_records(again, made.layout()))
+
+
+def test_table_computed_from_the_written_records_has_the_same_bytes(records):
+    frame = records_frame(records, made.layout())
+    written = csv_text(table_from_records(frame, made.layout()))
+    assert recompute_table(csv_text(frame), made.layout()) == written
+
+
+def test_rows_follow_the_config_and_end_with_the_floor(records):
+    table = table_from_records(records_frame(records, made.layout()), made.layout())
+    found = list(zip(table["method"], table["condition"], strict=True))
+    assert found == [*made.layout().pairs, *((name, REFERENCE) for name in FLOORS)]
+
+
+def test_targets_keep_the_order_of_the_dataset():
+    frame = records_frame(rows({"t1": 1.0, "t2": 2.0}), PLAIN)
+    assert list(frame["target"]) == ["t2", "t1"]
+
+
+def test_a_failed_cell_is_counted_and_is_in_no_mean(records):
+    table = table_from_records(records_frame(records, made.layout()), made.layout())
+    row = table[(table["method"] == "GS") & (table["condition"] == "leto-aged")].iloc[0]
+    assert (row["n"], row["failed"]) == (2, 1)
+
+
+def test_a_method_that_is_unavailable_keeps_its_row():
+    lost = rows({"t1": 0.0, "t2": 0.0}, label="b", state="unavailable", reason="needs a camera")
+    table = table_from_records(records_frame([*lost, *rows({"t1": 1.0, "t2": 2.0})], PLAIN), PLAIN)
+    assert (row_of(table, "b")["n"], row_of(table, "b")["failed"]) == (0, 2)
+    assert np.isnan(row_of(table, "b")["psnr_linear"])
+
+
+def test_repeats_are_averaged_within_a_target_first():
+    several = [*rows({"t1": 10.0}, repeats=3), *rows({"t2": 20.0})]
+    row = row_of(table_from_records(records_frame(several, PLAIN), PLAIN), "a")
+    assert row["n"] == 2
+    assert row["psnr_linear"] == pytest.approx((11.0 + 20.0) / 2)
+
+
+def test_a_metric_that_some_targets_lack_has_no_mean():
+    partial = rows({"t1": 10.0, "t2": 20.0})
+    partial[0]["scores"] |= {"ssim_linear": 0.5, "speckle_contrast": 0.3}
+    row = row_of(table_from_records(records_frame(partial, PLAIN), PLAIN), "a")
+    assert np.isnan(row["ssim_linear"])
+    assert row["speckle_contrast"] == 0.3
+
+
+def test_numbers_have_six_significant_digits():
+    text = csv_text(records_frame(rows({"t1": 12.3456789}, seconds=1 / 3), PLAIN))
+    assert ",12.3457," in text
+    assert ",0.333333," in text
+
+
+ALONE = {"t1": (5.0, False), "t2": (3.0, True)}
+"""Seconds of each target, and whether they were measured alone."""
+
+
+def timed(label="a", alone=ALONE):
+    return [
+        made.record(label, made.cell(label, target, "bench"), {"psnr_linear": 1.0}, seconds=seconds, alone=quiet)
+        for target, (seconds, quiet) in alone.items()
+    ]
+
+
+def test_the_seconds_of_a_row_are_those_of_what_was_timed_alone_if_anything_was():
+    frame = records_frame([*timed(), *timed("b", {"t1": (5.0, False), "t2": (3.0, False)})], PLAIN)
+    table = table_from_records(frame, PLAIN)
+    assert row_of(table, "a")["seconds"] == 3.0
+    assert row_of(table, "b")["seconds"] == 4.0
+    assert recompute_table(csv_text(frame), PLAIN) == csv_text(table)
+
+
+def test_records_that_do_not_say_what_was_beside_them_have_no_column_for_it_and_all_their_seconds_count():
+    old = [{key: value for key, value in record.items() if key != "alone"} for record in timed()]
+    frame = records_frame(old, PLAIN)
+    assert "timed_alone" not in frame
+    assert row_of(table_from_records(frame, PLAIN), "a")["seconds"] == 4.0
+
+
+SHARED = {"t1": (5.0, False), "t2": (3.0, False)}
+ALL = {"t1": (5.0, True), "t2": (3.0, True)}
+BESIDE = "holograms computed 2 side by side, which disturb each other"
+SENTENCES = [
+    (timed(), "The seconds are of one hologram a row, computed with nothing beside it."),
+    (
+        [*timed(), *timed("b", SHARED)],
+        f"The seconds are of one hologram a row, computed with nothing beside it; those of b on bench are of {BESIDE}.",
+    ),
+    (
+        [*timed("a", SHARED), *timed("b", ALL)],
+        "The seconds are of those holograms of a row that were computed with nothing beside them; those of a on bench "
+        f"are of {BESIDE}.",
+    ),
+    (timed("a", SHARED), f"The seconds are of {BESIDE}."),
+    (timed("a", ALL), "Each hologram was computed with nothing beside it."),
+    (rows({"t1": 1.0}), f"The seconds are of {BESIDE}."),
+]
+
+
+@pytest.mark.parametrize(("found", "sentence"), SENTENCES)
+def test_the_report_says_what_was_at_work_beside_what_was_timed(found, sentence):
+    assert timing(Results(records_frame(found, PLAIN), PLAIN), workers=2) == sentence
+
+
+def test_nothing_is_said_of_records_that_a_single_worker_left_without_a_note():
+    assert timing(Results(records_frame(rows({"t1": 1.0}), PLAIN), PLAIN), workers=1) == ""
+
+
+def test_published_figures_have_columns_of_their_own(records):
+    table = table_from_records(records_frame(records, made.layout()), made.layout())
+    assert row_of(table, "HIL")["reported_psnr"] == 20.5
+    assert np.isnan(row_of(table, "GS")["reported_psnr"])
+    assert row_of(table, "HIL")["psnr_linear"] != 20.5
+
+
+@pytest.mark.parametrize("label", ["NA", "nan", "a,b", 'say "x"', "1e5", " padded ", "é"])
+def test_labels_survive_being_written_and_read(label):
+    layout = made.layout(pairs=((label, "bench"),), targets=("t1",), reported={})
+    text = csv_text(records_frame(rows({"t1": 1.0}, label=label), layout))
+    assert list(read_records(text)["method"]) == [label]
+    assert csv_text(read_records(text)) == text
+
+
+def test_a_reason_with_line_breaks_stays_on_its_row():
+    frame = records_frame(rows({"t1": 1.0}, state="failed", reason="first\nsecond,\r\nthird"), PLAIN)
+    read = pd.read_csv(io.StringIO(csv_text(frame)))
+    assert list(read["reason"]) == ["first second, third"]
+
+
+def test_a_score_named_like_a_column_is_refused():
+    bad = rows({"t1": 1.0})
+    bad[0]["scores"]["seconds"] = 1.0
+    with pytest.raises(UserError, match="seconds"):
+        records_frame(bad, PLAIN)
+
+
+def test_records_of_another_version_are_refused():
+    with pytest.raises(UserError, match="lacks the columns"):
+        read_records("method,target\na,b\n")
+
+
+def test_published_figures_stand_beside_the_display_they_belong_to(records):
+    layout = made.layout(reported_beside=made.layout().conditions[0])
+    table = table_from_records(records_frame(records, layout), layout)
+    beside = table[table["reported_psnr"].notna()]
+    assert set(beside["condition"]) == {layout.conditions[0]}

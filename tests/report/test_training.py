@@ -1,0 +1,258 @@
+import csv
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+from holobench_eval.core.hashing import digest
+from holobench_eval.report import csv_text, recompute_table, records_frame, table_from_records, write_report
+from holobench_eval.report.charts.training import CURVES, draw_trainings
+from holobench_eval.report.data.layout import TrainingSet
+from holobench_eval.report.sections.description import Description
+from holobench_eval.study.training_log import Round, rounds_in, rounds_of
+from tests.support import synthetic_study as made
+
+TARGETS = made.TARGETS[1:4]
+PAIRS = (("GS", "leto-aged"), ("HIL", "leto-aged"), ("U-Net", "leto-aged"))
+TRAINING = TrainingSet("dead_leaves (count = 24, seed = 0)", 24, 4, 200)
+COLUMNS = "round,step,predicted_psnr,captured_psnr,fidelity_psnr,captures,seconds,l1,perceptual,adversarial,total,judge"
+LOG = f"""{COLUMNS}
+1,100,,,,12,30.1,0.09,0.2,0.7,2.1,0.6
+1,600,20.5,12.7,14.7,16,120.2,,,,,
+2,100,,,,20,130.1,0.08,0.2,0.7,2.0,0.6
+2,300,21.25,15.5,18.125,24,200.2,,,,,
+"""
+
+
+def layout(**changes):
+    given = {"targets": TARGETS, "pairs": PAIRS, "reported": {}, "baseline": "GS", "privileged": frozenset()}
+    return made.layout(**(given | {"trained": frozenset({"HIL", "U-Net"}), "training": TRAINING} | changes))
+
+
+def description(method):
+    return {"method": method, "profile": "leto-aged", "params": {}}
+
+
+def trained(record, method, **learned):
+    """The record of a method that was trained."""
+    cell = record["cell"] | {"method": method, "prepared": [digest(description(method))]}
+    given = {"sha256": method * 16, "captures": 140, "seconds": 3600.5} | learned
+    return record | {"cell": cell, "learned": given if record["state"] == "done" else None}
+
+
+def keep(output, name, log=LOG, **facts):
+    folder = output / "training"
+    folder.mkdir(exist_ok=True)
+    provenance = {"description": description(name), "sha256": name * 16, "captures": 140, "seconds": 3600.5, **facts}
+    (folder / f"{name}.json").write_text(json.dumps(provenance))
+    (folder / f"{name}.csv").write_text(log)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    records = []
+    for record in made.study(folder, size=32, targets=TARGETS):
+        if record["label"] in ("HIL", "SGD") and record["cell"]["condition"] == "leto-aged":
+            label, method = {"HIL": ("HIL", "hil"), "SGD": ("U-Net", "unet")}[record["label"]]
+            records.append(trained(record | {"label": label}, method))
+        elif record["label"] == "GS" and record["cell"]["condition"] == "leto-aged":
+            records.append(record | {"learned": None})
+        elif record["cell"]["condition"] == made.REFERENCE:
+            records.append(record)
+    return records
+
+
+def written(found, tmp_path, **changes):
+    return write_report(layout(**changes), found, tmp_path, {}, Description()).read_text()
+
+
+def rows_under(text, heading):
+    part = text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in part.splitlines() if line[:1] == "|"]
+
+
+def test_captures_for_training_are_told_apart_from_those_while_solving(found, tmp_path):
+    last = max(index for index, record in enumerate(found) if record["label"] == "HIL")
+    lost = trained(found[last] | {"state": "failed", "reason": "x", "scores": {}}, "hil")
+    frame = records_frame([*found[:last], lost, *found[last + 1 :]], layout())
+    took = frame[frame["state"] == "done"].groupby("method")[["captures", "training_captures", "training_seconds"]]
+    assert took.mean().loc["HIL"].tolist() == [50, 140, 3600.5]
+    assert took.mean().loc["GS"].tolist() == [0, 0, 0]
+    holes = frame[frame["state"] == "failed"]
+    assert len(holes) == 2
+    assert holes["training_captures"].isna().all()
+    table = table_from_records(frame, layout())
+    assert table.set_index("method").loc["HIL", "learned_sha256"] == "hil" * 16
+    assert recompute_table(csv_text(frame), layout()) == csv_text(table)
+
+    text = written(found, tmp_path)
+    header, _, *rows = rows_under(text, "Captures, time and light")
+    row = dict(zip(header, next(row for row in rows if row[0] == "HIL"), strict=True))
+    assert row["captures for training"] == "140"
+    assert row["captures per target while solving"] == "50"
+
+
+def test_a_study_without_training_has_neither_its_columns_nor_its_section(found, tmp_path):
+    plain = [record for record in found if record["label"] not in ("HIL", "U-Net")]
+    text = written(plain, tmp_path, trained=frozenset(), training=None, pairs=PAIRS[:1])
+    assert "raining" not in text
+    for name in ("records.csv", "table.csv"):
+        assert "training" not in (tmp_path / name).read_text().splitlines()[0]
+
+
+def test_every_round_is_listed_with_its_figures_on_held_out_images(found, tmp_path):
+    keep(tmp_path, "hil", perceptual="oriented filters")
+    keep(tmp_path, "unet")
+    text = written(found, tmp_path)
+    assert "| HIL | leto-aged | 140 | 3600 | 20 | 4 | 2 | oriented filters | hilhilhilh |" in text
+    assert "| HIL | 1 | 16 | 120 | 20.50 | 12.70 | 14.70 |" in text
+    assert "| U-Net | 2 | 24 | 200 | 21.25 | 15.50 | 18.12 |" in text
+    assert "(figures/training-1.png)" in text
+    assert (tmp_path / "figures" / "training-1.png").is_file()
+    for phrase in (
+        "HIL and U-Net are trained on captures of a display before any target is seen.",
+        "The 24 training images come from the dataset dead_leaves (count = 24, seed = 0); 4 of them",
+        "none may take more than 200 captures",
+        "Training images are never scored",
+        "Each of the 2 trainings took 140 captures",
+    ):
+        assert phrase in text, phrase
+
+
+def test_a_training_that_is_not_beside_the_report_or_not_the_right_one_is_said(found, tmp_path):
+    keep(tmp_path, "hil", sha256="another")
+    text = written(found, tmp_path)
+    assert "The figures for HIL here are of another training than its scores come from." in text
+    assert "Nothing is known of the training of U-Net" in text
+    assert "| U-Net | leto-aged | – | – | 20 | 4 | – | not trained |" in text
+
+
+def test_scores_of_two_trainings_in_one_row_are_said(found, tmp_path):
+    keep(tmp_path, "hil")
+    first = next(index for index, record in enumerate(found) if record["label"] == "HIL")
+    mixed = [*found[:first], trained(found[first], "hil", sha256="other"), *found[first + 1 :]]
+    assert "The scores of HIL come from 2 different trainings." in written(mixed, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "log",
+    ["", "a,b\n1,2\n", "round,step\nx,y\n", "round\n1\n1,2,3,4\n", "\x00", "round,predicted_psnr\n1,nan\ninf,3\n"],
+)
+def test_logs_of_strangers_show_nothing_and_stop_nothing(found, tmp_path, log):
+    keep(tmp_path, "hil", log=log)
+    (tmp_path / "training" / "broken.json").write_text("{")
+    (tmp_path / "training" / "list.json").write_text("[]")
+    text = written(found, tmp_path)
+    assert "No figures on held-out images were logged." in text
+    assert not list((tmp_path / "figures").glob("training-*.png"))
+
+
+def test_a_round_is_the_last_figure_of_every_kind(tmp_path):
+    first, second = rounds_in(csv.DictReader(LOG.splitlines()))
+    assert first == Round(1, 16, 120.2, 20.5, 12.7, 14.7)
+    assert second == Round(2, 24, 200.2, 21.25, 15.5, 18.125)
+    assert rounds_of(tmp_path / "absent.csv") == ()
+    (lone,) = rounds_in([{"round": "3", "captures": "7"}])
+    assert (lone.captures, math.isnan(lone.fidelity)) == (7, True)
+
+
+def test_many_trainings_are_one_chart_and_few_have_a_panel_each(tmp_path):
+    rounds = rounds_in(csv.DictReader(LOG.splitlines()))
+    few = draw_trainings(tmp_path / "few", [(f"m{index}", rounds) for index in range(7)])
+    assert [(path.name, curves) for path, curves in few] == [("few-1.png", True), ("few-2.png", True)]
+    many = draw_trainings(tmp_path / "many", [(f"m{index}", rounds) for index in range(CURVES + 1)])
+    assert [(path.name, curves) for path, curves in many] == [("many-last.png", False)]
+    assert draw_trainings(tmp_path / "none", [("m", ())]) == []
+
+
+def prediction(**changes):
+    return {
+        "measure": "prediction",
+        "holograms": "wirtinger (iterations = 200)",
+        "pairs": PAIRS[1:],
+        "baseline": "HIL",
+    } | changes
+
+
+def test_a_prediction_study_never_speaks_of_picture_quality(found, tmp_path):
+    records = [record for record in found if record["label"] != "GS"]
+    text = written(records, tmp_path / "report", **prediction())
+    for phrase in (
+        "captures are predicted most closely by: HIL",
+        "It says nothing about how good a picture is",
+        "The patterns are holograms of the targets by wirtinger, the same for all methods.",
+        "predictions of the captures of holograms by wirtinger (iterations = 200)",
+        "| in the place of a prediction |",
+        "the mirrored capture",
+        "the capture of the wrong target",
+        "after prediction and capture are blurred alike",
+        "mean of the prediction over mean of the capture",
+    ):
+        assert phrase in text, phrase
+    for phrase in ("Best of", "the best is", "shown instead of a capture", "captures while solving", "is refused."):
+        assert phrase not in text.replace("a study in which one is a target is refused.", ""), phrase
+
+
+def test_predictions_on_another_display_are_not_set_beside_captures_of_the_first(found, tmp_path):
+    records = [record for record in found if record["label"] != "GS"]
+    elsewhere = [
+        record | {"cell": record["cell"] | {"profile": "other"}}
+        if record["cell"]["condition"] == made.REFERENCE
+        else record
+        for record in records
+    ]
+    text = written(elsewhere, tmp_path, **prediction())
+    assert "Floor:" not in text
+    assert "comparison-" not in text
+
+
+def test_a_learned_display_claims_no_camera(found, tmp_path):
+    name = "hil trained on leto-aged"
+    moved = [
+        record | {"cell": record["cell"] | {"condition": name, "profile": name}}
+        for record in found
+        if record["label"] == "HIL"
+    ]
+    keep(tmp_path, "hil")
+    text = written(
+        moved, tmp_path, pairs=(("HIL", name),), learned_display=name, trained=frozenset({"HIL"}), baseline=None
+    )
+    for phrase in ("circle grid", "refused.", "saturated samples", "Stages of", "simulated benches"):
+        assert phrase not in text.replace("a study in which one is a target is refused.", ""), phrase
+    for phrase in (
+        "| HIL and the display itself | leto-aged | 140 |",
+        "**Saturation.** None: there is no sensor.",
+        "**Registration.** None:",
+        "A learned display has no noise",
+        "HIL solves through the very network that is the display here, and so knows it exactly.",
+    ):
+        assert phrase in text, phrase
+
+
+def test_the_note_of_a_study_stands_behind_its_table_as_text(found, tmp_path):
+    text = written(found, tmp_path, note="Weights *as drawn*.\n\n# No heading | no table")
+    place = text.index("Weights \\*as drawn\\*. # No heading \\| no table")
+    assert text.index("\n## Results\n") < place < text.index("\n### The floor\n")
+
+
+def test_hostile_names_in_a_training_stay_text(found, tmp_path):
+    evil = "<img src=x onerror=alert(1)> | [l](javascript:1)"
+    keep(tmp_path, "hil", perceptual=evil)
+    text = written(found, tmp_path)
+    assert "<img" not in text
+    assert not re.search(r"(?<!\\)\]\(javascript", text)
+
+
+def test_two_reports_of_one_training_have_equal_bytes(found, tmp_path):
+    reports = []
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        keep(tmp_path / name, "hil", made=name)
+        written(found, tmp_path / name)
+        kept = [path for path in sorted((tmp_path / name).rglob("*")) if path.is_file() and path.suffix != ".json"]
+        reports.append([path.read_bytes() for path in kept])
+    assert len(reports[0]) > 4
+    assert np.all([a == b for a, b in zip(*reports, strict=True)])

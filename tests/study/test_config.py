@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.study.config import load_study
+
+DATASETS = """
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from annotated_types import Interval
+
+
+@dataclass(frozen=True)
+class Images:
+    count: Annotated[int, Interval(ge=0)] = 2
+
+    def items(self):
+        return [f"image {i}" for i in range(self.count)]
+
+
+@dataclass(frozen=True)
+class Training(Images):
+    training: ClassVar[bool] = True
+"""
+
+FULL = """\
+title: "A study"
+seed: 7
+display:
+  profiles: [ideal]
+  panel: [128, 256]
+  exposure: matched
+targets: {dataset: "sets.py:Images", params: {count: 3}}
+methods:
+  - wirtinger
+  - {name: gerchberg_saxton, label: "GS", params: {iterations: 12}, profiles: [ideal]}
+repeats: 2
+baseline: GS
+headline: ssim_srgb
+save: {captures: true}
+reported: {source: "a paper", rows: {GS: {psnr: 17.6}}}
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    (folder / "sets.py").write_text(DATASETS)
+    path = folder / "study.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_a_complete_config_becomes_a_study(tmp_path: Path) -> None:
+    study = load_study(write(tmp_path, FULL))
+    assert (study.title, study.seed, study.repeats, study.baseline) == ("A study", 7, 2, "GS")
+    assert study.display.panel == (128, 256)
+    assert study.display.exposure == "matched"
+    assert study.labels == ("wirtinger", "GS")
+    assert study.targets.params == {"count": 3}
+    assert study.save.captures
+    assert not study.save.phases
+    assert study.name == "study"
+    assert study.text == FULL
+
+
+def test_defaults_are_filled_in(tmp_path: Path) -> None:
+    text = "title: t\ndisplay: {profiles: [ideal]}\ntargets: {dataset: 'sets.py:Images'}\nmethods: [wirtinger]\n"
+    study = load_study(write(tmp_path, text))
+    assert study.baseline == "wirtinger"
+    assert study.methods[0].profiles == ("ideal",)
+    assert study.methods[0].params["iterations"] == 200
+    assert study.display.panel is None
+    assert study.reported is None
+
+
+CHANGES = [
+    ("seed: 7", "sede: 7", "2:1: unknown key 'sede' in the document; did you mean 'seed'?"),
+    ("seed: 7", "seed: -1", "2:7: seed should be greater than or equal to 0, got -1"),
+    ("seed: 7", "seed: 1.5", "2:7: seed should be a whole number"),
+    ("seed: 7", "seed: .nan", "2:7: '.nan' is not a finite number"),
+    ("seed: 7", "seed: yes", '2:7: seed should be a whole number, got "yes"'),
+    ("seed: 7", "file: x", "2:1: unknown key 'file'"),
+    ('title: "A study"\n', "", "1:1: missing key 'title'"),
+    ("profiles: [ideal]\n", "profiles: []\n", "4:13: display.profiles"),
+    ("profiles: [ideal]\n", "profiles: [idel]\n", "4:14: unknown profile 'idel'; did you mean 'ideal'?"),
+    ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n", "4:21: 'ideal' and 'ideal' are both named 'ideal'"),
+    ("profiles: [ideal]\n", "profiles: [absent.yaml]\n", "4:14: profile 'absent.yaml': no such file"),
+    ("profiles: [ideal]\n", "profiles: ideal\n", "4:13: display.profiles should be a list"),
+    ("panel: [128, 256]", "panel: [32, 256]", "5:11: display.panel[0] should be greater than or equal to 64, got 32"),
+    ("panel: [128, 256]", "panel: [128, 9000]", "5:16: display.panel[1] should be less than or equal to 8192"),
+    ("panel: [128, 256]", "panel: [128]", "5:10: display.panel has too few values"),
+    ("panel: [128, 256]", "panel: [128, 1, 1]", "5:10: display.panel tuple should have at most 2 items"),
+    ("panel: [128, 256]", "panel: [64, 64]", "5:10: 'ideal' scores a window of 52 x 52 pixels"),
+    ("exposure: matched", "exposure: bright", "6:13: display.exposure should be 'equal' or 'matched'"),
+    ("sets.py:Images", "phtographs", "7:20: unknown dataset 'phtographs'; did you mean 'photographs'?"),
+    ("sets.py:Images", "sets.py:Training", "7:20: dataset 'sets.py:Training' holds training images"),
+    ("sets.py:Images", "gone.py:Images", "7:20: dataset 'gone.py:Images': no such file"),
+    ("count: 3", "cuont: 3", "7:47: dataset 'sets.py:Images' has no parameter 'cuont'; did you mean 'count'?"),
+    ("count: 3", "count: -3", "7:54: dataset 'sets.py:Images': parameter 'count'"),
+    ("count: 3", "count: 0", "7:20: dataset 'sets.py:Images' has no images"),
+    ("- wirtinger", "- wirtinker", "9:5: unknown method 'wirtinker'; did you mean 'wirtinger'?"),
+    ("- wirtinger", "- 3", "9:5: methods[0] should be a mapping"),
+    ("- wirtinger", "- {label: x}", "9:5: missing key 'name' in methods[0]"),
+    ("iterations: 12", "itterations: 12", "10:52: method 'gerchberg_saxton' has no parameter 'itterations'"),
+    ("iterations: 12", "iterations: 0", "10:64: method 'gerchberg_saxton': parameter 'iterations': input should be"),
+    ("iterations: 12", "iterations: many", "10:64: method 'gerchberg_saxton': parameter 'iterations'"),
+    ("params: {iterations: 12}", "parms: {}", "10:43: unknown key 'parms' in methods[1]; did you mean 'params'?"),
+    ("profiles: [ideal]}", "profiles: [idael]}", "10:80: 'idael' is not in display.profiles; did you mean 'ideal'?"),
+    ('label: "GS"', "label: wirtinger", "10:37: methods[1] and methods[0] share the label 'wirtinger'"),
+    ('label: "GS"', "label: floor_black", "10:37: label 'floor_black' should be"),
+    ('label: "GS"', 'label: "a\\nb"', "10:37: label 'a\\nb' should be printable"),
+    ("repeats: 2", "timing: serial", "11:9: timing should be 'shared' or 'alone', got \"serial\""),
+    ("repeats: 2", "repeats: 0", "11:10: repeats should be greater than or equal to 1"),
+    ("baseline: GS", "baseline: gs", "12:11: no method has the label 'gs'; "),
+    ("headline: ssim_srgb", "headline: ssim_sgrb", "13:11: unknown metric 'ssim_sgrb'; did you mean 'ssim_srgb'?"),
+    ("captures: true", "captures: 1", "14:18: save.captures should be a valid boolean"),
+    ("GS: {psnr", "gS: {psnr", "15:38: no method has the label 'gS'"),
+    ("rows: {GS", "beside: idael, rows: {GS", "15:39: 'idael' is not in display.profiles; did you mean 'ideal'?"),
+    ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
+    ("repeats: 2", "protocol: {version: v2}", "11:21: protocol.version should be 'v1'"),
+    ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),
+    ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
+    ("headline: ssim_srgb", "headline: ms_ssim_linear", "13:11: 'ideal' scores 104 x 208 pixels; ms_ssim needs 161"),
+    ("repeats: 2", "protocol: {metrics: [psnr]}", "11:21: the headline is 'ssim_srgb'; add ssim to the metrics, or "),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), CHANGES)
+def test_a_mistake_is_one_line_at_its_place(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in FULL
+    path = write(tmp_path, FULL.replace(old, new, 1))
+    with pytest.raises(UserError) as caught:
+        load_study(path)
+    assert str(caught.value).startswith(f"{path}:{message}")
+    assert "\n" not in str(caught.value)
+
+
+def test_one_method_twice_with_the_same_parameters_is_refused(tmp_path: Path) -> None:
+    text = FULL.replace("- wirtinger", "- {name: gerchberg_saxton, params: {iterations: 12}}")
+    with pytest.raises(UserError, match=r"study\.yaml:10:5: methods\[1\] has the method, parameters and display"):
+        load_study(write(tmp_path, text))
+
+
+def test_a_missing_config_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"absent\.yaml: cannot be read: No such file"):
+        load_study(tmp_path / "absent.yaml")

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import weakref
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holobench_eval.study import cost
+
+LARGE = 48
+LINUX = pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
+
+
+def touched(mib: int) -> float:
+    """Fill so many MiB and let go of them."""
+    return float(np.ones(mib * 2**17).sum())
+
+
+@LINUX
+def test_the_peak_counts_and_not_what_is_left_at_the_end() -> None:
+    watch = cost.start()
+    touched(LARGE)
+    taken = watch.stop()
+    assert taken.memory_mib is not None
+    assert LARGE - 2 < taken.memory_mib < LARGE + 16
+    assert taken.seconds > 0
+
+
+@LINUX
+def test_an_earlier_peak_is_forgotten_and_held_memory_is_not_counted() -> None:
+    held = np.ones(LARGE * 2**17)
+    touched(LARGE)
+    watch = cost.start()
+    touched(4)
+    taken = watch.stop()
+    assert held.any()
+    assert taken.memory_mib is not None
+    assert taken.memory_mib < LARGE / 2
+
+
+@LINUX
+def test_memory_that_was_let_go_before_counts_when_it_is_taken_again() -> None:
+    pieces = [np.ones(2**13) for _ in range(LARGE * 16)]  # small, so that the allocator keeps them
+    del pieces
+    watch = cost.start()
+    pieces = [np.ones(2**13) for _ in range(LARGE * 16)]
+    taken = watch.stop()
+    assert len(pieces) == LARGE * 16
+    assert taken.memory_mib is not None
+    assert taken.memory_mib > LARGE / 2
+
+
+def test_without_the_linux_files_time_is_measured_and_memory_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cost, "PROCESS", tmp_path / "nowhere")
+    taken = cost.start().stop()
+    assert taken.memory_mib is None
+    assert taken.seconds >= 0
+
+
+class Node:
+    """Something that can hold itself."""
+
+    own: Node
+
+
+def test_what_a_solution_left_in_circles_is_let_go_before_the_next() -> None:
+    cost.start().stop()
+    left = Node()
+    left.own = left
+    seen = weakref.ref(left)
+    del left
+    cost.start().stop()
+    assert seen() is None

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from holobench_eval.commands.preview import Row, preview, table
+from holobench_eval.study import plan as planning
+from holobench_eval.study.config import load_study
+from holobench_eval.study.progress import Lines, watching
+from holobench_eval.study.store import Record, Store
+from tests.study.test_run import compute
+from tests.support.fake_study import write_config
+
+
+def failed(task: planning.Task) -> list[Record]:
+    return [Record(cell.description(), "failed", task.label, "no [light]") for cell in task.cells]
+
+
+def test_plain_lines_come_at_most_every_few_seconds(tmp_path: Path) -> None:
+    tasks = planning.plan(load_study(write_config(tmp_path))).tasks
+    now = [0.0]
+    lines: list[str] = []
+    watch = Lines(lines.append, clock=lambda: now[0])
+    watch.planned(100, 60)
+    for task in tasks * 10:
+        watch.started(task)
+        now[0] += 1.0
+        watch.finished([])
+    assert lines[0] == "60 of 100 cells to compute"
+    assert len(lines) == 1 + 60 // 5 - 1
+
+
+def test_a_failure_is_told_at_once_and_counted(tmp_path: Path) -> None:
+    task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
+    lines: list[str] = []
+    watch = Lines(lines.append)
+    watch.planned(1, 1)
+    watch.finished(failed(task))
+    assert lines[-1] == "failed: Toy · ideal · gray 2: no [light]"
+    assert watch.failures == 1
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_console_shows_failures_whatever_it_is(tmp_path: Path, terminal: bool) -> None:
+    task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
+    text = io.StringIO()
+    with watching(Console(file=text, force_terminal=terminal, width=120)) as watch:
+        watch.planned(2, 1)
+        watch.started(task)
+        watch.finished(failed(task))
+    assert "gray 2: no [light]" in text.getvalue()
+    assert ("1 failed" in text.getvalue()) == terminal
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no"}}', "plugins.py:Seeing"))
+    study = load_study(config)
+    grid, store = planning.plan(study), Store(tmp_path / "out")
+    before = preview(study, grid, store, threads=1, workers=1)
+    assert [(row.label, row.cells, row.missing, row.seconds) for row in before] == [
+        ("floor", 18, 18, None),
+        ("Toy", 3, 3, None),
+        ("Seeing", 3, 3, None),
+    ]
+    compute(config, tmp_path / "out")
+    after = preview(study, grid, store, threads=1, workers=1)
+    assert [(row.done, row.failed, row.missing) for row in after] == [(18, 0, 0), (2, 1, 0), (3, 0, 0)]
+    elsewhere = preview(study, grid, Store(tmp_path / "new"), threads=1, workers=1)
+    assert all(row.seconds is not None and row.seconds > 0 for row in elsewhere[1:])
+
+
+def test_the_table_of_a_preview_shows_sums_and_brackets(tmp_path: Path) -> None:
+    study = load_study(write_config(tmp_path))
+    rows = [Row("a[b]", 1, 2, 30, None, 10, 0, 20, 1.5), Row("c", 1, 2, 4, 50, 0, 0, 4, None)]
+    text = io.StringIO()
+    Console(file=text, width=160).print(table(study, rows))
+    assert all(
+        word in text.getvalue() for word in ("a[b]", "34", "24", "at least 1.5", "50", "not timed", "solving [s]")
+    )

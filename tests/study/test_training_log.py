@@ -1,0 +1,150 @@
+import json
+import math
+
+import pytest
+from rich.console import Console
+
+from holobench_eval.commands.preview import training_table, trainings
+from holobench_eval.core.io import write_atomically
+from holobench_eval.report import layout_of
+from holobench_eval.study.artifacts import FAILURE, Artifacts
+from holobench_eval.study.config import load_study
+from holobench_eval.study.plan import plan
+from holobench_eval.study.training_log import keep_training_records, training_records
+
+METHOD = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Learner:
+    width: int = 4
+    trains: ClassVar[bool] = True
+    def prepare(self, bench):
+        return {}
+    def solve(self, target, bench):
+        return target
+    def predict(self, phase, bench):
+        return phase
+"""
+CONFIG = """
+title: Learners
+display: {profiles: [ideal], panel: [128, 128]}
+targets: {dataset: charts}
+training: {dataset: dead_leaves, params: {count: 3}, held_out: 1, captures: 9}
+methods:
+  - {name: "learner.py:Learner", label: A b}
+  - {name: "learner.py:Learner", label: a-b, params: {width: 8}}
+  - wirtinger
+"""
+LOG = "round,step,captures,seconds,fidelity_psnr\n1,10,5,2.5,14.5\n"
+
+
+@pytest.fixture
+def study(tmp_path):
+    (tmp_path / "learner.py").write_text(METHOD)
+    (tmp_path / "study.yaml").write_text(CONFIG)
+    return load_study(tmp_path / "study.yaml")
+
+
+@pytest.fixture
+def artifacts(tmp_path):
+    return Artifacts(tmp_path / "artifacts")
+
+
+def finish(artifacts, needed, captures=7):
+    write_atomically(artifacts.place(needed) / "training.csv", LOG.encode())
+    artifacts.write(needed, {}, {"captures": captures, "seconds": 61.25})
+
+
+def test_logs_and_provenance_are_kept_beside_the_report_under_their_labels(study, artifacts, tmp_path):
+    grid, output = plan(study), tmp_path / "out"
+    first, second = grid.preparations().values()
+    for needed in (first, second):
+        finish(artifacts, needed)
+    keep_training_records(grid, artifacts, output)
+    names = sorted(path.name for path in (output / "training").iterdir())
+    assert names == [
+        "A-b-ideal.csv",
+        "A-b-ideal.json",
+        f"a-b-ideal-{second.id[:8]}.csv",
+        f"a-b-ideal-{second.id[:8]}.json",
+    ]
+    found = training_records(output)
+    assert set(found) == {first.id, second.id}
+    assert found[first.id].provenance["captures"] == 7
+    assert [(one.captures, one.fidelity) for one in found[first.id].rounds] == [(5, 14.5)]
+
+
+def test_what_is_kept_outlives_its_artifact_and_what_is_not_needed_goes(study, artifacts, tmp_path):
+    grid, output = plan(study), tmp_path / "out"
+    first, _ = grid.preparations().values()
+    finish(artifacts, first)
+    keep_training_records(grid, artifacts, output)
+    stale = output / "training" / "of-an-earlier-config.csv"
+    stale.write_text(LOG)
+    artifacts.remove(first)
+    keep_training_records(grid, artifacts, output)
+    assert not stale.exists()
+    assert set(training_records(output)) == {first.id}
+
+
+def test_a_study_that_trains_nothing_gets_no_folder(study, artifacts, tmp_path):
+    (tmp_path / "plain.yaml").write_text(CONFIG.split("methods:")[0] + "methods: [wirtinger]\n")
+    plain = load_study(tmp_path / "plain.yaml")
+    keep_training_records(plan(plain), artifacts, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    assert trainings(plan(plain), artifacts) == []
+    assert layout_of(plain).training is None
+
+
+def test_a_layout_knows_who_is_trained_and_on_how_many_images(study):
+    layout = layout_of(study)
+    assert layout.trained == {"A b", "a-b"}
+    assert layout.training is not None
+    assert (layout.training.images, layout.training.held_out, layout.training.captures) == (3, 1, 9)
+
+
+def test_a_preview_says_what_is_trained_unfinished_failed_and_missing(study, artifacts):
+    grid = plan(study)
+    first, second = grid.preparations().values()
+    before = trainings(grid, artifacts)
+    assert [(row.state, row.needed_by) for row in before] == [("missing", ("A b",)), ("missing", ("a-b",))]
+    assert math.isnan(before[0].captures)
+
+    write_atomically(artifacts.place(second) / "training.csv", LOG.encode())
+    artifacts.memory(second).save("network", {})
+    finish(artifacts, first)
+    done, unfinished = trainings(grid, artifacts)
+    assert (done.state, done.captures, done.seconds) == ("done", 7, 61.25)
+    assert (unfinished.state, unfinished.captures, unfinished.seconds) == ("unfinished", 5, 2.5)
+
+    write_atomically(artifacts.place(second) / FAILURE, b"BudgetError: [no] captures left\n")
+    failed = trainings(grid, artifacts)[1]
+    assert (failed.state, failed.reason) == ("failed", "BudgetError: [no] captures left")
+    console = Console(width=160, record=True, file=open("/dev/null", "w"))  # noqa: PTH123, SIM115
+    console.print(training_table([done, failed]))
+    text = console.export_text()
+    assert "failed: BudgetError: [no] captures left" in text
+    assert done.name in text
+    assert "61.25" in text
+
+
+def test_a_preview_of_a_learned_display_names_the_display(study, artifacts, tmp_path):
+    display = 'display: {learned: {method: "learner.py:Learner", profile: ideal}, panel: [128, 128]}'
+    text = CONFIG.replace("display: {profiles: [ideal], panel: [128, 128]}", display)
+    (tmp_path / "on.yaml").write_text(text)
+    grid = plan(load_study(tmp_path / "on.yaml"))
+    shared = next(row for row in trainings(grid, artifacts) if "A b" in row.needed_by)
+    assert any(name.startswith("display ") for name in shared.needed_by)
+
+
+def test_a_damaged_provenance_is_passed_over(study, artifacts, tmp_path):
+    grid, output = plan(study), tmp_path / "out"
+    first, _ = grid.preparations().values()
+    finish(artifacts, first)
+    for damaged in ("{", "[]", json.dumps({"description": 3})):
+        (artifacts.place(first) / "provenance.json").write_text(damaged)
+        keep_training_records(grid, artifacts, output)
+        assert training_records(output) == {}
+        assert math.isnan(trainings(grid, artifacts)[0].captures)

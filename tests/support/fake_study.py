@@ -1,0 +1,209 @@
+"""A study without physics: a display, scores and plug-ins that cost nothing, for tests of the machinery alone."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import types
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import torch
+from torch import Tensor
+
+from holobench_eval.core.seeds import generator
+from holobench_eval.display import MeteredBench, Workbench, load_profile
+from holobench_eval.study import cell, job, scoring, training
+from holobench_eval.study.store import Record
+
+PLUGINS = '''
+import hashlib
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import torch
+
+LOG = Path(__file__).with_name("solves.txt")
+
+
+@dataclass(frozen=True)
+class Gray:
+    """A fake dataset of even grays."""
+
+    count: int = 3
+
+    def items(self):
+        return [f"gray {i}" for i in range(self.count)]
+
+    def digest(self, item):
+        return hashlib.sha256(item.encode()).hexdigest()
+
+    def load(self, item, shape, channels=3):
+        return torch.full((channels, *shape), (1 + int(item.split()[1])) / 10)
+
+
+@dataclass(frozen=True)
+class Training(Gray):
+    training: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class Toy:
+    """A fake method: a constant phase, and a line in a file for every solution."""
+
+    value: float = 1.0
+    pause: float = 0.0
+    fail: str = ""
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+
+    def solve(self, target, bench):
+        with LOG.open("a") as log:
+            log.write(f"{type(self).__name__} {self.value} {float(target.mean()):.1f}\\n")
+        time.sleep(self.pause)
+        if self.fail and abs(float(target.mean()) - 0.2) < 1e-3:
+            raise ValueError(self.fail)
+        shape = (*target.shape[:2], *bench.spec.shape)
+        return torch.full(shape, self.value) + 0.01 * torch.rand(shape, generator=bench.generator("toy"))
+
+
+@dataclass(frozen=True)
+class Seeing(Toy):
+    camera: ClassVar[bool] = True
+'''
+
+CONFIG = """\
+title: "Fake"
+seed: 3
+display: {{profiles: [{profiles}], panel: [128, 160]}}
+targets: {{dataset: "plugins.py:Gray", params: {{count: {count}}}}}
+methods:
+{methods}
+"""
+
+OTHER_PROFILE = """\
+name: other
+version: 4
+seed: 1
+description: A fake display with the nominal optics of the ideal one.
+"""
+
+
+def write_config(
+    folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), count: int = 3, profiles: str = "ideal"
+) -> Path:
+    """A config and the plug-ins it names, in a folder."""
+    (folder / "plugins.py").write_text(PLUGINS)
+    path = folder / "study.yaml"
+    entries = "\n".join(f"  - {method}" for method in methods)
+    path.write_text(CONFIG.format(methods=entries, count=count, profiles=profiles))
+    return path
+
+
+def solves(folder: Path) -> list[str]:
+    """A line for every solution that a fake method made."""
+    log = folder / "solves.txt"
+    return log.read_text().splitlines() if log.exists() else []
+
+
+class FakeBench:
+    """A display whose picture is the target, darkened by the phase."""
+
+    def __init__(self, spec: Any) -> None:
+        self.spec, self.bench = spec, self
+
+    def for_method(
+        self,
+        method: Any,
+        label: str,
+        target: Tensor,
+        item: str,
+        repeat: int,
+        budget: int | None = None,
+        learned: Any = None,
+    ) -> MeteredBench:
+        return MeteredBench(cast(Workbench, self), label, target, (item, repeat), method, budget, learned)
+
+    def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
+        shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000
+        image = target * shade * torch.linspace(0.5, 1, target.shape[-1])
+        return types.SimpleNamespace(image=image, saturated=0.0, efficiency=0.5, residual=0.05)
+
+    def exposure(self, target: Tensor) -> tuple[float, ...]:
+        return (1.0,) * len(target)
+
+    def session(self, *names: object, exposure: tuple[float, ...] = ()) -> FakeSession:
+        return FakeSession(self.spec, tuple(name for name in names if not isinstance(name, Tensor)))
+
+    def rectified(self, capture: Tensor, target: Tensor) -> Tensor:
+        return capture
+
+
+@dataclass(frozen=True)
+class FakeSession:
+    """A camera that sees noise around the mean of the phase."""
+
+    spec: Any
+    names: tuple[object, ...]
+
+    def capture(self, phase: Tensor) -> Tensor:
+        noise = torch.rand((len(phase), *self.spec.region.shape), generator=generator(*self.names))
+        return phase.mean((1, 2))[:, None, None] + noise
+
+
+def fake_workbench(place: Any, seed: int, device: torch.device | None = None) -> FakeBench:
+    return FakeBench(load_profile("ideal").spec(place.spec.shape))
+
+
+def fake_score(image: Tensor, target: Tensor, **_: Any) -> dict[str, float]:
+    error = float((image - target).square().mean())
+    return {"psnr_linear": -10 * float(torch.tensor(error + 1e-6).log10()), "ssim_linear": 1 - error}
+
+
+FAKES: tuple[tuple[types.ModuleType, str, Any], ...] = (
+    (job, "workbench", fake_workbench),
+    (scoring, "workbench", fake_workbench),
+    (training, "workbench", fake_workbench),
+    (scoring, "score", fake_score),
+)
+"""Where the machinery calls the physics, and what stands there instead."""
+
+
+def install() -> None:
+    """Put the fakes where a task calls the physics."""
+    for module, name, fake in FAKES:
+        setattr(module, name, fake)
+
+
+def fake_work(task: job.Job) -> list[Record]:
+    """``cell.work`` with the fakes, for worker processes that are started fresh."""
+    install()
+    return cell.work(task)
+
+
+def lose_a_worker(task: job.Job) -> list[Record]:
+    """Work that kills its process on one target."""
+    if task.task.cells[0].target == "gray 1" and not task.task.is_floor:
+        os.kill(os.getpid(), 9)
+    return fake_work(task)
+
+
+def noted_work(task: job.Job) -> list[Record]:
+    """Work that writes when it began and ended into ``solves.txt`` of the output folder."""
+    begun = time.time()
+    records = fake_work(task)
+    with (task.setting.output / "solves.txt").open("a") as log:
+        log.write(f"task {begun} {time.time()}\n")
+    return records
+
+
+if __name__ == "__main__":
+    from holobench_eval.commands.app import main
+
+    install()
+    sys.argv[0] = "holoeval"
+    main()

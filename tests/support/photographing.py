@@ -1,0 +1,75 @@
+"""Somebody with a bench of their own: shows the patterns of a session folder and saves photographs, knowing no more of
+holoeval than order.csv and the phase convention in manifest.json."""
+
+import csv
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from holobench_eval.display import load_profile
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.stages import Relay
+
+ROOM = 0.6
+"""Of full scale, for the brightest of the fiducial holograms."""
+
+
+def another_pose(seed: int) -> Relay:
+    """Where this camera stands: turned, off the axis and tilted, differently for every seed."""
+    draw = np.random.default_rng(seed)
+    return Relay(
+        magnification=float(draw.uniform(1.3, 1.7)),
+        rotation=float(draw.uniform(-6, 6)),
+        shift=tuple(draw.uniform(-0.01, 0.01, 2)),
+        perspective=tuple(draw.uniform(-0.06, 0.06, 2)),
+    )
+
+
+class Lab:
+    """A simulated bench behind files. gain: counts per electron."""
+
+    def __init__(self, profile: str, panel: tuple[int, int], seed: int, dark: int = 900) -> None:
+        loaded = load_profile(profile).scaled(panel)
+        self.bench = SimulatedBench(replace(loaded, relay=another_pose(seed)))
+        self.draw = torch.Generator().manual_seed(seed)
+        self.dark, self.gain = dark, None
+
+    def photograph_round(self, folder: Path, number: int) -> None:
+        """Show and save what order.csv of a round says."""
+        convention = json.loads((folder / "manifest.json").read_text())["phase"]
+        with (folder / "patterns" / f"round-{number}" / "order.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        wavelengths = sorted({float(row["wavelength_nm"]) for row in rows}, reverse=True)
+        for row in rows:
+            channel = wavelengths.index(float(row["wavelength_nm"]))
+            levels = cv2.imread(str(folder / row["show"]), cv2.IMREAD_UNCHANGED)
+            light = torch.zeros(self.bench.points.shape[:2])
+            if row["laser"] == "on":
+                light = self._light(self._phase(levels, convention), channel) * float(row["relative_exposure"])
+            if self.gain is None and row["laser"] == "on":
+                self.gain = ROOM * 65535 / float(light.max()) / 2
+            counts = light * (self.gain or 0) + self.dark
+            counts = counts + 20 * torch.randn(counts.shape, generator=self.draw)
+            path = folder / row["save_photograph_as"]
+            path.parent.mkdir(parents=True, exist_ok=True)
+            cv2.imwrite(str(path), counts.round().clamp(0, 65535).numpy().astype(np.uint16))
+
+    def _phase(self, levels: np.ndarray, convention: dict) -> torch.Tensor:
+        if convention["flip_horizontal"]:
+            levels = levels[:, ::-1]
+        if convention["flip_vertical"]:
+            levels = levels[::-1]
+        turns = convention["sign"] * levels / convention["two_pi_level"]
+        return torch.from_numpy((turns * math.tau + convention["origin"]).astype(np.float32))
+
+    def _light(self, phase: torch.Tensor, channel: int) -> torch.Tensor:
+        from holobench_eval.display.simulated.stages.relay import sample
+
+        carrier = self.bench.ramp  # the patterns carry it already, this bench adds it itself
+        light = self.bench.integrated(phase - carrier, channel)
+        return sample(light, self.bench.grid, self.bench.image_samples)

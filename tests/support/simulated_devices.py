@@ -1,0 +1,210 @@
+"""A panel, its lasers and a camera around the simulated bench, on a clock of their own that nobody has to wait for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from holobench_eval.display import Workbench, load_profile
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.stages.relay import sample
+from holobench_eval.imaging.convention import Levels
+from holobench_eval.lab.devices import Counts, DeviceError
+from holobench_eval.lab.test_pattern import letter
+from holobench_eval.methods.initial_phase import InitialPhase
+from holobench_eval.methods.wirtinger import Wirtinger
+
+PANEL = (128, 128)
+GREEN = 1
+
+
+class Clock:
+    """Time that passes when somebody waits."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def wait(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@lru_cache(maxsize=4)
+def bench(profile: str = "leto-mild") -> SimulatedBench:
+    return SimulatedBench(load_profile(profile).scaled(PANEL))
+
+
+@lru_cache(maxsize=4)
+def letter_phase(profile: str = "leto-mild", initial_phase: InitialPhase = "random") -> Tensor:
+    """Hologram ``(3, H, W)`` of the letter from nominal optics."""
+    place = Workbench(bench(profile), 0)
+    target = letter(place.spec.region.shape).expand(3, -1, -1)
+    handle = place.for_method(Wirtinger(), "wirtinger", target, "letter", 0)
+    return Wirtinger(iterations=30, initial_phase=initial_phase).solve(target[None], handle)[0]
+
+
+@dataclass
+class Scene:
+    """What light is on the sensor: the panel's picture, by the laser that is on.
+
+    sign, two_pi_level: the panel's truth; mirrored: the relay mirrors left and right; flipped: the panel shows its
+    columns in the other order; latency [s]: from showing to the first change; lag [s]: time constant of the liquid
+    crystal, in light; restless: relative amplitude of the light's changes, of an unsteady laser.
+    """
+
+    bench: SimulatedBench
+    clock: Clock = field(default_factory=Clock)
+    sign: int = 1
+    two_pi_level: float = 256.0
+    mirrored: bool = False
+    flipped: bool = False
+    latency: float = 0.0
+    lag: float = 0.0
+    restless: float = 0.0
+    channel: int | None = 0
+    selected: list[int | None] = field(default_factory=list)
+    history: list[tuple[float, Levels]] = field(default_factory=list)
+    seen: dict[tuple[bytes, int], NDArray[np.float64]] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        rows, columns = self.bench.grid.shape[:2]
+        return rows, columns
+
+    def select(self, channel: int | None) -> None:
+        self.channel = channel
+        self.selected.append(channel)
+
+    def close(self) -> None:
+        self.select(None)
+
+    def light(self) -> NDArray[np.float64]:
+        if self.channel is None or not self.history:
+            return np.zeros(self.shape)
+        started, levels = self.history[-1]
+        new, since = self.settled(levels), self.clock.now - started - self.latency
+        old = self.settled(self.history[-2][1]) if len(self.history) > 1 else np.zeros_like(new)
+        if since < 0:
+            return old
+        share = 1 - math.exp(-since / self.lag) if self.lag else 1.0
+        light = old + (new - old) * share
+        return light * (1 + self.restless * math.sin(40 * self.clock.now))
+
+    def settled(self, levels: Levels) -> NDArray[np.float64]:
+        assert self.channel is not None
+        key = (levels.tobytes(), self.channel)
+        if key not in self.seen:
+            shown = levels[:, ::-1] if self.flipped else levels
+            phase = torch.from_numpy(self.sign * math.tau * shown.astype(np.float32) / self.two_pi_level)
+            light = self.bench.integrated(phase, self.channel)
+            light = sample(light, self.bench.grid, self.bench.image_samples).double().numpy()
+            self.seen[key] = light[:, ::-1] if self.mirrored else light
+        return self.seen[key]
+
+
+@dataclass
+class Still:
+    """A picture that nothing changes, lit as long as a channel is on."""
+
+    picture: NDArray[np.float64]
+    clock: Clock = field(default_factory=Clock)
+    channel: int | None = 0
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        rows, columns = self.picture.shape
+        return rows, columns
+
+    def light(self) -> NDArray[np.float64]:
+        return self.picture if self.channel is not None else np.zeros_like(self.picture)
+
+
+class SimulatedSlm:
+    name = "simulated panel"
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.failures, self.shown = scene, 0, 0
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.scene.bench.spec.shape
+
+    def show(self, levels: Levels) -> None:
+        if self.failures:
+            self.failures -= 1
+            raise DeviceError("simulated panel: not connected")
+        assert levels.shape == self.shape
+        assert levels.dtype == np.uint8
+        self.shown += 1
+        self.scene.history.append((self.scene.clock.now, levels.copy()))
+        del self.scene.history[:-2]
+
+    def close(self) -> None:
+        pass
+
+
+@dataclass
+class SimulatedCamera:
+    """Counts of the scene: ``gain`` counts a second for the panel's mean light, on a dark level that grows with time.
+
+    gamma: below 1 for a camera that encodes; noise [counts, rms]; colour: three planes, of which the laser lights
+    one and leaks a tenth into the others; deaf: it never changes its exposure.
+    """
+
+    scene: Scene | Still
+    gain: float = 20_000.0
+    bits: int = 12
+    dark: float = 64.0
+    dark_rate: float = 0.0
+    hot: float = 0.0
+    gamma: float = 1.0
+    noise: float = 0.0
+    colour: bool = False
+    deaf: bool = False
+    limits: tuple[float, float] = (1e-5, 10.0)
+    failures: int = 0
+    frames: int = 0
+    name: str = "simulated camera"
+
+    def __post_init__(self) -> None:
+        self.random = np.random.default_rng(0)
+        self.pattern = self.hot * self.random.random(self.scene.shape)
+
+    @property
+    def white(self) -> float:
+        return 2.0**self.bits - 1
+
+    @property
+    def exposures(self) -> tuple[float, float]:
+        return self.limits
+
+    def expose(self, seconds: float) -> tuple[Counts, float]:
+        if self.failures:
+            self.failures -= 1
+            raise DeviceError("simulated camera: no frame within 1 s")
+        self.frames += 1
+        seconds = min(max(seconds, self.limits[0]), self.limits[1])
+        counts = self._counts(self.scene.light(), 0.01 if self.deaf else seconds)
+        self.scene.clock.wait(seconds)
+        if not self.colour:
+            return counts, seconds
+        leak = self._counts(self.scene.light() / 10, seconds)
+        planes = np.repeat(leak[..., None], 3, axis=-1)
+        if self.scene.channel is not None:
+            planes[..., self.scene.channel] = counts
+        return planes, seconds
+
+    def _counts(self, light: NDArray[np.float64], seconds: float) -> Counts:
+        share = np.clip(light * self.gain * seconds / (self.white - self.dark), 0, None) ** self.gamma
+        counts = share * (self.white - self.dark) + self.dark + self.dark_rate * seconds + self.pattern
+        if self.noise:
+            counts = counts + self.random.normal(0, self.noise, counts.shape)
+        return np.clip(np.round(counts), 0, self.white).astype(np.uint16)
+
+    def close(self) -> None:
+        pass

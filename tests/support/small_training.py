@@ -1,0 +1,156 @@
+"""A display of a few pixels, its trainings, and a way to kill them at any moment."""
+
+from __future__ import annotations
+
+import copy
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from holobench_eval.core import seeds
+from holobench_eval.display.api import Capture, DisplaySpec, Region
+from holobench_eval.display.calibrated import MeteredBench, Workbench, concentration
+from holobench_eval.display.training import TrainingBench, TrainingImage
+
+
+class Killed(BaseException):
+    """The process is gone."""
+
+
+@dataclass
+class Fate:
+    """Notes the moments that a training passes, and ends it at the one numbered ``at``."""
+
+    at: int | None = None
+    passed: list[str] = field(default_factory=list)
+
+    def meets(self, moment: str) -> None:
+        self.passed.append(moment)
+        if self.at is not None and len(self.passed) == self.at + 1:
+            raise Killed(moment)
+
+
+def small_spec(size: int = 64, region: int = 48, colours: int = 1, **optics: Any) -> DisplaySpec:
+    edge = (size - region) // 2
+    nominal: dict[str, Any] = {"pitch": 6.4e-6, "distance": 4e-3, "bits": 8, "pupil": None, **optics}
+    wavelengths = (636e-9, 517e-9, 446e-9)[:colours]
+    return DisplaySpec(
+        "small", (size, size), wavelengths=wavelengths, region=Region(edge, edge, region, region), **nominal
+    )
+
+
+def pictures(spec: DisplaySpec, count: int = 1, first: int = 0) -> Tensor:
+    """Smooth pictures with a bright edge, ``(count, C, h, w)`` linear light in [0, 1]."""
+    draws = [
+        torch.rand(len(spec.wavelengths), 6, 6, generator=torch.Generator().manual_seed(100 + first + number))
+        for number in range(count)
+    ]
+    smooth = functional.interpolate(torch.stack(draws), spec.region.shape, mode="bilinear")
+    smooth[..., : spec.region.height // 3, : spec.region.width // 3] = 0.9
+    return smooth
+
+
+@dataclass
+class BentDisplay:
+    """Bends the phase, adds light that it does not modulate, and photographs with a little noise."""
+
+    spec: DisplaySpec
+    fate: Fate = field(default_factory=Fate)
+    names: tuple[object, ...] = ()
+
+    @property
+    def bench(self) -> BentDisplay:
+        return self
+
+    def exposure(self, target: Tensor) -> tuple[float, ...]:
+        return (1.0,) * len(target)
+
+    def session(self, names: tuple[object, ...], target: Tensor) -> BentDisplay:
+        return BentDisplay(self.spec, self.fate, names)
+
+    def announce(self, phases):
+        pass
+
+    def capture(self, phase: Tensor) -> Capture:
+        self.fate.meets("before a photograph")
+        shown = phase.remainder(math.tau)
+        frames = []
+        for channel, one in enumerate(shown + 0.4 * torch.sin(shown)):
+            light = torch.polar(torch.ones_like(one), one) + 0.2
+            frames.append(self.spec.region.crop(self.spec.propagator(channel).forward(light)).abs().square())
+        frame = torch.stack(frames)
+        noise = torch.randn(frame.shape, generator=seeds.generator(*self.names))
+        self.fate.meets("after a photograph")
+        return Capture(frame + 0.01 * noise, dark=0.0, white=math.inf, gain=(1.0,) * len(frame))
+
+    def rectified(self, capture: Capture, target: Tensor) -> Tensor:
+        return capture.linear() / concentration(target, self.spec)[:, None, None]
+
+
+class Memory:
+    """What stays of a training that was killed: values and rows. as_files: the values go through a file's bytes."""
+
+    def __init__(self, as_files: bool = False) -> None:
+        self.as_files = as_files
+        self.fate = Fate()
+        self.kept: dict[str, dict[str, Any]] = {}
+        self.rows: list[dict[str, float | int | str]] = []
+
+    def load(self, name: str) -> dict[str, Any] | None:
+        return copy.deepcopy(self.kept.get(name))
+
+    def save(self, name: str, value: dict[str, Any]) -> None:
+        self.fate.meets(f"before keeping {name}")
+        self.kept[name] = through_a_file(value) if self.as_files else copy.deepcopy(value)
+        self.fate.meets(f"after keeping {name}")
+
+    def log(self, row: Mapping[str, float | int | str]) -> None:
+        """As the memory in a folder: a row takes the place of one of the same round and step."""
+        self.fate.meets("before a row")
+        place = (row["round"], row["step"])
+        self.rows = [*(old for old in self.rows if (old["round"], old["step"]) != place), dict(row)]
+        self.fate.meets("after a row")
+
+    @property
+    def story(self) -> list[dict[str, float | int | str]]:
+        """The rows without the time they took."""
+        return [{key: value for key, value in row.items() if key != "seconds"} for row in self.rows]
+
+
+def through_a_file(value: dict[str, Any]) -> dict[str, Any]:
+    buffer = io.BytesIO()
+    torch.save(value, buffer)
+    buffer.seek(0)
+    loaded: dict[str, Any] = torch.load(buffer, weights_only=True)
+    return loaded
+
+
+def training_bench(
+    spec: DisplaySpec, memory: Memory, fate: Fate | None = None, images: int = 3, held_out: int = 1, seed: int = 3
+) -> TrainingBench:
+    """The bench that a training starts on, and starts on again with the same memory after a kill."""
+    memory.fate = Fate() if fate is None else fate
+    display = cast(Workbench, BentDisplay(spec, memory.fate))
+    numbered = pictures(spec, images + held_out)
+    given = [TrainingImage(f"picture {number}", picture) for number, picture in enumerate(numbered)]
+    return TrainingBench(display, "small", given[:images], given[images:], memory, None, seed)
+
+
+def solving_bench(method: object, target: Tensor, spec: DisplaySpec, learned: Mapping[str, Any]) -> MeteredBench:
+    """The bench on which a trained method solves ``target`` ``(C, h, w)``."""
+    return MeteredBench(cast(Any, BentDisplay(spec)), "small", target, ("solve", 0), method, None, learned)
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two learned states are equal, bit for bit."""
+    if isinstance(one, Tensor):
+        return isinstance(other, Tensor) and torch.equal(one, other)
+    if isinstance(one, Mapping):
+        return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
+    return bool(one == other)

@@ -1,0 +1,97 @@
+"""Studies with the fake trained methods: their configs, their runs, and what a command line says of them."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holobench_eval.commands import app as cli
+from holobench_eval.study.artifacts import Artifacts
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.preparation import Preparation
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import Outcome, run
+from tests.support import fake_trained
+
+CONFIG = """\
+title: "Trained"
+seed: 3
+display: {profiles: [ideal], panel: [128, 128]}
+targets: {dataset: "trained.py:Pictures", params: {count: 1}}
+training: {dataset: "trained.py:Unseen", held_out: 1}
+methods: ["trained.py:Gain"]
+"""
+
+
+def write(folder: Path, *changes: tuple[str, str]) -> Path:
+    """A config and the plug-ins it names, with pieces of the config exchanged."""
+    shutil.copy(fake_trained.__file__, folder / "trained.py")
+    text = CONFIG
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "study.yaml"
+    path.write_text(text)
+    return path
+
+
+def write_profile(folder: Path, *changes: tuple[str, str]) -> tuple[str, str]:
+    """The ideal profile in a file ``mine.yaml``, with pieces exchanged; the change of a config that names it."""
+    text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
+    for old, new in (("name: ideal", "name: mine"), *changes):
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "mine.yaml").write_text(text)
+    return "[ideal]", "[mine.yaml]"
+
+
+def compute(config: Path, output: str = "out", write: Callable[[str], None] = print, **options: Any) -> Outcome:
+    """Run a study in this process; artifacts are beside its config."""
+    study, folder = load_study(config), config.parent
+    return run(study, plan(study), folder / output, Serial(), Lines(write), 1, folder / "artifacts", **options)
+
+
+def needs(config: Path) -> list[Preparation]:
+    """What has to be learned for a study."""
+    return list(plan(load_study(config)).preparations().values())
+
+
+def artifact_of(config: Path) -> Path:
+    """The folder of the one artifact of a study."""
+    (needed,) = needs(config)
+    return Artifacts(config.parent / "artifacts").place(needed)
+
+
+def rounds(folder: Path) -> list[int]:
+    """Every round of training that was begun."""
+    log = folder / "rounds.txt"
+    return [int(line) for line in log.read_text().split()] if log.exists() else []
+
+
+def holoeval(patch: pytest.MonkeyPatch, config: Path, *options: str) -> int:
+    """The exit code of ``holoeval run``; no pictures of displays are drawn."""
+    folder = config.parent
+    command = ["holoeval", "run", str(config), "--executor", "serial", "--output", str(folder / "out")]
+    patch.setattr(sys, "argv", [*command, "--artifacts", str(folder / "artifacts"), *options])
+    patch.setattr(cli, "_sheets", lambda *_: None)
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    code = stopped.value.code
+    return code if isinstance(code, int) else 0
+
+
+def assert_refused(code: int, printed: Any, *words: str) -> None:
+    """A command ended with one line that holds the words, and with exit code 2."""
+    assert code == 2
+    assert printed.err.startswith("holoeval: ")
+    assert printed.err.count("\n") == 1
+    assert all(word in printed.err for word in words), printed.err
+    assert "Traceback" not in printed.out
