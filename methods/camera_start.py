@@ -20,7 +20,7 @@ from .hil.retrieval import matched
 from .wirtinger import Wirtinger
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredBench
+    from ..display.calibrated import MeteredDisplay
 
 LEAST_SHARE = 4
 """Neither the search for a start nor the decision at the end takes more than one capture in so many."""
@@ -39,7 +39,7 @@ class Camera:
     the display may end the solution at any moment.
     """
 
-    def __init__(self, bench: MeteredBench, target: Tensor, fallback: Tensor, captures: int) -> None:
+    def __init__(self, bench: MeteredDisplay, target: Tensor, fallback: Tensor, captures: int) -> None:
         self.left = captures
         self._bench, self._target = bench, target
         self._best = Best(fallback)
@@ -100,11 +100,11 @@ class CameraStart:
     early: Wirtinger = Wirtinger(iterations=8)
     offsets: Annotated[int, Interval(ge=1, le=64)] = 8
 
-    def nominal(self, target: Tensor, bench: MeteredBench) -> Tensor:
+    def nominal(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """The converged hologram ``(C, H, W)`` [rad] of a target ``(C, h, w)``, made without a capture."""
         return self.converged.solve(target[None], bench)[0]
 
-    def search(self, target: Tensor, bench: MeteredBench, camera: Camera, nominal: Tensor) -> Tensor:
+    def search(self, target: Tensor, bench: MeteredDisplay, camera: Camera, nominal: Tensor) -> Tensor:
         """Show the candidates, the converged one first; the best of each colour, ``(C, H, W)`` [rad]."""
         offsets = min(self.offsets, camera.left // LEAST_SHARE - 1)
         tried = [nominal] if offsets >= 0 else []
@@ -117,6 +117,6 @@ class CameraStart:
         return camera.best.clone()
 
 
-def allowed(captures: int, bench: MeteredBench, images: int) -> int:
+def allowed(captures: int, bench: MeteredDisplay, images: int) -> int:
     """Captures for each of so many images: as many as the method wants, within what the display allows for all."""
     return captures if bench.budget is None else min(captures, bench.budget // images)

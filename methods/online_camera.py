@@ -22,7 +22,7 @@ from .hil.retrieval import matched
 
 if TYPE_CHECKING:
     from ..display.api import DisplaySpec
-    from ..display.calibrated import MeteredBench
+    from ..display.calibrated import MeteredDisplay
 
 MOMENTS = (0.6, 0.99)
 """Adam's decay rates. Little momentum: the gradient is that of another display."""
@@ -51,11 +51,11 @@ class OnlineCamera:
     camera: ClassVar[bool] = True
     privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
         return torch.stack([self._optimise(image, bench, len(target)) for image in target])
 
-    def _optimise(self, target: Tensor, bench: MeteredBench, images: int) -> Tensor:
+    def _optimise(self, target: Tensor, bench: MeteredDisplay, images: int) -> Tensor:
         """One image: target ``(C, h, w)`` to phase ``(C, H, W)``."""
         nominal = self.start.nominal(target, bench)
         camera = Camera(bench, target, nominal, allowed(self.captures, bench, images))

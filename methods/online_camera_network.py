@@ -23,7 +23,7 @@ from .hil.objective import Objective
 from .hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredBench
+    from ..display.calibrated import MeteredDisplay
 
 SMOOTHING = 0.7
 """Width [px] of the Gaussian that what the network misses of the captures is filtered with."""
@@ -79,13 +79,13 @@ class OnlineCameraNetwork:
     camera: ClassVar[bool] = True
     privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
         check_region(bench.spec.region.shape, self.retrieval)
         pairs = enumerate(target)
         return torch.stack([self._optimise(image, bench, len(target), index) for index, image in pairs])
 
-    def _optimise(self, target: Tensor, bench: MeteredBench, images: int, index: int) -> Tensor:
+    def _optimise(self, target: Tensor, bench: MeteredDisplay, images: int, index: int) -> Tensor:
         """One image: target ``(C, h, w)`` to phase ``(C, H, W)``."""
         nominal = self.start.nominal(target, bench)
         camera = Camera(bench, target, nominal, allowed(self.captures, bench, images))
@@ -105,7 +105,7 @@ class OnlineCameraNetwork:
             phase = retrieve(corrected(approximator.image(bench.light), fresh), target, phase, self.retrieval)
         return camera.settle([nominal, camera.best, phase], checks) if checks else camera.best
 
-    def _fresh(self, bench: MeteredBench, draw: torch.Generator) -> NetworkApproximator:
+    def _fresh(self, bench: MeteredDisplay, draw: torch.Generator) -> NetworkApproximator:
         """An approximator that has seen nothing; D = Id."""
         seed = int(torch.randint(2**31, (), generator=draw))
         approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_judge=False, seed=seed)

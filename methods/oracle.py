@@ -14,7 +14,7 @@ from .losses import intensity_l2
 from .wirtinger import Wirtinger
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredBench
+    from ..display.calibrated import MeteredDisplay
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Oracle:
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = True
 
-    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]. CellError without a simulated bench."""
         start = Wirtinger(iterations=self.start_iterations).solve(target, bench)
         return torch.stack([self._refine(image, phase, bench) for image, phase in zip(target, start, strict=True)])
 
-    def _refine(self, target: Tensor, start: Tensor, bench: MeteredBench) -> Tensor:
+    def _refine(self, target: Tensor, start: Tensor, bench: MeteredDisplay) -> Tensor:
         """One image: target ``(C, h, w)``, start ``(C, H, W)``; the colours do not interact."""
         simulation = bench.simulation
         phase, best = start.clone().requires_grad_(), Best(start)

@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 from torch import Tensor
 
 from ..core import plugins
-from ..display import Profile, Workbench, load_profile, open_bench
+from ..display import CalibratedBench, Profile, load_profile, open_bench
 from ..display.simulated.pipeline import SimulatedBench
 from ..display.simulated.stages import ZeroOrder
 from ..metrics import match, score
@@ -87,7 +87,7 @@ def _quick(bench: SimulatedBench, phase: Tensor, target: Tensor) -> float:
     return float(-10 * torch.log10((image - target).square().mean()))
 
 
-def _solve(name: str, bench: Workbench, target: Tensor, item: str) -> Tensor:
+def _solve(name: str, bench: CalibratedBench, target: Tensor, item: str) -> Tensor:
     method = plugins.build("methods", name, {})
     phase: Tensor = method.solve(target[None], bench.for_method(method, name, target, item, 0))[0]
     return phase

@@ -1,18 +1,18 @@
 """Displays: what a method may touch, and the simulated bench."""
 
 from .api import Capture, Display, DisplaySpec, Region
-from .calibrated import MeteredBench, Shot, Workbench, open_bench
+from .calibrated import CalibratedBench, MeteredDisplay, RectifiedCapture, open_bench
 from .simulated.profile import Profile, load_profile
 
 __all__ = [
+    "CalibratedBench",
     "Capture",
     "Display",
     "DisplaySpec",
-    "MeteredBench",
+    "MeteredDisplay",
     "Profile",
+    "RectifiedCapture",
     "Region",
-    "Shot",
-    "Workbench",
     "load_profile",
     "open_bench",
 ]

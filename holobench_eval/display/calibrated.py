@@ -31,14 +31,14 @@ DARKEST_MEAN = 0.01
 """A target channel darker than this is exposed as if it had this mean, so that exposure stays finite."""
 
 
-def concentration(target: Tensor, spec: DisplaySpec) -> Tensor:
+def white_irradiance(target: Tensor, spec: DisplaySpec) -> Tensor:
     """Light at a white pixel, per channel, if all light of the panel went into the target; mean incident light is 1."""
     share = target.mean((-2, -1)).clamp_min(DARKEST_MEAN) * (target.shape[-2] * target.shape[-1])
     return spec.shape[0] * spec.shape[1] / share
 
 
 @dataclass(frozen=True)
-class Shot:
+class RectifiedCapture:
     """A capture brought into the target's frame.
 
     image: ``(C, h, w)`` linear light; 1 is what a white pixel gets if all light of the panel went into the target;
@@ -85,16 +85,16 @@ class Shows:
         repeat: int,
         budget: int | None = None,
         learned: Mapping[str, Any] | None = None,
-    ) -> MeteredBench:
+    ) -> MeteredDisplay:
         """The handle that ``method`` gets to solve ``target`` ``(C, h, w)`` with at most ``budget`` captures.
 
         learned: what the method's ``prepare`` returned.
         """
-        return MeteredBench(self, label, target, (self.seed, item, repeat), method, budget, learned)
+        return MeteredDisplay(self, label, target, (self.seed, item, repeat), method, budget, learned)
 
 
 @dataclass(frozen=True)
-class Workbench(Shows):
+class CalibratedBench(Shows):
     """A simulated bench and its calibration: one registration for all methods, made before any of them is shown.
 
     registered_as: a bench whose registration holds for this one too, since no camera has moved (None: its own).
@@ -102,7 +102,7 @@ class Workbench(Shows):
 
     bench: SimulatedBench
     seed: int
-    registered_as: Workbench | None = None
+    registered_as: CalibratedBench | None = None
 
     @property
     def spec(self) -> DisplaySpec:
@@ -145,7 +145,7 @@ class Workbench(Shows):
         A white pixel that gets all the light it can fills the well to 1 / headroom.
         """
         sensor = self.bench.profile.sensor
-        per_unit = sensor.full_well / sensor.headroom / concentration(target, self.spec)
+        per_unit = sensor.full_well / sensor.headroom / white_irradiance(target, self.spec)
         return tuple(per_unit.tolist())
 
     def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
@@ -154,7 +154,7 @@ class Workbench(Shows):
 
     def photograph(
         self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
-    ) -> Shot:
+    ) -> RectifiedCapture:
         """Show ``phase`` ``(C, H, W)`` [rad] and bring its capture into the frame of ``target`` ``(C, h, w)``.
 
         Exposure "equal": the same light for every method; "matched": a metering capture first, then the laser power
@@ -171,7 +171,7 @@ class Workbench(Shows):
         capture = session.capture(phase)
         image = self.rectified(capture, target)
         share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
-        return Shot(
+        return RectifiedCapture(
             image=image,
             capture=capture,
             saturated=capture.saturated,
@@ -181,9 +181,9 @@ class Workbench(Shows):
         )
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        """A capture as ``(C, h, w)`` in the target's frame, on its device, and in the unit of ``Shot.image``."""
+        """A capture as ``(C, h, w)`` in the target's frame, on its device, and in the unit of ``RectifiedCapture.image``."""
         light = self.registration.rectify(capture.linear()).to(target.device)
-        return light / concentration(target, self.spec)[: light.shape[0], None, None]
+        return light / white_irradiance(target, self.spec)[: light.shape[0], None, None]
 
 
 class Session(Protocol):
@@ -225,7 +225,7 @@ class Source(Protocol):
         ...
 
 
-class MeteredBench:
+class MeteredDisplay:
     """All that a method may see of a display: nominal optics, a metered camera, what it learned, named random numbers.
 
     Everything else is private to the harness, its account of captures included. method: who gets the handle, which
@@ -295,7 +295,7 @@ class MeteredBench:
     @property
     def light(self) -> Tensor:
         """Light at a white pixel, ``(C,)``, if all of the panel's went into the target; incident light is 1."""
-        return concentration(self._target, self.spec)
+        return white_irradiance(self._target, self.spec)
 
     @property
     def simulation(self) -> Simulation:
@@ -356,7 +356,7 @@ def fiducial_phases(display: Source, target: Tensor) -> list[Tensor]:
     """
     phases = []
     for hologram in range(FIDUCIAL_HOLOGRAMS):
-        handle = MeteredBench(display, "fiducial", target, (display.seed, "fiducial", hologram))
+        handle = MeteredDisplay(display, "fiducial", target, (display.seed, "fiducial", hologram))
         phase = Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]
         phases += [phase + step * TAU / FIDUCIAL_STEPS for step in range(FIDUCIAL_STEPS)]
     return phases
@@ -380,11 +380,11 @@ def open_bench(
     profile: Profile,
     panel: tuple[int, int] | None = None,
     seed: int = 0,
-    registered_as: Workbench | None = None,
+    registered_as: CalibratedBench | None = None,
     device: torch.device = CPU,
-) -> Workbench:
+) -> CalibratedBench:
     """The simulated bench of a profile on a panel of (rows, columns) pixels; ``seed`` names its noise.
 
-    registered_as: see ``Workbench``; device: see ``SimulatedBench``.
+    registered_as: see ``CalibratedBench``; device: see ``SimulatedBench``.
     """
-    return Workbench(SimulatedBench(profile.scaled(panel), device), seed, registered_as)
+    return CalibratedBench(SimulatedBench(profile.scaled(panel), device), seed, registered_as)

@@ -12,15 +12,24 @@ from torch import Tensor
 from ..core.device import CPU
 from ..core.errors import CellError
 from .api import Capture, DisplaySpec
-from .calibrated import DARKEST_MEAN, Exposure, MeteredBench, Shot, Shows, Simulation, check_phase, concentration
+from .calibrated import (
+    DARKEST_MEAN,
+    Exposure,
+    MeteredDisplay,
+    RectifiedCapture,
+    Shows,
+    Simulation,
+    check_phase,
+    white_irradiance,
+)
 from .simulated.pipeline import BenchSession
 
 
 class Predictor(Protocol):
     """A trained method that predicts captures."""
 
-    def predict(self, phase: Tensor, bench: MeteredBench) -> Tensor:
-        """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light in the unit of ``Shot.image``."""
+    def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
+        """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light in the unit of ``RectifiedCapture.image``."""
         ...
 
 
@@ -42,15 +51,17 @@ class LearnedBench(Shows):
     @torch.no_grad()
     def photograph(
         self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
-    ) -> Shot:
+    ) -> RectifiedCapture:
         """The predicted capture of ``phase`` ``(C, H, W)`` [rad]; the exposure does not matter without noise."""
         check_phase(phase, self.spec, label)
-        handle = MeteredBench(self, label, target.to(self.device), (self.seed, item, repeat), learned=self.learned)
+        handle = MeteredDisplay(self, label, target.to(self.device), (self.seed, item, repeat), learned=self.learned)
         image = self.method.predict(phase[None].to(self.device), handle)[0].detach().cpu()
         share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
-        light = tuple(concentration(target, self.spec).tolist())
+        light = tuple(white_irradiance(target, self.spec).tolist())
         capture = Capture(image, dark=0.0, white=float("inf"), gain=(1.0,) * len(image))
-        return Shot(image, capture, saturated=0.0, efficiency=float(share.mean()), residual=0.0, exposure=light)
+        return RectifiedCapture(
+            image, capture, saturated=0.0, efficiency=float(share.mean()), residual=0.0, exposure=light
+        )
 
     def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
         """There is none: a learned display has no camera."""

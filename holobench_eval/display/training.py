@@ -15,7 +15,7 @@ from ..core.device import CPU, moved
 from ..core.errors import BudgetError
 from ..core.seeds import generator
 from .api import DisplaySpec
-from .calibrated import Session, Source, check_phase, concentration
+from .calibrated import Session, Source, check_phase, white_irradiance
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
@@ -95,7 +95,7 @@ class TrainingBench:
 
     def light(self, image: TrainingImage) -> Tensor:
         """Light at a white pixel, ``(C,)``, if all of the panel's went into the target; incident light is 1."""
-        return concentration(image.target, self.spec)
+        return white_irradiance(image.target, self.spec)
 
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on the study's seed and ``names``."""

@@ -16,7 +16,7 @@ from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL, Panel
 from ..imaging.convention import Convention
 from .laser import LaserSettings
-from .settings import Procedure
+from .settings import CaptureSettings
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class BenchFile:
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
     slm: Mapping[str, Any] = field(default_factory=dict)
     camera: Mapping[str, Any] = field(default_factory=dict)
-    capture: Procedure = field(default_factory=Procedure)
+    capture: CaptureSettings = field(default_factory=CaptureSettings)
     laser: LaserSettings | None = None
     digest: str = field(default="", metadata={"key": False})
 

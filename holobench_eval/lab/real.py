@@ -15,12 +15,12 @@ from ..display.api import Capture, DisplaySpec
 from ..display.calibrated import (
     DARKEST_MEAN,
     Exposure,
-    Shot,
+    RectifiedCapture,
     Shows,
     Simulation,
     check_phase,
-    concentration,
     fiducial_phases,
+    white_irradiance,
 )
 from ..imaging.cross_check import disagreement, second_warp
 from ..imaging.grid import fiducial
@@ -123,7 +123,7 @@ class RealBench(Shows):
 
     def relative_exposure(self, target: Tensor) -> float:
         """Exposure time for a target ``(C, h, w)``, relative to that for the fiducial grid, from the target alone."""
-        ratio = concentration(self._grid_target, self.spec) / concentration(target.cpu(), self.spec)
+        ratio = white_irradiance(self._grid_target, self.spec) / white_irradiance(target.cpu(), self.spec)
         return float(f"{float(ratio.min()):.3g}")
 
     def session(self, names: tuple[object, ...], target: Tensor) -> RealSession:
@@ -136,10 +136,10 @@ class RealBench(Shows):
 
     def photograph(
         self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
-    ) -> Shot:
+    ) -> RectifiedCapture:
         """Show ``phase`` ``(C, H, W)`` [rad] and bring its photograph into the frame of ``target`` ``(C, h, w)``.
 
-        Exposures as in ``Workbench.photograph``; "matched" sets the exposure time in the place of the laser power.
+        Exposures as in ``CalibratedBench.photograph``; "matched" sets the exposure time in the place of the laser power.
         """
         check_phase(phase, self.spec, label)
         names, relative = (self.seed, item, repeat, "score"), self.relative_exposure(target)
@@ -156,7 +156,7 @@ class RealBench(Shows):
         photo = self.photographer.photograph(request)
         image = self.rectified(self.capture(photo), target)
         share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
-        return Shot(
+        return RectifiedCapture(
             image=image,
             capture=self.capture(photo),
             saturated=photo.saturated,
@@ -166,17 +166,17 @@ class RealBench(Shows):
         )
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        """A capture as ``(C, h, w)`` in the target's frame and in the unit of ``Shot.image``."""
+        """A capture as ``(C, h, w)`` in the target's frame and in the unit of ``RectifiedCapture.image``."""
         return self._in_frame(capture, target, self.registration)
 
-    def second_image(self, shot: Shot, target: Tensor) -> Tensor | None:
-        """``Shot.image`` by the second geometry; None where there is none."""
+    def second_image(self, shot: RectifiedCapture, target: Tensor) -> Tensor | None:
+        """``RectifiedCapture.image`` by the second geometry; None where there is none."""
         second = self.second_registration
         return None if second is None else self._in_frame(shot.capture, target, second)
 
     def _in_frame(self, capture: Capture, target: Tensor, registration: Registration) -> Tensor:
         light = registration.rectify(capture.linear()).to(target.device)
-        return light / concentration(target, self.spec)[: light.shape[0], None, None]
+        return light / white_irradiance(target, self.spec)[: light.shape[0], None, None]
 
 
 @dataclass

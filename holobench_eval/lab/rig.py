@@ -19,7 +19,7 @@ from .exposure import Dark, auto_exposure, averaged, combined, dark_frames, dark
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
 from .preflight import Gate, full_turn, linearity, phase_sign
-from .settings import Procedure
+from .settings import CaptureSettings
 from .settle import PATIENCE, Toggle, settle_time
 
 DARK_SPAN = 1 / 8, 2.0  # of the exposures in use: between these, dark counts are measured, beyond extrapolated
@@ -52,7 +52,7 @@ class Rig:
         slm: Slm,
         camera: Camera,
         convention: Convention,
-        procedure: Procedure,
+        procedure: CaptureSettings,
         wavelengths: Sequence[float],
         laser: Laser,
         wait: Callable[[float], None] = time.sleep,
@@ -169,7 +169,9 @@ class Rig:
         yield phase_sign(show, letter.phase, self.convention)
         yield full_turn(show, letter.phase, self.convention)
 
-    def _take(self, request: Request, convention: Convention, ready: Prepared, procedure: Procedure) -> Photograph:
+    def _take(
+        self, request: Request, convention: Convention, ready: Prepared, procedure: CaptureSettings
+    ) -> Photograph:
         frames, lost, seconds = [], [], []
         for channel, (exposure, dark) in enumerate(zip(ready.exposures, ready.darks, strict=True)):
             self._show(request.phase, channel, convention, ready.settle)

@@ -14,7 +14,7 @@ Relative = Annotated[float, Interval(gt=0, le=1)]
 
 
 @dataclass(frozen=True)
-class Procedure:
+class CaptureSettings:
     """Exposure, averaging, dark frames, bracket and settling of every photograph.
 
     exposure: seconds, one for each colour channel or one for all, or ``auto``: as long as the test letter allows;

@@ -23,7 +23,7 @@ _KIB_PER_MIB, _BYTES_PER_MIB = 1024, 1024**2
 
 
 @dataclass(frozen=True)
-class Effort:
+class Cost:
     """seconds: wall time; memory_mib: peak of the memory above the level before [MiB], None where unknown."""
 
     seconds: float
@@ -39,16 +39,16 @@ class Stopwatch:
     clock: float
     device: torch.device = CPU
 
-    def stop(self) -> Effort:
+    def stop(self) -> Cost:
         """The effort since the start."""
         if self.device.type == "cuda" and self.before is not None:
             torch.cuda.synchronize(self.device)
             seconds = time.perf_counter() - self.clock
-            return Effort(seconds, (torch.cuda.max_memory_allocated(self.device) - self.before) / _BYTES_PER_MIB)
+            return Cost(seconds, (torch.cuda.max_memory_allocated(self.device) - self.before) / _BYTES_PER_MIB)
         seconds = time.perf_counter() - self.clock
         peak = None if self.before is None else _status("VmHWM")
         memory = None if peak is None or self.before is None else max(0, peak - self.before) / _KIB_PER_MIB
-        return Effort(seconds, memory)
+        return Cost(seconds, memory)
 
 
 def start(device: torch.device = CPU) -> Stopwatch:

@@ -13,7 +13,7 @@ from ..core.device import CPU
 from ..core.errors import CellError, UserError
 
 if TYPE_CHECKING:
-    from ..display import Workbench
+    from ..display import CalibratedBench
     from ..display.api import DisplaySpec
     from ..display.simulated.changes import Value
     from ..lab.real import RealBench
@@ -97,7 +97,7 @@ def real_condition(source: str, folder: Path) -> Condition:
     return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=Rig(bench=path))
 
 
-def workbench(shown: Condition, seed: int, device: torch.device = CPU) -> Workbench | RealBench:
+def workbench(shown: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench | RealBench:
     """The bench of a condition, built and calibrated once in a process; a simulated one is computed on ``device``.
 
     CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
@@ -116,16 +116,16 @@ def workbench(shown: Condition, seed: int, device: torch.device = CPU) -> Workbe
     return opened
 
 
-_open: OrderedDict[object, Workbench | RealBench | CellError] = OrderedDict()
+_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()
 """Those used least recently come first."""
 
 
-def simulated(shown: Condition, seed: int, device: torch.device = CPU) -> Workbench:
+def simulated(shown: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
     """``workbench`` of a display that does not exist."""
-    from ..display import Workbench
+    from ..display import CalibratedBench
 
     opened = workbench(shown, seed, device)
-    assert isinstance(opened, Workbench)
+    assert isinstance(opened, CalibratedBench)
     return opened
 
 
@@ -135,7 +135,7 @@ def forget_sessions() -> None:
         del _open[key]
 
 
-def _opened(shown: Condition, seed: int, device: torch.device) -> Workbench | RealBench | CellError:
+def _opened(shown: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
     if shown.real is not None:
         from ..lab.opening import open_real
 

@@ -19,7 +19,7 @@ from .plan import Cell
 from .scoring import Measure, captured, plain, solution
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredBench
+    from ..display.calibrated import MeteredDisplay
 
 
 def focus(job: Job) -> Measure:
@@ -29,7 +29,7 @@ def focus(job: Job) -> Measure:
     targets = {cell.target: target_of(cell, place, folder) for cell in cells}
     offsets = {cell.target: offset(place, cell.change) for cell in cells}
 
-    def solve(method: Any, handle: MeteredBench) -> Any:
+    def solve(method: Any, handle: MeteredDisplay) -> Any:
         pictures = torch.stack(list(targets.values())).to(job.device)
         if getattr(method, "planes", False):
             return method.solve_planes(pictures, list(offsets.values()), handle)[None]

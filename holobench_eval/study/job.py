@@ -28,7 +28,7 @@ from .preparation import Preparation
 from .store import Record
 
 if TYPE_CHECKING:
-    from ..display import Workbench
+    from ..display import CalibratedBench
     from ..display.learned import LearnedBench
     from ..lab.real import RealBench
 
@@ -101,7 +101,7 @@ class Job:
             raise CellError(f"not trained: {artifacts.failure(needed)}")
         return artifacts.load(needed)
 
-    def bench(self, cell: Cell, place: Condition) -> Workbench | RealBench | LearnedBench:
+    def bench(self, cell: Cell, place: Condition) -> CalibratedBench | RealBench | LearnedBench:
         """The display of a cell: a simulated bench, or a trained network."""
         learned = self.learned(place.learned)
         if place.learned is None or learned is None:

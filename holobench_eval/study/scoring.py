@@ -31,8 +31,8 @@ from .solutions import Solution
 from .store import Record, Store
 
 if TYPE_CHECKING:
-    from ..display import Workbench
-    from ..display.calibrated import MeteredBench, Shot
+    from ..display import CalibratedBench
+    from ..display.calibrated import MeteredDisplay, RectifiedCapture
     from ..display.learned import LearnedBench
 
 Measure = Callable[[Cell, Condition], Record]
@@ -59,7 +59,7 @@ def picture(job: Job) -> Measure:
     return lambda cell, place: captured(job, made, cell, place, target)
 
 
-def solution(job: Job, place: Condition, target: Tensor, solve: Callable[[Any, MeteredBench], Any]) -> Solution:
+def solution(job: Job, place: Condition, target: Tensor, solve: Callable[[Any, MeteredDisplay], Any]) -> Solution:
     """Let the task's method ``solve`` on a display, in the name of the task's first cell.
 
     target: ``(C, h, w)``, which the display is exposed for. What a method does to its own must not reach the score.
@@ -113,7 +113,9 @@ def captured(job: Job, made: Solution, cell: Cell, place: Condition, target: Ten
     )
 
 
-def _second_scores(bench: Workbench | RealBench | LearnedBench, shot: Shot, target: Tensor) -> dict[str, float]:
+def _second_scores(
+    bench: CalibratedBench | RealBench | LearnedBench, shot: RectifiedCapture, target: Tensor
+) -> dict[str, float]:
     """PSNR and SSIM of a real photograph by the geometry that another algorithm found."""
     image = bench.second_image(shot, target) if isinstance(bench, RealBench) else None
     if image is None:
@@ -122,7 +124,7 @@ def _second_scores(bench: Workbench | RealBench | LearnedBench, shot: Shot, targ
     return {f"{name}_linear_second": again[f"{name}_linear"] for name in ("psnr", "ssim")}
 
 
-def _within_budget(method: Any, solve: Callable[[Any, MeteredBench], Any], handle: MeteredBench) -> tuple[Any, str]:
+def _within_budget(method: Any, solve: Callable[[Any, MeteredDisplay], Any], handle: MeteredDisplay) -> tuple[Any, str]:
     """What ``solve`` returns and an empty line; the best hologram so far and why, if the display ended its captures,
     whatever the method made of that."""
     solved = None
@@ -225,7 +227,7 @@ class _Shown:
 
 
 @lru_cache(maxsize=64)
-def _shown(shown: _Shown, place: Condition, folder: Path, device: torch.device) -> tuple[Tensor, Shot]:
+def _shown(shown: _Shown, place: Condition, folder: Path, device: torch.device) -> tuple[Tensor, RectifiedCapture]:
     """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture; once in a process."""
     cell = shown.cell
     bench, target = workbench(place, cell.seed, device), target_of(cell, place, folder)
@@ -236,7 +238,7 @@ def _shown(shown: _Shown, place: Condition, folder: Path, device: torch.device) 
     return phase, bench.photograph(phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure)
 
 
-def _refuse_saturated(shot: Shot) -> None:
+def _refuse_saturated(shot: RectifiedCapture) -> None:
     if shot.saturated > MOST_SATURATED:
         raise CellError(f"{shot.saturated:.2%} of the capture is saturated, more than {MOST_SATURATED:.1%}")
 

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ..core.io import write_atomically
 from .artifacts import Artifact, read_tensors
-from .cost import Effort
+from .cost import Cost
 
 if TYPE_CHECKING:
     from .job import Job
@@ -27,7 +27,7 @@ class Solution:
 
     phase: Tensor
     captures: int
-    taken: Effort
+    taken: Cost
     stopped: str
     learned: Artifact | None
 
@@ -38,7 +38,7 @@ def kept(job: Job, make: Callable[[], Solution]) -> Solution:
     if path.is_file():
         known = read_tensors(path)
         learned = job.learned(job.task.preparation)
-        return Solution(known["phase"], known["captures"], Effort(**known["taken"]), known["stopped"], learned)
+        return Solution(known["phase"], known["captures"], Cost(**known["taken"]), known["stopped"], learned)
     made, buffer = make(), io.BytesIO()
     plain = {"captures": made.captures, "taken": asdict(made.taken), "stopped": made.stopped}
     torch.save({"phase": made.phase, **plain}, buffer)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..core.hashing import digest
 from ..core.io import write_atomically
-from .cost import Effort
+from .cost import Cost
 from .plan import Plan, Task
 
 if TYPE_CHECKING:
@@ -90,24 +90,24 @@ def names() -> frozenset[str]:
     return frozenset(path.stem for path in folder().glob("*.json"))
 
 
-def known(name: str) -> Effort | None:
+def known(name: str) -> Cost | None:
     """The first measurement under a name, None if there is none; of an earlier version, without memory."""
     try:
         content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
         seconds, memory = float(content["seconds"]), content.get("memory_mib")
-        effort = Effort(seconds, None if memory is None else float(memory))
+        effort = Cost(seconds, None if memory is None else float(memory))
     except (OSError, ValueError, TypeError, KeyError):
         return None
     sizes = [effort.seconds, *([] if effort.memory_mib is None else [effort.memory_mib])]
     return effort if all(math.isfinite(size) and size >= 0 for size in sizes) else None
 
 
-def keep(name: str, effort: Effort, again: bool = False) -> Effort:
+def keep(name: str, effort: Cost, again: bool = False) -> Cost:
     """Note a measurement and return the one to report: the first, or this one when it is measured again."""
     first = None if again else known(name)
     if first is not None and (first.memory_mib is not None or effort.memory_mib is None):
         return first
-    kept = effort if first is None else Effort(first.seconds, effort.memory_mib)
+    kept = effort if first is None else Cost(first.seconds, effort.memory_mib)
     try:
         write_atomically(folder() / f"{name}.json", json.dumps(asdict(kept)).encode())
     except OSError:

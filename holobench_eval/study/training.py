@@ -13,7 +13,7 @@ from .. import __version__
 from ..core import plugins
 from ..core.device import CPU, find, gpu_name, moved
 from ..core.errors import CellError, LostDeviceError, Pending
-from ..display.calibrated import Workbench
+from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
 from ..display.simulated.effects import effects
 from ..display.simulated.ground_truth import truth
@@ -90,7 +90,7 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torc
     artifacts.write(needed, state, facts | diagnosis(method, state, place))
 
 
-def diagnosis(method: object, state: Mapping[str, Any], place: Workbench | RealBench) -> dict[str, Any]:
+def diagnosis(method: object, state: Mapping[str, Any], place: CalibratedBench | RealBench) -> dict[str, Any]:
     """What a method says of the display it learned, beside the truth, for methods that say something.
 
     estimates: see ``display.estimates.joined``; missing: effects of the bench that the form of the method's model has

@@ -11,7 +11,7 @@ from torch import Tensor
 from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
-from ..display import MeteredBench, Workbench, load_profile, open_bench
+from ..display import CalibratedBench, MeteredDisplay, load_profile, open_bench
 from ..study.versions import method_version
 
 PLAIN_PANEL, CAMERA_PANEL = (64, 64), (128, 128)
@@ -63,7 +63,7 @@ def _check_parameters(cls: type[Any], instance: Any) -> None:
     assert replace(instance) == instance, f"{name} is not equal to its own copy; remove eq=False"
 
 
-def _target(bench: Workbench, images: int, channels: int) -> Tensor:
+def _target(bench: CalibratedBench, images: int, channels: int) -> Tensor:
     """Smooth blobs and an edge: what a picture has, in the region's size."""
     height, width = bench.spec.region.shape
     noise = torch.rand((images, channels, 6, 6), generator=generator("contract", images, channels))
@@ -72,7 +72,7 @@ def _target(bench: Workbench, images: int, channels: int) -> Tensor:
     return target.clamp(0, 1)
 
 
-def _check_solution(method: Any, bench: Workbench, target: Tensor, camera: bool) -> None:
+def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, camera: bool) -> None:
     name, before = type(method).__name__, target.clone()
     shape = (*target.shape[:2], *bench.spec.shape)
     phase, handle = _solve(method, bench, target)
@@ -84,12 +84,12 @@ def _check_solution(method: Any, bench: Workbench, target: Tensor, camera: bool)
     assert camera or handle.captures == 0, f"{name} captures, but declares no camera; set camera = True"
 
 
-def _check_repeatable(method: Any, bench: Workbench, target: Tensor) -> None:
+def _check_repeatable(method: Any, bench: CalibratedBench, target: Tensor) -> None:
     (first, _), (again, _) = _solve(method, bench, target), _solve(method, bench, target)
     assert torch.equal(first, again), f"{type(method).__name__}.solve is not repeatable; draw from bench.generator(...)"
 
 
-def _solve(method: Any, bench: Workbench, target: Tensor) -> tuple[Any, MeteredBench]:
+def _solve(method: Any, bench: CalibratedBench, target: Tensor) -> tuple[Any, MeteredDisplay]:
     handle = bench.for_method(method, type(method).__name__, target[0], item="contract", repeat=0)
     torch.seed()  # another one at every call: it shows up a method that draws from the global generator
     return method.solve(target, handle), handle

@@ -19,7 +19,7 @@ from .patterns import pattern_samples
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
-    from ...display.calibrated import MeteredBench
+    from ...display.calibrated import MeteredDisplay
     from ...display.training import TrainingBench, TrainingImage
     from .approximator import ModelApproximator
 
@@ -118,7 +118,7 @@ class ThroughModel(ABC):
         gains = [ours - plain for ours, plain in pairs]
         return sum(gains) < 0
 
-    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
         if bench.learned["nominal"]:
             return self.NOMINAL.solve(target, bench)
@@ -127,12 +127,12 @@ class ThroughModel(ABC):
         return torch.stack([retrieve(display, image, phase, self.retrieval) for image, phase in pairs])
 
     @torch.no_grad()
-    def predict(self, phase: Tensor, bench: MeteredBench) -> Tensor:
+    def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)`` that was learned to follow."""
         display = self._display(bench)
         return torch.stack([display(one) for one in phase])
 
-    def _display(self, bench: MeteredBench) -> Image:
+    def _display(self, bench: MeteredDisplay) -> Image:
         approximator = self.approximator(bench.spec).to(bench.device)
         approximator.load_learned(bench.learned)
         return approximator.image(bench.light)

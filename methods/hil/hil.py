@@ -23,7 +23,7 @@ from .retrieval import Image, Retrieval, check_region, retrieve
 from .start import SmoothStart
 
 if TYPE_CHECKING:
-    from ...display.calibrated import MeteredBench
+    from ...display.calibrated import MeteredDisplay
     from ...display.training import TrainingBench, TrainingImage
 
 
@@ -69,7 +69,7 @@ class HIL:
         train_in_the_loop(bench, approximator, begin, search, self.training)
         return {**approximator.learned(), "offset": offset}
 
-    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
         approximator = self._frozen(bench)
         display, start = approximator.image(bench.light), self.start.solve(target, bench) + bench.learned["offset"]
@@ -80,16 +80,16 @@ class HIL:
         return torch.stack(found)
 
     @torch.no_grad()
-    def predict(self, phase: Tensor, bench: MeteredBench) -> Tensor:
+    def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)`` that the approximator expects."""
         display = self._frozen(bench).image(bench.light)
         return torch.stack([display(one) for one in phase])
 
-    def _approximator(self, bench: TrainingBench | MeteredBench) -> NetworkApproximator:
+    def _approximator(self, bench: TrainingBench | MeteredDisplay) -> NetworkApproximator:
         judged = self.retrieval.adversarial > 0
         return NetworkApproximator(bench.spec, self.network, self.loss, judged, self.seed).to(bench.device)
 
-    def _frozen(self, bench: MeteredBench) -> NetworkApproximator:
+    def _frozen(self, bench: MeteredDisplay) -> NetworkApproximator:
         approximator = self._approximator(bench)
         approximator.load_learned(bench.learned)
         return approximator

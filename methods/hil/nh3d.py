@@ -22,7 +22,7 @@ from .retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
-    from ...display.calibrated import MeteredBench
+    from ...display.calibrated import MeteredDisplay
     from ...display.training import TrainingBench, TrainingImage
 
 
@@ -54,13 +54,13 @@ class HILNH3D:
         train_in_the_loop(bench, approximator, begin, self._search, self.training)
         return approximator.learned()
 
-    def solve(self, target: Tensor, bench: MeteredBench) -> Tensor:
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
         display, start = self._display(bench), self.start.solve(target, bench)
         return torch.stack([self._search(display, image, phase) for image, phase in zip(target, start, strict=True)])
 
     @torch.no_grad()
-    def predict(self, phase: Tensor, bench: MeteredBench) -> Tensor:
+    def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light, that the network expects."""
         display = self._display(bench)
         return torch.stack([display(one) for one in phase])
@@ -74,7 +74,7 @@ class HILNH3D:
     def _approximator(self, spec: DisplaySpec) -> NetworkApproximator:
         return NetworkApproximator(spec, self.network, None, with_judge=False, seed=self.seed, of_amplitude=True)
 
-    def _display(self, bench: MeteredBench) -> Image:
+    def _display(self, bench: MeteredDisplay) -> Image:
         approximator = self._approximator(bench.spec).to(bench.device)
         approximator.load_learned(bench.learned)
         return approximator.image(bench.light)

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU
-from holobench_eval.display import Workbench, load_profile, open_bench
+from holobench_eval.display import CalibratedBench, load_profile, open_bench
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
@@ -39,7 +39,7 @@ def smooth(shape: tuple[int, ...], seed: int = 1) -> Tensor:
 
 
 @pytest.fixture(scope="module")
-def benches() -> dict[torch.device, Workbench]:
+def benches() -> dict[torch.device, CalibratedBench]:
     """The paper-like display without the noise of its camera, on both devices."""
     profile = load_profile("leto-aged")
     quiet = replace(profile, sensor=replace(profile.sensor, noise=False))
@@ -47,7 +47,7 @@ def benches() -> dict[torch.device, Workbench]:
         return {device: open_bench(quiet, PANEL, seed=0, device=device) for device in DEVICES}
 
 
-def psnr(place: Workbench, phase: Tensor, target: Tensor) -> float:
+def psnr(place: CalibratedBench, phase: Tensor, target: Tensor) -> float:
     """PSNR [dB] of the nominal picture at the brightness of its target."""
     fields = [place.spec.propagator(c).forward(torch.polar(torch.ones_like(p), p)) for c, p in enumerate(phase.cpu())]
     image = torch.stack([place.spec.region.crop(field).abs().square() for field in fields])
@@ -66,7 +66,7 @@ def test_propagation_within_1e_5(direction: str) -> None:
     assert relative(found[CUDA], found[CPU]) < 1e-5
 
 
-def test_twenty_iterations_of_wirtinger_within_a_twentieth_of_a_decibel(benches: dict[Any, Workbench]) -> None:
+def test_twenty_iterations_of_wirtinger_within_a_twentieth_of_a_decibel(benches: dict[Any, CalibratedBench]) -> None:
     method = plugins.build("methods", "wirtinger", {"iterations": 20}, Path())
     target, found = smooth((3, *benches[CPU].spec.region.shape)), []
     for device in DEVICES:
@@ -76,7 +76,7 @@ def test_twenty_iterations_of_wirtinger_within_a_twentieth_of_a_decibel(benches:
     assert found[1] == pytest.approx(found[0], abs=0.05)
 
 
-def test_a_capture_without_noise_within_one_in_a_thousand(benches: dict[Any, Workbench]) -> None:
+def test_a_capture_without_noise_within_one_in_a_thousand(benches: dict[Any, CalibratedBench]) -> None:
     phase, target = 6 * smooth((3, *PANEL), seed=2), smooth((3, *benches[CPU].spec.region.shape))
     frames = [benches[device].session(("t",), target).capture(phase).linear() for device in DEVICES]
     assert all(frame.device == CPU for frame in frames)
@@ -84,7 +84,7 @@ def test_a_capture_without_noise_within_one_in_a_thousand(benches: dict[Any, Wor
     assert relative(frames[1], frames[0]) < 1e-3
 
 
-def test_the_gradient_through_a_bench(benches: dict[Any, Workbench]) -> None:
+def test_the_gradient_through_a_bench(benches: dict[Any, CalibratedBench]) -> None:
     slopes = []
     for device in DEVICES:
         with repeatable(1, device):

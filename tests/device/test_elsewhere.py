@@ -14,7 +14,7 @@ import torch
 
 from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU, moved
-from holobench_eval.display import Workbench, load_profile
+from holobench_eval.display import CalibratedBench, load_profile
 from holobench_eval.display.learned import LearnedBench
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.training import TrainingBench, TrainingImage
@@ -55,18 +55,18 @@ class Registered:
         return linear[:, : self.shape[0], : self.shape[1]]
 
 
-def bench(name: str, **stages: Any) -> Workbench:
+def bench(name: str, **stages: Any) -> CalibratedBench:
     profile = replace(load_profile(name).scaled(PANEL), **stages)
     registered: Any = SimpleNamespace(registration=Registered(profile.spec().region.shape))
-    return Workbench(SimulatedBench(profile, ELSEWHERE), 0, registered_as=registered)
+    return CalibratedBench(SimulatedBench(profile, ELSEWHERE), 0, registered_as=registered)
 
 
 @pytest.fixture(scope="module")
-def ideal() -> Workbench:
+def ideal() -> CalibratedBench:
     return bench("ideal")
 
 
-def picture(place: Workbench, device: torch.device = ELSEWHERE) -> torch.Tensor:
+def picture(place: CalibratedBench, device: torch.device = ELSEWHERE) -> torch.Tensor:
     return torch.rand(3, *place.spec.region.shape, device=device)
 
 
@@ -98,7 +98,7 @@ def test_propagation() -> None:
 
 
 @pytest.mark.parametrize("loss", LOSSES)
-def test_loss_and_gradient_of_wirtinger(ideal: Workbench, loss: Any) -> None:
+def test_loss_and_gradient_of_wirtinger(ideal: CalibratedBench, loss: Any) -> None:
     with Elsewhere():
         model = ideal.spec.propagator(0, device=ELSEWHERE)
         objective = Objective(model, ideal.spec.region, picture(ideal)[:1], LOSSES[loss])
@@ -141,7 +141,7 @@ METHODS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_a_method_solves_where_its_target_is(ideal: Workbench, name: str) -> None:
+def test_a_method_solves_where_its_target_is(ideal: CalibratedBench, name: str) -> None:
     method = plugins.build("methods", name, METHODS[name], Path())
     with Elsewhere():
         target = picture(ideal)
@@ -179,7 +179,7 @@ class Memory:
 
 @pytest.mark.parametrize("name", TRAINED)
 def test_a_method_learns_resumes_and_solves_where_its_images_are(
-    ideal: Workbench, name: str, monkeypatch: pytest.MonkeyPatch
+    ideal: CalibratedBench, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ThroughModel, "NOMINAL", Wirtinger(iterations=1))
     method, memory = plugins.build("methods", name, TRAINED[name], Path()), Memory()

@@ -3,7 +3,7 @@ import torch
 
 from holobench_eval.core.errors import BudgetError, CellError
 from holobench_eval.display import load_profile, open_bench
-from holobench_eval.display.calibrated import MeteredBench, concentration
+from holobench_eval.display.calibrated import MeteredDisplay, white_irradiance
 from holobench_eval.testing.propagation_conformance import gaussian_beam
 
 PANEL = (192, 192)
@@ -97,19 +97,19 @@ def test_exposure_is_equal_for_all_methods_unless_brightness_is_matched(bench, t
 
 
 def test_dark_targets_have_a_finite_exposure(bench):
-    assert torch.isfinite(concentration(torch.zeros(3, 8, 8), bench.spec)).all()
+    assert torch.isfinite(white_irradiance(torch.zeros(3, 8, 8), bench.spec)).all()
 
 
 def test_handle_is_what_the_methods_expect(bench, target):
     handle = bench.for_method(object(), "m", target, "t", 0)
-    assert isinstance(handle, MeteredBench)
+    assert isinstance(handle, MeteredDisplay)
     assert handle.spec is bench.spec
 
 
 def test_simulation_is_the_noise_free_capture_in_the_target_frame(target):
     aged = open_bench(load_profile("leto-aged"), PANEL)
     flat = torch.zeros(3, *PANEL)
-    light = concentration(target, aged.spec)[:, None, None]
+    light = white_irradiance(target, aged.spec)[:, None, None]
     simulated = aged.simulation.image(flat) / light
     captured = aged.photograph(flat, target, "t", 0).image
     assert float((simulated - captured).norm() / captured.norm()) < 0.1

@@ -5,7 +5,7 @@ import torch
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.display import load_profile
-from holobench_eval.display.calibrated import MeteredBench
+from holobench_eval.display.calibrated import MeteredDisplay
 
 PANEL = (96, 128)
 
@@ -13,7 +13,7 @@ PANEL = (96, 128)
 @pytest.fixture
 def handle():
     spec = load_profile("ideal").scaled(PANEL).spec()
-    return MeteredBench(SimpleNamespace(spec=spec), "mine", torch.ones(3, *spec.region.shape), ("t", 0), budget=7)
+    return MeteredDisplay(SimpleNamespace(spec=spec), "mine", torch.ones(3, *spec.region.shape), ("t", 0), budget=7)
 
 
 def test_nothing_is_kept_at_first(handle):

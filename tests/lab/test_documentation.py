@@ -8,7 +8,7 @@ import pytest
 from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.lab.drivers.catalogue import checked_params
 from holobench_eval.lab.laser import laser
-from holobench_eval.lab.settings import Procedure
+from holobench_eval.lab.settings import CaptureSettings
 
 PAGE = Path(__file__).parents[3] / "docs" / "real-bench.md"
 
@@ -21,7 +21,7 @@ def test_the_documented_bench_file_is_read_and_its_settings_are_those_that_exist
     for kind, section in (("slm", bench.slm), ("camera", bench.camera)):
         params = dict(section)
         checked_params(kind, params.pop("driver"), params)
-    assert bench.capture == Procedure()  # the page shows the defaults
+    assert bench.capture == CaptureSettings()  # the page shows the defaults
     switch = laser(bench.laser, 3, tmp_path, pytest.fail)
     assert "{channel}" in switch.command
 

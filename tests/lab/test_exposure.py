@@ -4,7 +4,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.exposure import Averaged, Dark, auto_exposure, averaged, combined, dark_frames, dark_level
-from holobench_eval.lab.settings import Procedure
+from holobench_eval.lab.settings import CaptureSettings
 from tests.support.simulated_devices import SimulatedCamera, Still
 
 
@@ -122,22 +122,22 @@ def test_samples_saturated_in_every_exposure_count_as_saturated():
 
 
 def test_a_procedure_needs_dark_frames_or_a_dark_level():
-    assert Procedure().dark > 0
-    assert Procedure(dark=0, dark_level=64.0).dark_level == 64.0
+    assert CaptureSettings().dark > 0
+    assert CaptureSettings(dark=0, dark_level=64.0).dark_level == 64.0
     for wrong in ({"dark": 0}, {"dark": 4, "dark_level": 64.0}):
         with pytest.raises(UserError, match="either dark frames"):
-            Procedure(**wrong)
+            CaptureSettings(**wrong)
 
 
 def test_exposures_are_one_for_all_channels_or_one_for_each():
-    assert Procedure().exposures(3) is None
-    assert Procedure(exposure=0.1).exposures(3) == (0.1, 0.1, 0.1)
-    assert Procedure(exposure=(0.1, 0.2)).exposures(2) == (0.1, 0.2)
+    assert CaptureSettings().exposures(3) is None
+    assert CaptureSettings(exposure=0.1).exposures(3) == (0.1, 0.1, 0.1)
+    assert CaptureSettings(exposure=(0.1, 0.2)).exposures(2) == (0.1, 0.2)
     with pytest.raises(UserError, match="2 values, but the panel has 3"):
-        Procedure(exposure=(0.1, 0.2)).exposures(3)
+        CaptureSettings(exposure=(0.1, 0.2)).exposures(3)
 
 
 @pytest.mark.parametrize("wrong", [{"exposure": -1.0}, {"exposure": (0.1, 0.0)}, {"exposure": 1e9}, {"settle": -0.1}])
 def test_times_out_of_range_are_one_line_that_names_the_key(wrong):
     with pytest.raises(UserError, match=rf"capture\.{next(iter(wrong))} should be auto, or"):
-        Procedure(**wrong)
+        CaptureSettings(**wrong)

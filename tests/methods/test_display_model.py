@@ -12,7 +12,7 @@ from torch.nn import functional
 
 from holobench_eval.display import load_profile
 from holobench_eval.display.api import DisplaySpec, Region
-from holobench_eval.display.calibrated import concentration
+from holobench_eval.display.calibrated import white_irradiance
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import LookUpTable, ZeroOrder
 from holobench_eval.methods.display_model import KNOTS, MODES, DisplayModel
@@ -301,7 +301,7 @@ def measured(colours: int, count: int) -> tuple[DisplaySpec, list[Sample]]:
     for number in range(count):
         coarse = torch.rand(1, colours, 7, 7, generator=draw)
         target = functional.interpolate(coarse, spec.region.shape, mode="bilinear")[0]
-        light = concentration(target, spec)
+        light = white_irradiance(target, spec)
         handle = type("Handle", (), {"spec": spec})()
         # spread over the levels, and none in the middle of the wrap
         phase = Wirtinger(iterations=5, offset="none").solve(target[None], handle)[0] + TAU * (number + 0.5) / count

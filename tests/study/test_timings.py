@@ -7,7 +7,7 @@ import pytest
 
 from holobench_eval.study import timings
 from holobench_eval.study.config import load_study
-from holobench_eval.study.cost import Effort
+from holobench_eval.study.cost import Cost
 from holobench_eval.study.plan import Task, plan
 from tests.support.fake_study import write_config
 
@@ -18,24 +18,24 @@ def task(tmp_path: Path) -> Task:
 
 
 def test_the_first_measurement_is_the_one_reported() -> None:
-    assert timings.keep("a", Effort(2.5, 40.0)) == Effort(2.5, 40.0)
-    assert timings.keep("a", Effort(9.0, 50.0)) == Effort(2.5, 40.0)
-    assert timings.keep("a", Effort(9.0, None)) == Effort(2.5, 40.0)
-    assert timings.known("a") == Effort(2.5, 40.0)
+    assert timings.keep("a", Cost(2.5, 40.0)) == Cost(2.5, 40.0)
+    assert timings.keep("a", Cost(9.0, 50.0)) == Cost(2.5, 40.0)
+    assert timings.keep("a", Cost(9.0, None)) == Cost(2.5, 40.0)
+    assert timings.known("a") == Cost(2.5, 40.0)
 
 
 def test_measuring_again_replaces_it() -> None:
-    timings.keep("a", Effort(2.5, 40.0))
-    assert timings.keep("a", Effort(9.0, 50.0), again=True) == Effort(9.0, 50.0)
-    assert timings.keep("a", Effort(1.0, 10.0)) == Effort(9.0, 50.0)
+    timings.keep("a", Cost(2.5, 40.0))
+    assert timings.keep("a", Cost(9.0, 50.0), again=True) == Cost(9.0, 50.0)
+    assert timings.keep("a", Cost(1.0, 10.0)) == Cost(9.0, 50.0)
 
 
 def test_a_time_that_was_kept_without_memory_stays_and_gets_the_first_memory() -> None:
     timings.folder().mkdir(parents=True)
     (timings.folder() / "a.json").write_text('{"seconds": 2.5}')
-    assert timings.keep("a", Effort(9.0)) == Effort(2.5)
-    assert timings.keep("a", Effort(9.0, 40.0)) == Effort(2.5, 40.0)
-    assert timings.keep("a", Effort(9.0, 50.0)) == Effort(2.5, 40.0)
+    assert timings.keep("a", Cost(9.0)) == Cost(2.5)
+    assert timings.keep("a", Cost(9.0, 40.0)) == Cost(2.5, 40.0)
+    assert timings.keep("a", Cost(9.0, 50.0)) == Cost(2.5, 40.0)
 
 
 DAMAGED = ["", "[]", "{}", '{"seconds": "x"}', '{"seconds": -1}', '{"seconds": NaN}', "\xff"]
@@ -44,10 +44,10 @@ DAMAGED += ['{"seconds": 1, "memory_mib": -1}', '{"seconds": 1, "memory_mib": [2
 
 @pytest.mark.parametrize("content", DAMAGED)
 def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
-    timings.keep("a", Effort(2.5))
+    timings.keep("a", Cost(2.5))
     (timings.folder() / "a.json").write_text(content, encoding="latin-1")
     assert timings.known("a") is None
-    assert timings.keep("a", Effort(3.0)) == Effort(3.0)
+    assert timings.keep("a", Cost(3.0)) == Cost(3.0)
 
 
 def test_without_a_folder_to_write_to_what_was_measured_is_reported(
@@ -55,8 +55,8 @@ def test_without_a_folder_to_write_to_what_was_measured_is_reported(
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert timings.keep("a", Effort(2.5)) == Effort(2.5)
-    assert timings.keep("a", Effort(3.5)) == Effort(3.5)
+    assert timings.keep("a", Cost(2.5)) == Cost(2.5)
+    assert timings.keep("a", Cost(3.5)) == Cost(3.5)
 
 
 def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repeat(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.seeds import generator
-from holobench_eval.display import MeteredBench, Workbench, load_profile
+from holobench_eval.display import CalibratedBench, MeteredDisplay, load_profile
 from holobench_eval.study import cell, job, scoring, training
 from holobench_eval.study.store import Record
 
@@ -125,8 +125,8 @@ class FakeBench:
         repeat: int,
         budget: int | None = None,
         learned: Any = None,
-    ) -> MeteredBench:
-        return MeteredBench(cast(Workbench, self), label, target, (item, repeat), method, budget, learned)
+    ) -> MeteredDisplay:
+        return MeteredDisplay(cast(CalibratedBench, self), label, target, (item, repeat), method, budget, learned)
 
     def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
         shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000

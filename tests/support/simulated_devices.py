@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from holobench_eval.display import Workbench, load_profile
+from holobench_eval.display import CalibratedBench, load_profile
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages.relay import sample
 from holobench_eval.imaging.convention import Levels
@@ -42,7 +42,7 @@ def bench(profile: str = "leto-mild") -> SimulatedBench:
 @lru_cache(maxsize=4)
 def letter_phase(profile: str = "leto-mild", initial_phase: InitialPhase = "random") -> Tensor:
     """Hologram ``(3, H, W)`` of the letter from nominal optics."""
-    place = Workbench(bench(profile), 0)
+    place = CalibratedBench(bench(profile), 0)
     target = letter(place.spec.region.shape).expand(3, -1, -1)
     handle = place.for_method(Wirtinger(), "wirtinger", target, "letter", 0)
     return Wirtinger(iterations=30, initial_phase=initial_phase).solve(target[None], handle)[0]

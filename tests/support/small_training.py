@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from holobench_eval.core import seeds
 from holobench_eval.display.api import Capture, DisplaySpec, Region
-from holobench_eval.display.calibrated import MeteredBench, Workbench, concentration
+from holobench_eval.display.calibrated import CalibratedBench, MeteredDisplay, white_irradiance
 from holobench_eval.display.training import TrainingBench, TrainingImage
 
 
@@ -90,7 +90,7 @@ class BentDisplay:
         return Capture(frame + 0.01 * noise, dark=0.0, white=math.inf, gain=(1.0,) * len(frame))
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        return capture.linear() / concentration(target, self.spec)[:, None, None]
+        return capture.linear() / white_irradiance(target, self.spec)[:, None, None]
 
 
 class Memory:
@@ -136,15 +136,15 @@ def training_bench(
 ) -> TrainingBench:
     """The bench that a training starts on, and starts on again with the same memory after a kill."""
     memory.fate = Fate() if fate is None else fate
-    display = cast(Workbench, BentDisplay(spec, memory.fate))
+    display = cast(CalibratedBench, BentDisplay(spec, memory.fate))
     numbered = pictures(spec, images + held_out)
     given = [TrainingImage(f"picture {number}", picture) for number, picture in enumerate(numbered)]
     return TrainingBench(display, "small", given[:images], given[images:], memory, None, seed)
 
 
-def solving_bench(method: object, target: Tensor, spec: DisplaySpec, learned: Mapping[str, Any]) -> MeteredBench:
+def solving_bench(method: object, target: Tensor, spec: DisplaySpec, learned: Mapping[str, Any]) -> MeteredDisplay:
     """The bench on which a trained method solves ``target`` ``(C, h, w)``."""
-    return MeteredBench(cast(Any, BentDisplay(spec)), "small", target, ("solve", 0), method, None, learned)
+    return MeteredDisplay(cast(Any, BentDisplay(spec)), "small", target, ("solve", 0), method, None, learned)
 
 
 def same(one: Any, other: Any) -> bool:

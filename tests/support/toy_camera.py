@@ -12,7 +12,7 @@ from torch.nn import functional
 from holobench_eval.core import seeds
 from holobench_eval.core.errors import BudgetError
 from holobench_eval.display.api import Capture, DisplaySpec, Region
-from holobench_eval.display.calibrated import MeteredBench, concentration
+from holobench_eval.display.calibrated import MeteredDisplay, white_irradiance
 
 SPEC = DisplaySpec(
     name="toy",
@@ -50,7 +50,7 @@ class ToyDisplay:
         return self.spec.region.crop(torch.stack(fields)).abs().square()
 
     def session(self, names: tuple[object, ...], target: Tensor) -> ToyDisplay:
-        return replace(self, names=names, noise=self.noise * concentration(target, self.spec)[:, None, None])
+        return replace(self, names=names, noise=self.noise * white_irradiance(target, self.spec)[:, None, None])
 
     def announce(self, phases):
         pass
@@ -63,10 +63,10 @@ class ToyDisplay:
         return Capture(frame, dark=0.0, white=math.inf, gain=(1.0,) * len(frame))
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        return capture.linear() / concentration(target, self.spec)[:, None, None]
+        return capture.linear() / white_irradiance(target, self.spec)[:, None, None]
 
-    def handle(self, method: object, target: Tensor, budget: int | None = None) -> MeteredBench:
-        return MeteredBench(self, "toy", target, ("item", 0), method, budget)
+    def handle(self, method: object, target: Tensor, budget: int | None = None) -> MeteredDisplay:
+        return MeteredDisplay(self, "toy", target, ("item", 0), method, budget)
 
     def error(self, phase: Tensor, target: Tensor) -> Tensor:
         """Mean squared error ``(C,)`` of the noise-free picture, as it is scored."""
@@ -85,7 +85,7 @@ class ToyDisplay:
 class Plug:
     """A handle whose display ends the captures without a warning."""
 
-    def __init__(self, handle: MeteredBench, at: int) -> None:
+    def __init__(self, handle: MeteredDisplay, at: int) -> None:
         self._handle, self._at = handle, at
 
     def __getattr__(self, name: str) -> object:

@@ -16,7 +16,7 @@ from torch import Tensor
 from ...core.errors import UserError
 from ...datasets.charts import Charts
 from ...display import load_profile, open_bench
-from ...display.calibrated import Workbench
+from ...display.calibrated import CalibratedBench
 from ...display.simulated.pipeline import SimulatedBench
 from ...display.simulated.stages import PixelAperture
 from ...methods.wirtinger import Wirtinger
@@ -49,7 +49,7 @@ def drawn_from(path: Path) -> str:
         return ""
 
 
-def save_sheet(workbench: Workbench, note: str, path: Path, source: str = "") -> Path:
+def save_sheet(workbench: CalibratedBench, note: str, path: Path, source: str = "") -> Path:
     """Write the sheet of an open bench; ``note`` says how its panel was scaled. A few seconds at 256 x 256.
 
     source: what it is drawn from, kept in the file (PNG), so that it need not be drawn again.
@@ -153,7 +153,7 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     _picture(axes[5], response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
 
 
-def _chart(axes: list[Axes], workbench: Workbench) -> None:
+def _chart(axes: list[Axes], workbench: CalibratedBench) -> None:
     """A flat phase (zero order and fringes), sensor noise, and a capture of a chart beside its target."""
     spec, bench = workbench.spec, workbench.bench
     flat = torch.zeros(3, *spec.shape)

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.display.api import DisplaySpec
-from holobench_eval.display.calibrated import concentration
+from holobench_eval.display.calibrated import white_irradiance
 from holobench_eval.methods.calibrated.approximator import ModelApproximator
 from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
 from holobench_eval.methods.calibrated.hybrid import HybridModel
@@ -53,7 +53,7 @@ def samples(spec: DisplaySpec, capture: Callable[[Tensor], Tensor], count: int, 
     found = []
     for number in range(count):
         phase, target = a_phase(spec, seed + number), pictures(spec, 1, number)[0]
-        light = concentration(target, spec)
+        light = white_irradiance(target, spec)
         found.append(Sample(phase, capture(phase) / light[:, None, None], target, light))
     return found
 

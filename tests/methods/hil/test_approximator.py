@@ -10,7 +10,7 @@ from torch import Tensor
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.display.api import DisplaySpec
-from holobench_eval.display.calibrated import concentration
+from holobench_eval.display.calibrated import white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.judge import Judge
 from holobench_eval.methods.hil.loop import Sample
@@ -44,7 +44,7 @@ def phases(count: int = 1, spec: DisplaySpec = SPEC) -> list[Tensor]:
 def samples(count: int = 2, spec: DisplaySpec = SPEC) -> list[Sample]:
     targets = pictures(spec, count)
     return [
-        Sample(phase, 0.3 * target.flip(-1) + 0.1, target, concentration(target, spec))
+        Sample(phase, 0.3 * target.flip(-1) + 0.1, target, white_irradiance(target, spec))
         for phase, target in zip(phases(count, spec), targets, strict=True)
     ]
 
@@ -65,7 +65,7 @@ def test_the_input_is_the_ideal_intensity_in_the_unit_of_the_target(optics: dict
 def test_a_hologram_that_gives_all_its_light_to_a_target_is_as_bright_as_it() -> None:
     (target,) = pictures(SPEC)
     power = SPEC.shape[0] * SPEC.shape[1]
-    gathered = concentration(target, SPEC) * target.sum((1, 2))
+    gathered = white_irradiance(target, SPEC) * target.sum((1, 2))
     assert torch.allclose(gathered, torch.full((3,), float(power)), rtol=1e-5)
 
 

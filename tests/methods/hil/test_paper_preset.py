@@ -17,7 +17,7 @@ resource.setrlimit(resource.RLIMIT_AS, (int(24e9), int(24e9)))
 import torch
 from tests.support.small_training import pictures
 from holobench_eval.display.api import DisplaySpec, Region
-from holobench_eval.display.calibrated import concentration
+from holobench_eval.display.calibrated import white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
@@ -30,7 +30,7 @@ spec = DisplaySpec(
 )
 (target,) = pictures(spec)
 phase = 4 * target.flip(-1)
-sample = Sample(phase, 0.8 * target, target, concentration(target, spec))
+sample = Sample(phase, 0.8 * target, target, white_irradiance(target, spec))
 approximator = NetworkApproximator(spec, Network(preset="paper"), Objective(), with_judge=True, seed=0)
 approximator.expose([sample])
 losses = approximator.step(sample, 0.0)

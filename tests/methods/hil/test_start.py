@@ -9,7 +9,7 @@ from torch import Tensor
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile, open_bench
-from holobench_eval.display.calibrated import MeteredBench
+from holobench_eval.display.calibrated import MeteredDisplay
 from holobench_eval.methods.hil.start import SmoothStart
 from holobench_eval.methods.losses import intensity_l2
 from holobench_eval.methods.wirtinger import Wirtinger
@@ -18,9 +18,9 @@ PANEL = (96, 96)
 
 
 @pytest.fixture(scope="module")
-def bench() -> MeteredBench:
+def bench() -> MeteredDisplay:
     workbench = open_bench(load_profile("ideal"), PANEL)
-    return MeteredBench(workbench, "start", bright(workbench.spec.region.shape), ("test",))
+    return MeteredDisplay(workbench, "start", bright(workbench.spec.region.shape), ("test",))
 
 
 def bright(shape: tuple[int, int]) -> Tensor:
@@ -35,7 +35,7 @@ def dark(shape: tuple[int, int]) -> Tensor:
     return image
 
 
-def error(phase: Tensor, target: Tensor, bench: MeteredBench, channel: int) -> float:
+def error(phase: Tensor, target: Tensor, bench: MeteredDisplay, channel: int) -> float:
     """Relative squared error of the ideal picture of a colour."""
     field = bench.spec.propagator(channel).forward(torch.polar(torch.ones_like(phase), phase)[None, channel])
     intensity = bench.spec.region.crop(field.abs().square())
@@ -43,13 +43,13 @@ def error(phase: Tensor, target: Tensor, bench: MeteredBench, channel: int) -> f
 
 
 @pytest.mark.parametrize("picture", [bright, dark])
-def test_every_colour_ends_within_the_tolerance(bench: MeteredBench, picture: object) -> None:
+def test_every_colour_ends_within_the_tolerance(bench: MeteredDisplay, picture: object) -> None:
     target = picture(bench.spec.region.shape)  # type: ignore[operator]
     phase = SmoothStart(tolerance=0.2).solve(target[None], bench)[0]
     assert max(error(phase, target, bench, channel) for channel in range(3)) <= 0.2
 
 
-def test_it_stops_as_soon_as_it_may(bench: MeteredBench) -> None:
+def test_it_stops_as_soon_as_it_may(bench: MeteredDisplay) -> None:
     """One iteration fewer than it made would not have done."""
     target = bright(bench.spec.region.shape)
     phase = SmoothStart(tolerance=0.2).solve(target[None], bench)[0]
@@ -60,14 +60,14 @@ def test_it_stops_as_soon_as_it_may(bench: MeteredBench) -> None:
         torch.testing.assert_close(phase[channel], paths[first][channel])
 
 
-def test_an_image_does_not_depend_on_those_beside_it(bench: MeteredBench) -> None:
+def test_an_image_does_not_depend_on_those_beside_it(bench: MeteredDisplay) -> None:
     pair = torch.stack([bright(bench.spec.region.shape), dark(bench.spec.region.shape)])
     start = SmoothStart(tolerance=0.2)
     together = start.solve(pair, bench)
     assert torch.equal(together, torch.cat([start.solve(image[None], bench) for image in pair]))
 
 
-def test_tolerance_zero_is_wirtinger_holography(bench: MeteredBench) -> None:
+def test_tolerance_zero_is_wirtinger_holography(bench: MeteredDisplay) -> None:
     target = bright(bench.spec.region.shape)[None]
     assert torch.equal(
         SmoothStart(iterations=6, tolerance=0).solve(target, bench), Wirtinger(iterations=6).solve(target, bench)

@@ -56,7 +56,7 @@ class Sensor:
     def expose(self, light: Tensor, electrons: float, response: Tensor, draw: torch.Generator) -> Tensor:
         """Counts [DN] ``(Hs, Ws)`` of ``light`` (mean incident light on the panel is 1) at ``electrons`` per unit.
 
-        Shot noise is drawn as a normal number of the same variance, which it is to below the read noise from about
+        RectifiedCapture noise is drawn as a normal number of the same variance, which it is to below the read noise from about
         twenty electrons on.
         """
         charge = light * response * electrons
