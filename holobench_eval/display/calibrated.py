@@ -181,7 +181,7 @@ class CalibratedBench(Shows):
         )
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        """A capture as ``(C, h, w)`` in the target's frame, on its device, and in the unit of ``RectifiedCapture.image``."""
+        """A capture as ``(C, h, w)`` in the frame of the target, on its device, in the unit of ``RectifiedCapture``."""
         light = self.registration.rectify(capture.linear()).to(target.device)
         return light / white_irradiance(target, self.spec)[: light.shape[0], None, None]
 

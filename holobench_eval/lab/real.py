@@ -139,7 +139,7 @@ class RealBench(Shows):
     ) -> RectifiedCapture:
         """Show ``phase`` ``(C, H, W)`` [rad] and bring its photograph into the frame of ``target`` ``(C, h, w)``.
 
-        Exposures as in ``CalibratedBench.photograph``; "matched" sets the exposure time in the place of the laser power.
+        Exposures as in ``CalibratedBench.photograph``; "matched" sets the exposure time, not the laser power.
         """
         check_phase(phase, self.spec, label)
         names, relative = (self.seed, item, repeat, "score"), self.relative_exposure(target)

@@ -56,8 +56,7 @@ class Sensor:
     def expose(self, light: Tensor, electrons: float, response: Tensor, draw: torch.Generator) -> Tensor:
         """Counts [DN] ``(Hs, Ws)`` of ``light`` (mean incident light on the panel is 1) at ``electrons`` per unit.
 
-        RectifiedCapture noise is drawn as a normal number of the same variance, which it is to below the read noise from about
-        twenty electrons on.
+        Shot noise is the normal approximation of Poisson noise; its error is below the read noise above 20 e-.
         """
         charge = light * response * electrons
         if self.ambient:
