@@ -29,7 +29,7 @@ class Predictor(Protocol):
     """A trained method that predicts captures."""
 
     def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light in the unit of ``RectifiedCapture``."""
+        """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, in the unit of ``RectifiedCapture``."""
         ...
 
 
