@@ -1,1 +1,53 @@
-"""The command line, a command a file."""
+"""The command line: ``holoeval COMMAND``, a command a file. Heavy libraries are imported inside functions."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+
+import typer
+
+from ..core.errors import UserError
+
+# In the order of the help. Each is the name of a file in this folder and of the function, or group of functions, in it.
+COMMANDS = (
+    "score",
+    "doctor",
+    "bench",
+    "run",
+    "plan",
+    "report",
+    "list_",
+    "new_method",
+    "check",
+    "show",
+    "conformance",
+    "calibrate",
+    "session",
+)
+
+app = typer.Typer(
+    name="holoeval",
+    help="Compare phase-retrieval methods for holographic displays on simulated, imperfect benches.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+for _file in COMMANDS:
+    _name = _file.rstrip("_").replace("_", "-")
+    _command: Callable[..., None] | typer.Typer = getattr(import_module(f".{_file}", __name__), _file)
+    if isinstance(_command, typer.Typer):
+        app.add_typer(_command, name=_name)
+    else:
+        app.command(_name)(_command)
+
+
+def main() -> None:
+    """Run the command line; bad input and files that cannot be used are one line on stderr and exit code 2."""
+    try:
+        app()
+    except (UserError, OSError) as error:
+        print(f"holoeval: {' '.join(str(error).split())}", file=sys.stderr)
+        sys.exit(2)

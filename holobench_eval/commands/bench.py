@@ -1,4 +1,4 @@
-"""The command ``holoeval bench``."""
+"""``holoeval bench``: how fast the package is, beside others' code or against another revision of itself."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
+from rich.progress import Progress, TimeRemainingColumn
+from rich.table import Table
 
 from .output import console
 
-WHOLE, PART = Path("reports/performance"), Path(".benchmarks/part")
-"""Folders of reports; a part never takes the place of the whole."""
+COMPLETE, PART = Path("reports/performance"), Path(".benchmarks/part")  # so that a part never replaces the complete
 
 
 def bench(
@@ -35,8 +37,7 @@ def bench(
     before = machine.describe(load)
     compared = report.beside_others(timings)
     timings = [replace(one, memory=suite.peak_memory(one)) if one.group in compared else one for one in timings]
-    folder = WHOLE if only is None else PART
-    print(report.write(output or folder, timings, before))
+    print(report.write(output or (COMPLETE if only is None else PART), timings, before))
     if not complete:
         print("not all could be timed; what pytest printed says why")
         raise typer.Exit(1)
@@ -44,10 +45,6 @@ def bench(
 
 def _compare(revision: str, only: str | None) -> None:
     """Print a verdict for every case; exit code 1 if one is slower."""
-    from rich.markup import escape
-    from rich.progress import Progress, TimeRemainingColumn
-    from rich.table import Table
-
     from ..benchmarks.against import COMPARED, MARGIN, against
     from ..benchmarks.suite import names
 
@@ -57,17 +54,16 @@ def _compare(revision: str, only: str | None) -> None:
     with Progress(*columns, console=screen, transient=True) as progress:
         task = progress.add_task("timing", total=None)
 
-        def said(case: str, done: int, total: int) -> None:
+        def advance(case: str, done: int, total: int) -> None:
             progress.update(task, description=escape(case), completed=done, total=total)
 
-        found = against(revision, cases, said)
-    table = Table(title=f"working tree over {escape(revision)}", title_justify="left")
-    for heading in ("", "ratio of times", "interval", "verdict"):
-        table.add_column(heading)
-    for one in found:
-        interval = one.reason or f"{one.lower:.3f} to {one.upper:.3f}"
-        table.add_row(escape(one.case), f"{one.ratio:.3f}", escape(interval), one.verdict)
+        comparisons = against(revision, cases, advance)
+    title = f"working tree over {escape(revision)}"
+    table = Table("", "ratio of times", "interval", "verdict", title=title, title_justify="left")
+    for row in comparisons:
+        interval = row.reason or f"{row.lower:.3f} to {row.upper:.3f}"
+        table.add_row(escape(row.case), f"{row.ratio:.3f}", escape(interval), row.verdict)
     screen.print(table)
     screen.print(f"intervals: 99 % for all together; changes below {MARGIN - 1:.0%} are not counted", markup=False)
-    if any(one.verdict == "slower" for one in found):
+    if any(row.verdict == "slower" for row in comparisons):
         raise typer.Exit(1)

@@ -5,25 +5,25 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
+if TYPE_CHECKING:
     from ..report import Results
     from ..study.config import Study
 
 
 def console() -> Console:
     """A console as wide as its terminal; wide enough for tables where there is none."""
-    from rich.console import Console
-
-    found = Console()
-    return found if found.is_terminal else Console(width=160)
+    screen = Console()
+    return screen if screen.is_terminal else Console(width=160)
 
 
 def write_report(
     console: Console, study: Study, records: list[dict[str, object]], output: Path, known: dict[str, object]
 ) -> None:
-    """Write a study's report and print its headline tables."""
+    """Write a study's report and print its headline tables. known: its provenance."""
     from ..report import build_report
 
     written, results = build_report(study, records, output, known)
@@ -33,9 +33,6 @@ def write_report(
 
 def print_headline(console: Console, results: Results) -> None:
     """Print the headline table of every condition."""
-    from rich.markup import escape
-    from rich.table import Table
-
     from ..report import headline_rows
 
     for condition in results.conditions:

@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 from holobench_eval.benchmarks import against, machine, suite
 from holobench_eval.benchmarks.against import Comparison
 from holobench_eval.benchmarks.suite import Timing
-from holobench_eval.commands.app import app
+from holobench_eval.commands import app
 
 DESCRIBED = {
     "revision": "abc",

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from holobench_eval.commands.report_check import check
+from holobench_eval.commands.check import problems_in
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import layout_of, recompute_table
 from holobench_eval.report.data.tables import csv_text, records_frame
@@ -29,7 +29,7 @@ def report(tmp_path: Path) -> Path:
 
 
 def problems(report: Path) -> list[str]:
-    reports, found = check(report.parent)
+    reports, found = problems_in(report.parent)
     assert reports == 1
     return found
 
@@ -75,4 +75,4 @@ def test_a_damaged_provenance_is_found(report: Path) -> None:
 
 def test_a_folder_without_reports_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no reports"):
-        check(tmp_path)
+        problems_in(tmp_path)

@@ -5,9 +5,10 @@ import time
 from types import SimpleNamespace
 
 import pytest
+import typer
 
-from holobench_eval.commands import diagnosis as module
-from holobench_eval.commands.diagnosis import Finding, _asked, doctor, main
+from holobench_eval.commands import doctor as module
+from holobench_eval.commands.doctor import Finding, _ask, doctor, examine
 
 DEVICES = [
     {"kind": "slm", "driver": "monitor", "version": "2.1", "devices": ["HDMI-2, 1920x1080"], "why": ""},
@@ -22,11 +23,17 @@ def quick(monkeypatch, tmp_path):
     monkeypatch.setenv("TORCH_HOME", str(tmp_path))
     monkeypatch.chdir(tmp_path)
 
-    def asked(code, seconds, *arguments):
+    def answer(code, seconds, *arguments):
         return DEVICES if "drivers" in code else {"errors": {}, "threads": 2, "gpus": []}
 
-    monkeypatch.setattr(module, "_asked", asked)
+    monkeypatch.setattr(module, "_ask", answer)
     return monkeypatch
+
+
+def exit_code():
+    with pytest.raises(typer.Exit) as stopped:
+        doctor()
+    return stopped.value.exit_code
 
 
 def named(findings, what):
@@ -34,15 +41,15 @@ def named(findings, what):
 
 
 def test_this_installation_has_all_that_the_core_needs():
-    code = "from holobench_eval.commands.diagnosis import main; raise SystemExit(main())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=400)
+    code = "from holobench_eval.commands import main; main()"
+    done = subprocess.run([sys.executable, "-c", code, "doctor"], capture_output=True, text=True, timeout=400)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "the core is complete" in done.stdout
     assert "cameras: gphoto2" in done.stdout
 
 
 def test_devices_and_what_keeps_them_from_answering_are_listed(quick):
-    findings = doctor()
+    findings = examine()
     assert named(findings, "panels: monitor") == Finding("panels: monitor", "ok", "2.1; HDMI-2, 1920x1080")
     absent = named(findings, "panels: slmsuite")
     assert (absent.state, absent.remedy) == ("missing", "pip install 'x[slmsuite]'")
@@ -51,37 +58,37 @@ def test_devices_and_what_keeps_them_from_answering_are_listed(quick):
 
 
 def test_everything_missing_has_something_to_do(quick):
-    assert all(each.remedy for each in doctor() if each.state != "ok")
+    assert all(each.remedy for each in examine() if each.state != "ok")
 
 
 def test_weights_that_are_absent_are_one_command_away(quick, tmp_path):
-    absent = named(doctor(), "LPIPS weights (AlexNet)")
+    absent = named(examine(), "LPIPS weights (AlexNet)")
     place = tmp_path / "hub" / "checkpoints" / "alexnet-owt-7be5be79.pth"
     assert absent.state == "missing"
     assert absent.remedy.startswith(f"curl -L --create-dirs -o {place} https://")
     place.parent.mkdir(parents=True)
     place.touch()
-    assert named(doctor(), "LPIPS weights (AlexNet)") == Finding("LPIPS weights (AlexNet)", "ok", str(place))
+    assert named(examine(), "LPIPS weights (AlexNet)") == Finding("LPIPS weights (AlexNet)", "ok", str(place))
 
 
 def test_commands_are_printed_whole_for_copying(quick, capsys):
     quick.setenv("COLUMNS", "60")
-    assert main() == 0
+    assert exit_code() == 0
     assert "panels: slmsuite: pip install 'x[slmsuite]'" in capsys.readouterr().out.splitlines()
 
 
 def test_a_package_that_cannot_be_imported_is_broken_and_exits_1(quick, capsys):
     errors = {"kornia": "ImportError: no symbol"}
-    quick.setattr(module, "_asked", lambda code, *_: DEVICES if "drivers" in code else {"errors": errors})
-    assert named(doctor(), "kornia") == Finding("kornia", "missing", errors["kornia"], "pip install kornia", core=True)
-    assert main() == 1
+    quick.setattr(module, "_ask", lambda code, *_: DEVICES if "drivers" in code else {"errors": errors})
+    assert named(examine(), "kornia") == Finding("kornia", "missing", errors["kornia"], "pip install kornia", core=True)
+    assert exit_code() == 1
     assert capsys.readouterr().out.splitlines()[-1] == "broken: kornia"
 
 
 def test_the_wheel_with_windows_is_a_warning_since_it_overwrites_the_headless_one(quick):
     versions = {"opencv-python": "5.0", "opencv-python-headless": "5.0"}
     quick.setattr(module, "installed", versions.get)
-    found = named(doctor(), "OpenCV")
+    found = named(examine(), "OpenCV")
     assert found.state == "warning"
     assert found.remedy.startswith("pip uninstall -y opencv-python-headless opencv-python && pip install")
 
@@ -89,7 +96,7 @@ def test_the_wheel_with_windows_is_a_warning_since_it_overwrites_the_headless_on
 def test_a_full_disk_and_no_git_are_told(quick):
     quick.setattr(module.shutil, "disk_usage", lambda path: SimpleNamespace(free=1e8))
     quick.setattr(module.shutil, "which", lambda program: None)
-    findings = doctor()
+    findings = examine()
     assert named(findings, "disk").state == "warning"
     assert named(findings, "git").state == "missing"
 
@@ -99,22 +106,22 @@ def test_a_check_that_fails_is_a_finding(quick):
         raise RuntimeError("odd\nmachine")
 
     quick.setattr(module.shutil, "disk_usage", broken)
-    found = named(doctor(), "disk")
+    found = named(examine(), "disk")
     assert (found.state, found.found) == ("warning", "could not be looked at: RuntimeError: odd machine")
 
 
 def test_what_hangs_is_cut_off_and_what_crashes_is_told():
     started = time.monotonic()
-    assert _asked("import time; time.sleep(60)", 1.0) == "takes longer than 1 s"
+    assert _ask("import time; time.sleep(60)", 1.0) == "takes longer than 1 s"
     assert time.monotonic() - started < 20
-    assert str(_asked("import os; os.abort()", 20.0)).startswith("ends with -6")
-    assert _asked("raise SystemExit('no bus')", 20.0) == "ends with 1: no bus"
-    assert _asked(f"print('chatter'); print({json.dumps([1, 2])!r})", 20.0) == [1, 2]
+    assert str(_ask("import os; os.abort()", 20.0)).startswith("ends with -6")
+    assert _ask("raise SystemExit('no bus')", 20.0) == "ends with 1: no bus"
+    assert _ask(f"print('chatter'); print({json.dumps([1, 2])!r})", 20.0) == [1, 2]
 
 
 def test_drivers_that_crash_cost_one_line_and_no_exit_code(quick):
-    quick.setattr(module, "_asked", lambda code, *_: "ends with -11: x" if "drivers" in code else {"errors": {}})
-    found = named(doctor(), "drivers")
+    quick.setattr(module, "_ask", lambda code, *_: "ends with -11: x" if "drivers" in code else {"errors": {}})
+    found = named(examine(), "drivers")
     assert found.state == "warning"
     assert "ends with -11" in found.found
-    assert main() == 0
+    assert exit_code() == 0

@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-from holobench_eval.commands.score_folders import score_folders
+from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.imaging.align import Alignment
 from holobench_eval.metrics import score
@@ -53,8 +53,8 @@ def lay_out(root: Path) -> Path:
     return root
 
 
-def run(root: Path, **options: str) -> str:
-    report, _ = score_folders(root / "captures", root / "targets", root / "out", console=quiet(), **options)
+def run(root: Path, values: str = "stored", baseline: str | None = None) -> str:
+    report, _ = score_folders(root / "captures", root / "targets", root / "out", values, baseline, None, quiet())
     return report.read_text()
 
 
@@ -304,7 +304,7 @@ def test_wrong_choices_are_named(scored, options, line):
 def test_an_output_among_the_captures_is_refused(scored):
     root = scored[0]
     with pytest.raises(UserError, match="would mix with"):
-        score_folders(root / "captures", root / "targets", root / "captures" / "out", console=quiet())
+        score_folders(root / "captures", root / "targets", root / "captures" / "out", "stored", None, None, quiet())
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real captures are not here")

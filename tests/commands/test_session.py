@@ -14,7 +14,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 from typer.testing import CliRunner
 
-from holobench_eval.commands.app import app
+from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.hashing import digest
 from holobench_eval.lab.session import read_manifest

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from holobench_eval.commands.app import app
+from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.drivers import catalogue as drivers

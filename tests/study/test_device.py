@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import torch
 
-from holobench_eval.commands import app as cli
+from holobench_eval.commands import main
 from holobench_eval.core.device import CPU
 from holobench_eval.report.sections.description import environment
 from holobench_eval.study import clusters, provenance, timings
@@ -35,7 +35,7 @@ def test_a_gpu_that_is_not_there_is_one_line_and_exit_code_2(
     options = ["--output", str(output), "--device", "cuda"]
     monkeypatch.setattr(sys, "argv", ["holoeval", command[0], str(config), *command[1:], *options])
     with pytest.raises(SystemExit) as stopped:
-        cli.main()
+        main()
     assert stopped.value.code == 2
     printed = capsys.readouterr()
     assert printed.err.startswith("holoeval: --device cuda: torch ")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from holobench_eval.commands.preview import Row, preview, table
+from holobench_eval.commands.plan import Row, preview, table
 from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
 from holobench_eval.study.progress import Lines, watching

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.commands.preview import preview
+from holobench_eval.commands.plan import preview
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.io import file_name
 from holobench_eval.study import provenance

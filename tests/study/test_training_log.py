@@ -4,7 +4,7 @@ import math
 import pytest
 from rich.console import Console
 
-from holobench_eval.commands.preview import training_table, trainings
+from holobench_eval.commands.plan import training_table, trainings
 from holobench_eval.core.io import write_atomically
 from holobench_eval.report import layout_of
 from holobench_eval.study.artifacts import FAILURE, Artifacts

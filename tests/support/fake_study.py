@@ -202,7 +202,7 @@ def noted_work(task: job.Job) -> list[Record]:
 
 
 if __name__ == "__main__":
-    from holobench_eval.commands.app import main
+    from holobench_eval.commands import main
 
     install()
     sys.argv[0] = "holoeval"

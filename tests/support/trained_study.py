@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.commands import app as cli
+from holobench_eval.commands import main
+from holobench_eval.commands import run as run_command
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
@@ -81,9 +82,9 @@ def holoeval(patch: pytest.MonkeyPatch, config: Path, *options: str) -> int:
     folder = config.parent
     command = ["holoeval", "run", str(config), "--executor", "serial", "--output", str(folder / "out")]
     patch.setattr(sys, "argv", [*command, "--artifacts", str(folder / "artifacts"), *options])
-    patch.setattr(cli, "_sheets", lambda *_: None)
+    patch.setattr(run_command, "draw_sheets", lambda *_: None)
     with pytest.raises(SystemExit) as stopped:
-        cli.main()
+        main()
     code = stopped.value.code
     return code if isinstance(code, int) else 0
 

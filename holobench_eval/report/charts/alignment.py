@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.io import file_name, write_atomically
+from ...core.io import write_atomically
 from ...imaging.warp import Warp
 
 HEIGHT = 480  # pixels
@@ -18,11 +18,6 @@ YELLOW = (0, 255, 255)  # blue first
 BLACK = (0, 0, 0)
 
 Values = NDArray[np.float32]
-
-
-def alignment_name(method: str, target: str) -> str:
-    """The file of a capture's picture."""
-    return f"alignment-{file_name(method)}-{file_name(target)}.jpg"
 
 
 def draw_alignment(path: Path, capture: Values, warp: Warp, matched: Values, target: Values) -> None:

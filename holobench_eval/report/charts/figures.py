@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ...study.folders import alignment_name
 from ...study.plan import REFERENCE
 from ...study.store import Store
 from ..data.ranks import ranks
@@ -20,7 +21,6 @@ from ..sections.tables import label, leading_scores
 from ..sections.training import Trained
 from . import frontiers, sweep_figures
 from . import ranks as figure_ranks
-from .alignment import alignment_name
 from .charts import Chart, quality_bars, target_dots
 from .comparison import draw_comparison, tile_size
 from .gallery import Column, Picture, Tile, chunks, error_ceiling, error_map, load_picture, spread

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ...study.folders import FILES as FILES
+
 
 def plain(values: Mapping[str, Any]) -> str:
     """``a = 1, b = [2, 3]``: parameters as text on one line."""
@@ -181,9 +183,6 @@ FOCUS = replace(
     ),
 )
 
-
-FILES = "files"
-"""The measure of pictures that were given as files."""
 
 _COMPARED = {
     "stored": "in the values as stored",

@@ -23,32 +23,44 @@ from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
-from ...report.charts.alignment import alignment_name, draw_alignment
-from ...report.data.text import FILES
 from ..pictures import write_thumbnail
 from ..plan import FLOORS, REFERENCE
 from ..store import Record, Store
 from ..versions import ALIGNMENT, HARNESS
+from . import FILES, alignment_name
 from .files import Folders, Picture, Values
 
 CONDITION = "photographed display"
 
-Key = tuple[str, str]
-"""Method and name of the target."""
-Found = dict[Key, Alignment | str]
-"""Alignments, or the reasons why there are none."""
-Said = Callable[[str], None]
-"""Told the name of each step."""
+Key = tuple[str, str]  # method and name of the target
+Alignments = dict[Key, Alignment | str]  # or the reasons why there are none
+Step = Callable[[str], None]  # called with the name of each step
+Draw = Callable[[Path, Values, Warp, Values, Values], None]  # file, capture, warp, matched capture, target
 
 
 @dataclass(frozen=True)
 class Scoring:
-    """The pictures, where what is known of them is kept, and how they are read."""
+    """Given captures and how they are scored.
+
+    Parameters
+    ----------
+    folders
+        The captures and their targets.
+    store
+        Where records, alignments and pictures are kept.
+    values
+        How files are read: ``stored`` (as they are), ``srgb``, or ``linear`` (captures as linear light).
+    lpips_weights
+        File or folder of the LPIPS trunk.
+    draw
+        Draws the picture of an alignment from display-encoded values.
+    """
 
     folders: Folders
     store: Store
     values: str
     lpips_weights: str | None
+    draw: Draw
 
     @property
     def domain(self) -> str:
@@ -59,9 +71,9 @@ class Scoring:
     def metrics(self) -> list[str]:
         """Name and version of every metric that can be computed here."""
         weights = None if self.lpips_weights is None else Path(self.lpips_weights)
-        return [f"{one.name} {one.version}" for one in catalogue(weights) if one.available() is None]
+        return [f"{metric.name} {metric.version}" for metric in catalogue(weights) if metric.available() is None]
 
-    def records(self, step: Said) -> list[Record]:
+    def records(self, step: Step) -> list[Record]:
         """A record for every method and target, and for the floor; old pictures of alignments go."""
         found = self.alignments(step)
         placed = {**found, **self.common(found)}
@@ -82,9 +94,9 @@ class Scoring:
                 old.unlink()
         return records
 
-    def alignments(self, step: Said) -> Found:
+    def alignments(self, step: Step) -> Alignments:
         """Every capture's own alignment, from what is kept of an earlier run or computed."""
-        found: Found = {}
+        found: Alignments = {}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
             target = self.folders.targets[key[1]]
@@ -106,30 +118,32 @@ class Scoring:
                 "both have to be of one kind"
             }
         try:
-            return align(self.shown(picture.load()), target.load()).to_dict()
+            return align(self.viewable(picture.load()), target.load()).to_dict()
         except CellError as error:
             return {"refused": str(error)}
 
-    def shown(self, values: Values) -> Values:
+    def viewable(self, values: Values) -> Values:
         """Display-encoded values of a capture, in which it can be compared with its target by eye and by features."""
         if self.values != "linear":
             return values
         bright = max(float(np.percentile(values, 99.5)), 1e-6)
         return srgb_encode(torch.from_numpy(values) / bright).numpy()
 
-    def common(self, found: Found) -> Found:
+    def common(self, found: Alignments) -> Alignments:
         """The shared alignments: by frame size and shape of the target, for those that agree or that they fit."""
         captures, targets = self.folders.captures, self.folders.targets
         groups: dict[tuple[int, ...], list[Key]] = {}
         for key, picture in captures.items():
             groups.setdefault((*picture.shape, *targets[key[1]].shape), []).append(key)
-        placed: Found = {}
+        placed: Alignments = {}
         for keys in groups.values():
-            one = shared({key: own for key in keys if isinstance(own := found[key], Alignment)})
-            for key in keys if one is not None else ():
-                assert one is not None
-                if key in one[1] or isinstance(found[key], str):
-                    fits = confirmed(self.shown(captures[key].load()), targets[key[1]].load(), one[0])
+            common = shared({key: own for key in keys if isinstance(own := found[key], Alignment)})
+            if common is None:
+                continue
+            warp, agreeing = common
+            for key in keys:
+                if key in agreeing or isinstance(found[key], str):
+                    fits = confirmed(self.viewable(captures[key].load()), targets[key[1]].load(), warp)
                     placed |= {key: fits} if fits is not None else {}
         return placed
 
@@ -148,37 +162,26 @@ class Scoring:
         if known is not None and figure.is_file() and self.store.thumbnail(known.id).is_file():
             return known
         capture, target = self.folders.captures[key].load(), self.folders.targets[name].load()
-        image, wanted = (
-            torch.from_numpy(sampled(self.taken(capture), place.warp)),
-            torch.from_numpy(self.decoded(target)),
-        )
+        image = torch.from_numpy(sampled(self.capture_values(capture), place.warp))
+        wanted = torch.from_numpy(self.target_values(target))
         scores = self.scores(image, wanted) | self.second(capture, target, place.warp)
         full = sampled((capture >= 1).astype(np.float32), place.warp)
         record = Record(described, "done", method, scores=scores, saturated=float((full > 0.5).mean()))
         matched, _ = match(image, wanted)
         write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
-        draw_alignment(figure, self.shown(capture), place.warp, self.encoded(matched), target)
+        self.draw(figure, self.viewable(capture), place.warp, self.encoded(matched), target)
         self.store.write(record)
         return record
 
     def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
         """PSNR and SSIM by the geometry that another algorithm finds, and how far apart the two are."""
-        frame, reference = (
-            self.as_light(torch.from_numpy(self.taken(capture))),
-            self.as_light(torch.from_numpy(self.decoded(target))),
-        )
-        other = second_warp(gray(frame.numpy()), gray(reference.numpy()), first)
+        frame, wanted = self.capture_values(capture), torch.from_numpy(self.target_values(target))
+        light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(wanted)
+        other = second_warp(gray(light.numpy()), gray(reference.numpy()), first)
         if other is None:
             return {}
-        image = torch.from_numpy(sampled(self.taken(capture), other))
-        again = score(
-            image,
-            torch.from_numpy(self.decoded(target)),
-            refine=False,
-            blur=(),
-            metrics=("psnr", "ssim"),
-            stored=self.values == "stored",
-        )
+        image = torch.from_numpy(sampled(frame, other))
+        again = score(image, wanted, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored")
         scores = {f"{name}_{self.domain}_second": again[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return scores | {"second_aligner_px": disagreement(first, other)}
 
@@ -195,7 +198,8 @@ class Scoring:
         thumbnail = self.store.target_thumbnail(name)
         if len(kept) == len(rows) and thumbnail.is_file():
             return kept
-        wanted, *others = (torch.from_numpy(self.decoded(self.folders.targets[one].load())) for one in (name, *wrong))
+        pair = (self.folders.targets[target].load() for target in (name, *wrong))
+        wanted, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(wanted))
         pictures = floor_captures(wanted, others, name)
         records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], wanted)) for row in rows]
@@ -208,13 +212,13 @@ class Scoring:
         found = score(image, wanted, lpips_weights=self.lpips_weights, stored=self.values == "stored")
         return found if len(image) > 1 else {"match_factor" if k == "scale_0" else k: v for k, v in found.items()}
 
-    def decoded(self, target: Values) -> Values:
+    def target_values(self, target: Values) -> Values:
         """A target in the values that are compared."""
         return target if self.values == "stored" else srgb_decode(torch.from_numpy(target)).numpy()
 
-    def taken(self, capture: Values) -> Values:
+    def capture_values(self, capture: Values) -> Values:
         """A capture in the values that are compared."""
-        return self.decoded(capture) if self.values == "srgb" else capture
+        return self.target_values(capture) if self.values == "srgb" else capture
 
     def as_light(self, compared: Tensor) -> Tensor:
         """Linear light of values that are compared, for thumbnails, which are sRGB, and for the second aligner."""
@@ -222,8 +226,8 @@ class Scoring:
 
     def encoded(self, compared: Tensor) -> Values:
         """Display-encoded values of values that are compared."""
-        shown = compared if self.values == "stored" else srgb_encode(compared)
-        return shown.float().numpy()
+        values = compared if self.values == "stored" else srgb_encode(compared)
+        return values.float().numpy()
 
     def cell(self, method: str, name: str, place: Alignment | str | None, kind: str, wrong: str = "") -> dict[str, Any]:
         """The plain description of a number."""

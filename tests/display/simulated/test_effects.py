@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from holobench_eval.commands.listing import effects as listed
+from holobench_eval.commands.show import effects as listed
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.effects import effects
 from holobench_eval.display.simulated.profile import names

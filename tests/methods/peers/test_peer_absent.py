@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from holobench_eval.commands.listing import methods
+from holobench_eval.commands.list_ import methods
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.methods.peers.loading import load

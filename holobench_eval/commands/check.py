@@ -1,24 +1,33 @@
-"""Are committed reports still what their studies say? Re-checked without computing a cell."""
+"""``holoeval check``: whether committed reports still follow from their studies, without computing a cell."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from ..core.errors import UserError
-from ..study import provenance
-from ..study.config import load_study
-from ..study.plan import displays
 
 if TYPE_CHECKING:
     from ..study.config import Study
 
 
-def check(folder: Path) -> tuple[int, list[str]]:
-    """Number of reports in a folder, and a line for everything that no longer holds."""
+def check(folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports")) -> None:
+    """Check that committed reports still follow from their records, configs and profiles."""
+    reports, problems = problems_in(folder)
+    for problem in problems:
+        print(problem)
+    print(f"{reports} report{'s' * (reports > 1)}, {len(problems)} problem{'s' * (len(problems) != 1)}")
+    if problems:
+        raise typer.Exit(1)
+
+
+def problems_in(folder: Path) -> tuple[int, list[str]]:
+    """Number of reports in a folder, and a line for everything that no longer holds. UserError: no reports."""
     from ..benchmarks import report as performance
+    from ..study import provenance
 
     reports = sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
     timed = sorted(path.parent for path in folder.glob(f"*/{performance.MACHINE}"))
@@ -30,6 +39,9 @@ def check(folder: Path) -> tuple[int, list[str]]:
 
 
 def _problems(report: Path) -> Iterator[str]:
+    from ..study import provenance
+    from ..study.config import load_study
+
     try:
         known = provenance.read(report)
         lacking = [key for key in ("config", "config_sha256", "profiles") if key not in known]
@@ -43,13 +55,16 @@ def _problems(report: Path) -> Iterator[str]:
 
 
 def _study_problems(study: Study, known: dict[str, Any]) -> Iterator[str]:
-    if hashlib.sha256(study.text.encode()).hexdigest() != known["config_sha256"]:
+    from ..study.plan import displays
+    from ..study.provenance import text_digest
+
+    if text_digest(study.text) != known["config_sha256"]:
         yield "the config has changed since the report was made; run the study again"
-    for place in displays(study).values():
-        now = {"version": place.version, "sha256": place.digest}
-        then = dict(known["profiles"]).get(place.name)
+    for display in displays(study).values():
+        now = {"version": display.version, "sha256": display.digest}
+        then = dict(known["profiles"]).get(display.name)
         if then != now:
-            yield f"profile '{place.name}' was {then}, is now {now}; run the study again"
+            yield f"profile '{display.name}' was {then}, is now {now}; run the study again"
 
 
 def _table_problems(report: Path, study: Study) -> Iterator[str]:

@@ -1,7 +1,7 @@
-"""What is installed here, which displays and cameras answer, and what to do about each thing that is missing.
+"""``holoeval doctor``: what is installed, which displays and cameras answer, and what to do about what is missing.
 
-What runs other people's native code, imports and drivers, is asked in a process of its own with a time limit: a library
-that crashes or hangs is a finding.
+Imports and drivers run native code of others, so they run in a process of their own with a time limit: a library that
+crashes or hangs is a finding.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from importlib.metadata import requires, version
 from pathlib import Path
 from typing import Any, Literal
 
-from rich.console import Console
+import typer
 from rich.markup import escape
 from rich.table import Table
 
 from ..core.installed import installed
+from .output import console
 
 State = Literal["ok", "missing", "warning"]
 
@@ -75,51 +76,48 @@ class Finding:
 
     @property
     def broken(self) -> bool:
-        """Is this something that the core needs and does not have?"""
+        """Whether the core needs it and does not have it."""
         return self.core and self.state == "missing"
 
 
-def doctor() -> list[Finding]:
-    """Look at everything; raises nothing, and comes back within a few minutes whatever hangs."""
-    checks: tuple[tuple[str, Callable[[], Iterator[Finding]]], ...] = (
-        ("Python", _python),
-        ("packages", _packages),
-        ("OpenCV", _opencv),
-        ("git", _git),
-        ("disk", _disk),
-        ("weights", _weights),
-        ("peers", _peers),
-        ("drivers", _drivers),
-    )
-    findings: list[Finding] = []
-    for name, check in checks:
-        try:
-            findings += check()
-        except Exception as error:  # a check that fails says nothing about what it checks
-            reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            findings.append(Finding(name, "warning", f"could not be looked at: {reason}"))
-    return findings
-
-
-def main() -> int:
-    """Print the findings, then what to do; 1 if something that the core needs is broken, else 0."""
-    console = Console()
-    console = console if console.is_terminal else Console(width=160)
-    findings = doctor()
+def doctor() -> None:
+    """List what is installed, which panels and cameras answer, and what to do about each thing missing."""
+    screen, findings = console(), examine()
     table = Table(title="holoeval doctor", title_justify="left")
     for heading in ("", "", "found"):
         table.add_column(heading, overflow="fold")
     for finding in findings:
         state = "broken" if finding.broken else finding.state
         table.add_row(escape(finding.what), f"[{STYLES[state]}]{state}[/]", escape(finding.found))
-    console.print(table)
-    for finding in findings:
-        if finding.remedy:  # whole lines, which can be copied
-            console.print(f"{finding.what}: {finding.remedy}", soft_wrap=True, highlight=False, markup=False)
+    screen.print(table)
+    remedies = [f"{finding.what}: {finding.remedy}" for finding in findings if finding.remedy]
     broken = [finding.what for finding in findings if finding.broken]
     last = f"broken: {', '.join(broken)}" if broken else "the core is complete; what is missing is optional"
-    console.print(last, soft_wrap=True, highlight=False, markup=False)
-    return 1 if broken else 0
+    for line in (*remedies, last):  # never wrapped, so that commands can be copied
+        screen.print(line, soft_wrap=True, highlight=False, markup=False)
+    raise typer.Exit(1 if broken else 0)
+
+
+def examine() -> list[Finding]:
+    """Look at everything; raises nothing, and comes back within a few minutes whatever hangs."""
+    checks: dict[str, Callable[[], Iterator[Finding]]] = {
+        "Python": _python,
+        "packages": _packages,
+        "OpenCV": _opencv,
+        "git": _git,
+        "disk": _disk,
+        "weights": _weights,
+        "peers": _peers,
+        "drivers": _drivers,
+    }
+    findings: list[Finding] = []
+    for name, check in checks.items():
+        try:
+            findings += check()
+        except Exception as error:  # a check that fails says nothing about what it checks
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+            findings.append(Finding(name, "warning", f"could not be looked at: {reason}"))
+    return findings
 
 
 def _python() -> Iterator[Finding]:
@@ -131,11 +129,10 @@ def _python() -> Iterator[Finding]:
 def _packages() -> Iterator[Finding]:
     names = _required()
     modules = {MODULES.get(name, name.replace("-", "_")): name for name in names}
-    seen = _asked(LIBRARIES, IMPORTING, *modules)
+    seen = _ask(LIBRARIES, IMPORTING, *modules)
     if isinstance(seen, str):
-        yield Finding(
-            "packages", "missing", f"importing them all {seen}", "pip install -c constraints.txt -e .", core=True
-        )
+        remedy = "pip install -c constraints.txt -e ."
+        yield Finding("packages", "missing", f"importing them all {seen}", remedy, core=True)
         return
     for module, name in modules.items():
         wrong = seen["errors"].get(module)
@@ -165,10 +162,9 @@ def _opencv() -> Iterator[Finding]:
     if list(there) == ["opencv-python-headless"]:
         yield Finding("OpenCV", "ok", text)
     elif there:
+        why = f"{text}: not the headless wheel alone, which the results are tested with"
         remedy = f"pip uninstall -y {' '.join(there)} && pip install opencv-python-headless"
-        yield Finding(
-            "OpenCV", "warning", f"{text}: not the headless wheel alone, which the results are tested with", remedy
-        )
+        yield Finding("OpenCV", "warning", why, remedy)
 
 
 def _git() -> Iterator[Finding]:
@@ -185,10 +181,8 @@ def _disk() -> Iterator[Finding]:
     free = shutil.disk_usage(Path()).free
     enough = free >= LEAST_DISK
     text = f"{free / 1e9:.1f} GB free in {Path().resolve()}"
-    remedy = (
-        "" if enough else f"free some, or write elsewhere with --output; {LEAST_DISK / 1e9:.0f} GB do for most studies"
-    )
-    yield Finding("disk", "ok" if enough else "warning", text, remedy)
+    remedy = f"free some, or write elsewhere with --output; {LEAST_DISK / 1e9:.0f} GB do for most studies"
+    yield Finding("disk", "ok", text) if enough else Finding("disk", "warning", text, remedy)
 
 
 def _weights() -> Iterator[Finding]:
@@ -206,8 +200,8 @@ def _weights() -> Iterator[Finding]:
         if found is not None:
             yield Finding(name, "ok", str(found))
             continue
-        place = Path(torch.hub.get_dir()) / "checkpoints" / url.rpartition("/")[2]
-        command = f"curl -L --create-dirs -o {shlex.quote(str(place))} {url}"
+        file = Path(torch.hub.get_dir()) / "checkpoints" / url.rpartition("/")[2]
+        command = f"curl -L --create-dirs -o {shlex.quote(str(file))} {url}"
         yield Finding(name, "missing", without, command)
 
 
@@ -220,15 +214,14 @@ def _peers() -> Iterator[Finding]:
 
 def _drivers() -> Iterator[Finding]:
     raw = installed("rawpy")
-    remedy = "" if raw else _install("holobench_eval[raw]")
-    yield Finding(
-        "camera RAW files", "ok" if raw else "missing", f"rawpy {raw}" if raw else "rawpy: not installed", remedy
-    )
-    seen = _asked(DRIVERS, ASKING)
+    if raw:
+        yield Finding("camera RAW files", "ok", f"rawpy {raw}")
+    else:
+        yield Finding("camera RAW files", "missing", "rawpy: not installed", _install("holobench_eval[raw]"))
+    seen = _ask(DRIVERS, ASKING)
     if isinstance(seen, str):
-        yield Finding(
-            "drivers", "warning", f"asking panels and cameras {seen}", "unplug devices one by one and try again"
-        )
+        remedy = "unplug devices one by one and try again"
+        yield Finding("drivers", "warning", f"asking panels and cameras {seen}", remedy)
         return
     for each in seen:
         name = f"{'panels' if each['kind'] == 'slm' else 'cameras'}: {each['driver']}"
@@ -240,8 +233,8 @@ def _drivers() -> Iterator[Finding]:
             yield Finding(name, "missing", f"{each['version']}; no device answers", each["why"])
 
 
-def _asked(code: str, seconds: float, *arguments: str) -> Any:
-    """What Python code prints as its last line, JSON, in a process of its own; a line that says what went wrong."""
+def _ask(code: str, seconds: float, *arguments: str) -> Any:
+    """Run Python code in a process of its own: the JSON of its last line, or a text that says what went wrong."""
     try:
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments],
@@ -258,8 +251,8 @@ def _asked(code: str, seconds: float, *arguments: str) -> Any:
     try:
         return json.loads(done.stdout.splitlines()[-1])
     except (IndexError, ValueError):
-        said = (done.stderr.strip() or "without a word").splitlines()[-1][:200]
-        return f"ends with {done.returncode}: {said}"
+        reason = (done.stderr.strip() or "without a word").splitlines()[-1][:200]
+        return f"ends with {done.returncode}: {reason}"
 
 
 def _install(package: str) -> str:

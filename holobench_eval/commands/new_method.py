@@ -1,4 +1,4 @@
-"""Write the first version of a new method: a file that runs, and a test that passes."""
+"""``holoeval new-method``: a file that runs, and a test that passes."""
 
 from __future__ import annotations
 
@@ -8,14 +8,41 @@ import re
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from typing import Annotated
+
+import typer
 
 from ..core.errors import UserError
 
 
-def new_method(name: str, folder: Path) -> tuple[Path, Path, str]:
-    """Write ``NAME.py`` and ``test_NAME.py`` and return their paths and the method as a config names it.
+def new_method(
+    name: Annotated[str, typer.Argument(help="Lower-case words, such as my_method.")],
+    folder: Annotated[Path, typer.Option(help="Where to write NAME.py and test_NAME.py.")] = Path(),
+) -> None:
+    """Write a method that works, to be changed, and its test."""
+    method, test, source = write_method(name, folder)
+    print(f"{method}\n{test}\nnext: pytest {test} (pip install pytest brings it); name it in a config as '{source}'")
 
-    UserError for a name that is no module name and for files that exist: nothing is ever overwritten.
+
+def write_method(name: str, folder: Path) -> tuple[Path, Path, str]:
+    """Write ``NAME.py`` and ``test_NAME.py``; nothing is ever overwritten.
+
+    Parameters
+    ----------
+    name
+        Of the method and of its module: lower-case words such as ``my_method``.
+    folder
+        Where to write; made where it does not exist.
+
+    Returns
+    -------
+    tuple of Path, Path and str
+        The method's file, the test's file, and the method as a config names it.
+
+    Raises
+    ------
+    UserError
+        The name is no module name or hides an installed module, or the files exist or cannot be written.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise UserError(f"'{name}' is no name for a method; use lower-case words such as 'my_method'")

@@ -1,0 +1,41 @@
+"""Options that several commands have, and what follows where they are left out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ..study.config import Study
+
+Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as configs/table3.yaml.")]
+Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]
+Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
+Device = Annotated[str, typer.Option(help="Where torch computes: cpu, cuda, cuda:N, or auto, a GPU if it finds one.")]
+Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
+Profile = Annotated[str, typer.Argument(help="A display profile: its name or its file.")]
+
+LARGE_PANEL = 512 * 1024  # pixels
+
+
+def output_folder(study: Study, output: Path | None) -> Path:
+    """The folder that a study's records and report are written to."""
+    return output or Path("reports") / study.name
+
+
+def is_small(panel: tuple[int, int] | None) -> bool:
+    """Whether one thread computes a panel of (rows, columns) as well as several; not for one of unknown size."""
+    return panel is not None and panel[0] * panel[1] < LARGE_PANEL
+
+
+def thread_count(threads: int | None, workers: int, study: Study) -> int:
+    """Torch threads of a worker: as asked for, else one, or all for a single worker on large panels.
+
+    Transforms of small panels gain less than twofold from a second thread, and lose tenfold and more (measured) when
+    another program wants the core, since the threads wait for each other after every operation.
+    """
+    import torch
+
+    return threads or (1 if workers > 1 or is_small(study.display.panel) else torch.get_num_threads())

@@ -1,0 +1,186 @@
+"""``holoeval score``: photographs that somebody took, scored against their targets without any fiducial."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from .. import __version__
+from ..core.errors import UserError, suggest
+from .output import console as open_console
+from .output import print_headline
+
+if TYPE_CHECKING:
+    from ..report import Results
+    from ..report.data.layout import Layout
+    from ..study.folders.files import Folders
+
+# How files are read: as they are; captures and targets as sRGB; captures as linear light and targets as sRGB.
+VALUES = ("stored", "srgb", "linear")
+
+
+def score(
+    captures: Annotated[Path, typer.Option(help="Folder with captures, METHOD/TARGET.png.")],
+    targets: Annotated[Path, typer.Option(help="Folder with targets, TARGET.png.")],
+    output: Annotated[Path, typer.Option(help="Where to write the report.")],
+    values: Annotated[str, typer.Option(help="Values in the files: stored (as they are), srgb or linear.")] = "stored",
+    baseline: Annotated[str | None, typer.Option(help="The method that others are tested against.")] = None,
+    lpips_weights: Annotated[Path | None, typer.Option(help="File or folder of the LPIPS trunk.")] = None,
+) -> None:
+    """Score pictures that were taken long ago: align each with its target by what it shows, and write a report."""
+    weights = None if lpips_weights is None else str(lpips_weights)
+    console = open_console()
+    report, results = score_folders(captures, targets, output, values, baseline, weights, console)
+    print_headline(console, results)
+    print(f"{report}\n{output / 'table.csv'}\n{output / 'records.csv'}")
+    raise typer.Exit(1 if len(results.holes) else 0)
+
+
+def score_folders(
+    captures: Path,
+    targets: Path,
+    output: Path,
+    values: str,
+    baseline: str | None,
+    lpips_weights: str | None,
+    console: Console,
+) -> tuple[Path, Results]:
+    """Score ``captures/<method>/<target>.png`` against ``targets/<target>.png`` and write a report.
+
+    What was computed before in ``output`` for the same files by the same code is taken from there. A capture that
+    cannot be aligned is a hole in the report, with its reason.
+
+    Parameters
+    ----------
+    captures, targets, output
+        Folders; ``output`` lies in none of the others.
+    values
+        One of `VALUES`.
+    baseline
+        The method that every other method is tested against.
+    lpips_weights
+        File or folder of the LPIPS trunk.
+    console
+        Where notes and progress are printed.
+
+    Returns
+    -------
+    tuple of Path and Results
+        The report's file and its numbers.
+
+    Raises
+    ------
+    UserError
+        The input cannot be used; one line.
+    """
+    from ..report.build import write_report
+    from ..report.charts.alignment import draw_alignment
+    from ..report.data.results import Results
+    from ..report.data.tables import records_frame
+    from ..report.sections.description import Description
+    from ..study import provenance
+    from ..study.folders.files import read_folders
+    from ..study.folders.scoring import Scoring
+    from ..study.store import Store
+
+    if values not in VALUES:
+        raise UserError(f"--values {values}: {suggest(values, VALUES)}")
+    _refuse_nested(output, captures, targets)
+    folders = read_folders(captures, targets)
+    if baseline is not None and baseline not in folders.methods:
+        raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
+    lossy = next((picture.path for picture in folders.captures.values() if picture.is_jpeg), None)
+    if values == "linear" and lossy is not None:
+        raise UserError(f"{lossy}: a JPEG holds no linear light; expected --values stored or srgb")
+    for note in folders.notes:
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
+    scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment)
+    with scoring.store.locked():
+        known = provenance.begin(output, _provenance(folders, values), resumed=True)
+        with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
+            records = [asdict(record) for record in scoring.records(step)]
+        known = provenance.end(output, known)
+        words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
+        words += ["--baseline", baseline] if baseline else []
+        described = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
+        layout = _layout(folders, scoring.domain, values, baseline)
+        report = write_report(layout, records, output, known, described)
+        return report, Results(records_frame(records, layout), layout)
+
+
+def _layout(folders: Folders, domain: str, values: str, baseline: str | None) -> Layout:
+    from ..report.data.layout import Layout
+    from ..study.folders import FILES
+    from ..study.folders.scoring import CONDITION
+
+    return Layout(
+        title=f"Scores of photographs: {', '.join(folders.methods)}",
+        pairs=tuple((method, CONDITION) for method in folders.methods),
+        targets=tuple(folders.targets),
+        headline=f"psnr_{domain}",
+        baseline=baseline,
+        note=" ".join(folders.notes),
+        measure=FILES,
+        values=values,
+    )
+
+
+def _provenance(folders: Folders, values: str) -> dict[str, Any]:
+    from ..core.installed import installed
+    from ..study import provenance
+    from ..study.versions import ALIGNMENT, HARNESS
+
+    files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
+    files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
+    return {
+        "package": __version__,
+        "code_sha256": {"metrics": HARNESS, "alignment": ALIGNMENT},
+        "files": files,
+        "values": values,
+        "python": platform.python_version(),
+        "packages": {name: installed(name) for name in provenance.PACKAGES},
+        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "started": provenance.now(),
+        "ended": None,
+    }
+
+
+def _refuse_nested(output: Path, *sources: Path) -> None:
+    for source in sources:
+        if output.resolve().is_relative_to(source.resolve()):
+            raise UserError(
+                f"--output {output}: lies in {source}, whose files it would mix with; expected another folder"
+            )
+
+
+@contextmanager
+def _steps(console: Console, total: int) -> Iterator[Callable[[str], None]]:
+    """Show every step by its name: a bar on a terminal, else a line every few seconds."""
+    from ..study.progress import SECONDS_BETWEEN_LINES
+
+    if console.is_terminal:
+        text = TextColumn("{task.description}", markup=False)
+        with Progress(text, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console) as progress:
+            bar = progress.add_task("reading", total=total, completed=-1)
+            yield lambda name: progress.update(bar, description=name, advance=1)
+        return
+    last, done = time.monotonic(), 0
+
+    def line(name: str) -> None:
+        nonlocal last, done
+        if time.monotonic() - last >= SECONDS_BETWEEN_LINES:
+            last = time.monotonic()
+            console.print(f"{done}/{total} steps; now {name}", markup=False, highlight=False, soft_wrap=True)
+        done += 1
+
+    yield line

@@ -1,0 +1,64 @@
+"""``holoeval session export`` and ``session import``: files exchanged with a bench that other software drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .output import console, write_report
+
+if TYPE_CHECKING:
+    from ..study.session import Advance
+
+session = typer.Typer(
+    help="Exchange files with a bench that other software drives.", no_args_is_help=True, rich_markup_mode=None
+)
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The session's folder.")]
+
+
+@session.command("export")
+def export(
+    config: Annotated[Path, typer.Argument(metavar="STUDY", help="A study, such as configs/table3.yaml.")],
+    folder: Folder,
+    bench: Annotated[Path | None, typer.Option(help="File of the bench that will show the patterns.")] = None,
+    display: Annotated[str | None, typer.Option(help="Without --bench: the study's display to stand for it.")] = None,
+    fixed_exposure: Annotated[bool, typer.Option("--fixed-exposure", help="One exposure time for all.")] = False,
+) -> None:
+    """Write the patterns of a study: what to show, in which order, and under which names to save photographs."""
+    from ..study.progress import watching
+    from ..study.session import export as begin
+
+    with watching(console()) as watch:
+        advance = begin(config, folder, watch, 1, bench, display, fixed_exposure=fixed_exposure)
+    _finish(advance, folder)
+
+
+@session.command("import")
+def import_(
+    folder: Folder,
+    study: Annotated[Path | None, typer.Option(help="The study's config, where the folder's copy may not do.")] = None,
+) -> None:
+    """Check the photographs in a session's folder, score them, and write the next round where a method needs one."""
+    from ..study.progress import watching
+    from ..study.session import go_on
+
+    with watching(console()) as watch:
+        advance = go_on(folder, watch, 1, print, study)
+    _finish(advance, folder)
+
+
+def _finish(advance: Advance, folder: Path) -> None:
+    """Name the photographs to take next; where there are none, write the report."""
+    from ..study.session import REPORT
+
+    records = advance.outcome.records
+    if not advance.patterns:
+        write_report(console(), advance.study, records, folder / REPORT, advance.outcome.provenance)
+        raise typer.Exit(1 if advance.outcome.failed else 0)
+    number = advance.patterns[0].round
+    print(f"{sum(record['state'] == 'done' for record in records)} of {len(records)} cells are scored")
+    readme = f"{folder}/patterns/round-{number}/README.txt"
+    print(f"round {number}: {len(advance.patterns)} patterns to photograph, see {readme}")

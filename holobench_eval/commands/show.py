@@ -1,0 +1,44 @@
+"""``holoeval show``: what a display does to a hologram."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from .options import Profile, is_small
+from .output import console
+
+
+def show(
+    profile: Profile,
+    panel: Annotated[tuple[int, int] | None, typer.Option(help="Rows and columns in pixels.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Picture to write.")] = None,
+) -> None:
+    """Draw what a display does to a hologram, stage by stage, and list its effects."""
+    import torch
+
+    from ..report.charts.sheet import draw_sheet
+
+    if panel is None or is_small(panel):
+        torch.set_num_threads(1)  # see options.thread_count
+    path = draw_sheet(profile, panel, output)
+    table = Table("effect", "", "parametric model", title=f"effects of {profile}", title_justify="left")
+    for name, text, modelled in effects(profile):
+        table.add_row(name, escape(text), "has it" if modelled else "lacks it")
+    console().print(table)
+    print(path)
+
+
+def effects(source: str) -> Iterator[tuple[str, str, bool]]:
+    """Name and description of every effect of a display profile, and whether the parametric model has a term for it."""
+    from ..display import load_profile
+    from ..display.simulated.effects import effects as effects_of
+    from ..methods.display_model import FORM
+
+    for effect in effects_of(load_profile(source)):
+        yield effect.name, effect.text, effect.name in FORM
