@@ -1,8 +1,8 @@
 """Is this version slower than another? Both take turns in one run, and intervals decide.
 
 A machine's speed changes from minute to minute, and a process's from start to start (where its memory lies, say). So
-each version has a process of its own, started anew several times; within a start the two take turns, and only ratios
-of neighbours count. The interval is Student's, over the starts.
+each version has a process of its own, with the benchmarks of its own checkout, started anew several times; within a
+start the two take turns, and only ratios of neighbours count. The interval is Student's, over the starts.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 import random
 import shutil
 import subprocess
+import sys
 import tarfile
 import tomllib
 from collections.abc import Callable, Sequence
@@ -19,7 +20,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from statistics import mean, stdev
+from statistics import mean
 from tempfile import TemporaryDirectory
 from typing import Literal
 
@@ -27,17 +28,15 @@ from scipy import stats
 
 from ..core.errors import UserError
 from ..core.seeds import seed
-from .suite import CHECKOUT, suite, worker
+from .suite import CHECKOUT, suite
 
 STARTS, TURNS = 12, 21
-TURN_SECONDS = 0.05
-"""Least length of a turn."""
+TURN_SECONDS = 0.05  # the least length of a turn
+# Share of turns at either end that is left out. No median: where arrays lie makes two or three humps of one time.
 DISTURBED = 0.1
-"""Share of turns at either end that is left out. No median: where arrays lie makes two or three humps of one time."""
-CONFIDENCE = 0.99
-"""That no unchanged case at all is called changed."""
-MARGIN = 1.05
-"""Ratio of times below which a change is not worth a word."""
+CONFIDENCE = 0.99  # that no unchanged case at all is called changed
+MARGIN = 1.05  # ratio of times below which a change is not worth a word
+# What is compared unless one asks for something else: a bit of everything, none of it long.
 COMPARED = (
     "gradient step, 540x960, 100 mm | holobench_eval",
     "propagation, 256x256, 20 mm | holobench_eval",
@@ -45,9 +44,9 @@ COMPARED = (
     "approximator, preset small, 256x256, 100 mm | forward and backward",
     "study | one cell: Wirtinger, 100 iterations, 192x192, three colours",
 )
-"""What is compared unless one asks for something else: a bit of everything, none of it long."""
 
 Verdict = Literal["slower", "faster", "unchanged", "not in both"]
+Worker = subprocess.Popen[str]
 
 
 @dataclass(frozen=True)
@@ -62,37 +61,44 @@ class Comparison:
     reason: str = ""
 
 
-def against(revision: str, cases: Sequence[str], said: Callable[[str, int, int], None]) -> list[Comparison]:
-    """Compare the working tree with a git revision; ``said`` is told of each start: case, and starts done of all."""
+def against(revision: str, cases: Sequence[str], advance: Callable[[str, int, int], None]) -> list[Comparison]:
+    """Compare the working tree with a git revision.
+
+    Parameters
+    ----------
+    revision
+        Whatever names a commit. UserError: nothing of that name.
+    cases
+        Names of benchmarks.
+    advance
+        Called at each start of the two versions with the case, the starts done and their number.
+    """
     suite()  # without a checkout there is nothing to lay out
     with TemporaryDirectory() as folder:
         here, there = Path(folder) / "here", Path(folder) / "there"
         _lay_out(CHECKOUT, here)
         _lay_out(_extract(revision, Path(folder) / "archive"), there)
         draw = random.Random(seed("order of turns"))
-        found: dict[str, list[float]] = {case: [] for case in cases}
+        ratios: dict[str, list[float]] = {case: [] for case in cases}
         faults: dict[str, str] = {}
-        steps = [(start, case) for start in range(STARTS) for case in cases]
-        for done, (start, case) in enumerate(steps):
-            said(case, done, len(steps))
-            if case in faults:
-                continue
-            try:
-                found[case].append(_start(case, here, there, start % 2 == 0, draw))
-            except LookupError as error:
-                faults[case] = str(error)
+        for start in range(STARTS):
+            for number, case in enumerate(cases):
+                advance(case, start * len(cases) + number, STARTS * len(cases))
+                try:
+                    if case not in faults:
+                        ratios[case].append(_start(case, here, there, start % 2 == 0, draw))
+                except LookupError as error:
+                    faults[case] = str(error)
     return [
-        Comparison(case, "not in both", reason=faults[case]) if case in faults else judge(case, ratios, len(cases))
-        for case, ratios in found.items()
+        Comparison(case, "not in both", reason=faults[case]) if case in faults else judge(case, found, len(cases))
+        for case, found in ratios.items()
     ]
 
 
 def judge(case: str, logarithms: Sequence[float], cases: int) -> Comparison:
     """The verdict on a case from the logarithms of its ratios, one a start; ``cases`` share the error (Bonferroni)."""
-    middle = mean(logarithms)
-    tail = (1 - CONFIDENCE) / 2 / cases
-    reach = float(stats.t.ppf(1 - tail, len(logarithms) - 1)) * stdev(logarithms) / math.sqrt(len(logarithms))
-    lower, ratio, upper = (math.exp(value) for value in (middle - reach, middle, middle + reach))
+    interval = stats.ttest_1samp(logarithms, 0).confidence_interval(1 - (1 - CONFIDENCE) / cases)
+    lower, ratio, upper = (math.exp(value) for value in (interval.low, mean(logarithms), interval.high))
     verdict: Verdict = "unchanged"
     if lower > 1 and ratio > MARGIN:
         verdict = "slower"
@@ -104,28 +110,37 @@ def judge(case: str, logarithms: Sequence[float], cases: int) -> Comparison:
 def _start(case: str, here: Path, there: Path, here_first: bool, draw: random.Random) -> float:
     """Logarithm of the ratio of times, over turns of two fresh processes. LookupError: one cannot do the case.
 
-    The process that is started first is a few percent slower, so it should be the one as often as the other.
+    The process that is started first is a few percent slower, so each version should be first as often as the other.
     """
-    places = (here, there) if here_first else (there, here)
+    folders = (here, there) if here_first else (there, here)
     with ExitStack() as stack:
-        workers = {place: stack.enter_context(worker(place, draw.randrange(2**32))) for place in places}
-        for one in workers.values():
-            stack.callback(one.kill)
-        calls = max(1, math.ceil(TURN_SECONDS / max(_timed(one, case, 1) for one in workers.values())))
+        workers = {folder: stack.enter_context(worker(folder, draw.randrange(2**32))) for folder in folders}
+        for process in workers.values():
+            stack.callback(process.kill)
+        calls = max(1, math.ceil(TURN_SECONDS / max(_timed(process, case, 1) for process in workers.values())))
         ratios = []
         for _ in range(TURNS):
-            seconds = {place: _timed(workers[place], case, calls) for place in draw.sample(places, 2)}
+            seconds = {folder: _timed(workers[folder], case, calls) for folder in draw.sample(folders, 2)}
             ratios.append(math.log(seconds[here] / seconds[there]))
     return float(stats.trim_mean(ratios, DISTURBED))
 
 
-def _timed(one: subprocess.Popen[str], case: str, calls: int) -> float:
-    assert one.stdin is not None
-    assert one.stdout is not None
-    one.stdin.write(f"{case}\t{calls}\n")
-    one.stdin.flush()
-    line = one.stdout.readline()
-    answer = json.loads(line) if line else {"error": "the process ended"}
+def worker(folder: Path, layouts: int = 0) -> Worker:
+    """A process that times benchmarks on request, with the package and the benchmarks of a folder and no others.
+
+    layouts: seed of where arrays lie in memory, which is drawn anew for each answer.
+    """
+    command = [sys.executable, str(folder / "benchmarks" / "worker.py"), "--from", str(folder), str(layouts)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
+
+
+def _timed(process: Worker, case: str, calls: int) -> float:
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(f"{case}\t{calls}\n")
+    process.stdin.flush()
+    answer = json.loads(process.stdout.readline() or '{"error": "the process ended"}')
     if "seconds" not in answer:
         raise LookupError(answer["error"])
     return float(answer["seconds"])
@@ -136,13 +151,13 @@ def _extract(revision: str, folder: Path) -> Path:
     if not (CHECKOUT / ".git").exists():
         raise UserError(f"--against needs a git checkout, which {CHECKOUT} is not")
     # A revision may begin with a dash; what git archive is given is always a hash.
-    found = _git("rev-parse", "--verify", "--quiet", "--end-of-options", revision)
-    if found.returncode == 0:
-        found = _git("archive", "--format=tar", f"{found.stdout.decode().strip()}^{{commit}}")
-    if found.returncode:
-        said = found.stderr.decode(errors="replace").strip()
-        raise UserError(f"--against {revision}: no such commit" + (f"; git says: {said}" if said else ""))
-    with tarfile.open(fileobj=BytesIO(found.stdout)) as archive:
+    done = _git("rev-parse", "--verify", "--quiet", "--end-of-options", revision)
+    if done.returncode == 0:
+        done = _git("archive", "--format=tar", f"{done.stdout.decode().strip()}^{{commit}}")
+    if done.returncode:
+        reason = done.stderr.decode(errors="replace").strip()
+        raise UserError(f"--against {revision}: no such commit" + (f"; git says: {reason}" if reason else ""))
+    with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
         archive.extractall(folder, filter="data")
     return folder
 
@@ -152,10 +167,13 @@ def _git(*arguments: str) -> subprocess.CompletedProcess[bytes]:
 
 
 def _lay_out(checkout: Path, folder: Path) -> None:
-    """Copy a checkout's packages to where they are imported from, as installing them would."""
+    """Copy a checkout's packages to where they are imported from, as installing them would, and its benchmarks."""
     project = tomllib.loads((checkout / "pyproject.toml").read_text(encoding="utf-8"))
-    for package, source in sorted(project["tool"]["setuptools"]["package-dir"].items()):  # outer ones first
-        place = folder / package.replace(".", "/")
+    sources = project["tool"]["setuptools"]["package-dir"]
+    for package, source in sorted(sources.items()):  # outer ones first
         if not (checkout / source).is_dir():
             raise UserError(f"--against: that revision has no folder {source}, which its pyproject.toml names")
-        shutil.copytree(checkout / source, place, ignore=shutil.ignore_patterns("__pycache__"))
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(checkout / source, folder / package.replace(".", "/"), ignore=ignored)
+    benchmarks = checkout / "tests" / "benchmarks"  # a revision without any is timed by those of the working tree
+    shutil.copytree(benchmarks if benchmarks.is_dir() else suite(), folder / "benchmarks")

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import os
 import platform
-import time
 from typing import Any
 
 import torch
+from torch.utils.benchmark import Timer
 
 from ..core.installed import installed
 from ..study.provenance import now, revision
 from ..study.timings import cpu_model
 from .suite import THREADS
 
-COPIED = 256 * 2**20
-"""Bytes, far more than a cache holds."""
-BUSY = 0.5
-"""Load above which times of short calls are more the scheduler's than the code's."""
+COPIED = 256 * 2**20  # bytes, far more than a cache holds
+BUSY = 0.5  # load above which times of short calls are more the scheduler's than the code's
 PACKAGES = ("torch", "numpy", "opencv-python-headless", "scikit-image", "odak", "torchoptics", "pytest-benchmark")
 
 
@@ -37,7 +35,7 @@ def describe(load_before: float | None) -> dict[str, Any]:
         "cpu": cpu_model(),
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
-        "packages": {name: found for name in PACKAGES if (found := installed(name))},
+        "packages": {name: version for name in PACKAGES if (version := installed(name))},
         "threads": THREADS,
         "bandwidth": bandwidth(),
         "load_before": load_before,
@@ -46,14 +44,6 @@ def describe(load_before: float | None) -> dict[str, Any]:
 
 def bandwidth() -> float:
     """Bytes a second, read and written, of the best of several copies of a large array."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(THREADS)
-    source = torch.zeros(COPIED, dtype=torch.uint8)
-    place = torch.ones_like(source)
-    best = float("inf")
-    for _ in range(7):
-        started = time.perf_counter()
-        place.copy_(source)
-        best = min(best, time.perf_counter() - started)
-    torch.set_num_threads(before)
-    return 2 * COPIED / best
+    arrays = {"source": torch.zeros(COPIED, dtype=torch.uint8), "copy": torch.ones(COPIED, dtype=torch.uint8)}
+    timer = Timer("copy.copy_(source)", globals=arrays, num_threads=THREADS)
+    return 2 * COPIED / min(timer.timeit(1).median for _ in range(7))

@@ -36,7 +36,7 @@ def bench(
     timings, complete = suite.measure(only)
     before = machine.describe(load)
     compared = report.beside_others(timings)
-    timings = [replace(one, memory=suite.peak_memory(one)) if one.group in compared else one for one in timings]
+    timings = [replace(row, memory_bytes=suite.peak_memory(row)) if row.group in compared else row for row in timings]
     print(report.write(output or (COMPLETE if only is None else PART), timings, before))
     if not complete:
         print("not all could be timed; what pytest printed says why")

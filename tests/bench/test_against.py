@@ -162,7 +162,7 @@ def test_a_slower_copy_is_seen_and_imported_from_its_own_folder(tmp_path):
     case = "propagation, 256x256, 7 mm | holobench_eval"
     seconds = []
     for place in (here, there):
-        with suite.worker(place) as worker:
+        with against.worker(place) as worker:
             seconds.append(against._timed(worker, case, 1))
     assert seconds[0] >= 1 > seconds[1]
 
@@ -172,16 +172,16 @@ def test_what_a_version_lacks_is_not_taken_from_another(tmp_path):
     """Without the allocator's settings an older version is timed as it is; without anything else it gives a reason."""
     against._lay_out(suite.CHECKOUT, tmp_path)
     package = tmp_path / "holobench_eval"
-    (package / "allocator.py").unlink()
+    (package / "core" / "allocator.py").unlink()
     case = "propagation, 256x256, 7 mm | holobench_eval"
-    lacking = pytest.raises(LookupError, match=r"No module named 'holobench_eval\.allocator'")
-    with suite.worker(tmp_path) as worker, lacking:
+    lacking = pytest.raises(LookupError, match=r"No module named 'holobench_eval\.core\.allocator'")
+    with against.worker(tmp_path) as worker, lacking:
         against._timed(worker, case, 1)
     for user, line in (("optics/convolution.py", "LARGEST_KEPT = 2**25"), ("study/job.py", "keep_freed_memory = int")):
         text = (package / user).read_text()
-        assert "from ..allocator import " in text
-        (package / user).write_text(re.sub(r"from \.\.allocator import .*", line, text))
-    with suite.worker(tmp_path) as worker:
+        assert "from ..core.allocator import " in text
+        (package / user).write_text(re.sub(r"from \.\.core\.allocator import .*", line, text))
+    with against.worker(tmp_path) as worker:
         assert against._timed(worker, case, 1) > 0
 
 

@@ -26,8 +26,8 @@ STEP = "gradient step"
 def measured(monkeypatch):
     def fix(complete=True):
         rows = [
-            Timing(STEP, "holobench_eval", 0.1, 0.1, 0.1, 3, (10, 10), 0.01),
-            Timing(STEP, "another", 0.2, 0.2, 0.2, 3, (10, 10), 0.02),
+            Timing(STEP, "holobench_eval", 0.1, 0.1, 0.1, 3, 10, 10, 0.01),
+            Timing(STEP, "another", 0.2, 0.2, 0.2, 3, 10, 10, 0.02),
             Timing("metric", "psnr", 0.1, 0.1, 0.1, 3),
         ]
         monkeypatch.setattr(suite, "measure", lambda only: (rows, complete))
@@ -92,7 +92,7 @@ def test_the_load_is_unknown_where_the_system_does_not_tell(monkeypatch):
 @pytest.mark.parametrize(("verdict", "code"), [("slower", 1), ("unchanged", 0), ("faster", 0)])
 def test_a_slower_case_is_exit_code_1(monkeypatch, verdict, code):
     monkeypatch.setattr(
-        against, "against", lambda revision, cases, said: [Comparison(cases[0], verdict, 1.2, 1.1, 1.3)]
+        against, "against", lambda revision, cases, advance: [Comparison(cases[0], verdict, 1.2, 1.1, 1.3)]
     )
     done = CliRunner().invoke(app, ["bench", "--against", "HEAD"])
     assert done.exit_code == code
@@ -101,11 +101,11 @@ def test_a_slower_case_is_exit_code_1(monkeypatch, verdict, code):
 
 
 def test_revisions_cases_and_reasons_are_shown_as_they_are(monkeypatch):
-    def told(revision, cases, said):
-        said("a case [/]", 0, 1)
+    def compare(revision, cases, advance):
+        advance("a case [/]", 0, 1)
         return [Comparison("a case [/]", "not in both", reason="KeyError: [/red]")]
 
-    monkeypatch.setattr(against, "against", told)
+    monkeypatch.setattr(against, "against", compare)
     done = CliRunner().invoke(app, ["bench", "--against", "HEAD^{/[/]}"])
     assert done.exit_code == 0
     assert all(text in done.output for text in ("HEAD^{/[/]}", "a case [/]", "KeyError: [/red]"))
