@@ -13,12 +13,10 @@ import random
 import shutil
 import subprocess
 import sys
-import tarfile
 import tomllib
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from statistics import mean
 from tempfile import TemporaryDirectory
@@ -152,18 +150,19 @@ def _extract(revision: str, folder: Path) -> Path:
         raise UserError(f"--against needs a git checkout, which {CHECKOUT} is not")
     # A revision may begin with a dash; what git archive is given is always a hash.
     done = _git("rev-parse", "--verify", "--quiet", "--end-of-options", revision)
+    archive = folder.with_suffix(".tar")
     if done.returncode == 0:
-        done = _git("archive", "--format=tar", f"{done.stdout.decode().strip()}^{{commit}}")
+        done = _git("archive", "--format=tar", f"--output={archive}", f"{done.stdout.strip()}^{{commit}}")
     if done.returncode:
-        reason = done.stderr.decode(errors="replace").strip()
+        reason = done.stderr.strip()
         raise UserError(f"--against {revision}: no such commit" + (f"; git says: {reason}" if reason else ""))
-    with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
-        archive.extractall(folder, filter="data")
+    shutil.unpack_archive(archive, folder, filter="data")
     return folder
 
 
-def _git(*arguments: str) -> subprocess.CompletedProcess[bytes]:
-    return subprocess.run(["git", *arguments], cwd=CHECKOUT, capture_output=True, check=False)
+def _git(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = ["git", *arguments]
+    return subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, errors="replace", check=False)
 
 
 def _lay_out(checkout: Path, folder: Path) -> None:

@@ -47,14 +47,14 @@ def _problems(report: Path) -> Iterator[str]:
         lacking = [key for key in ("config", "config_sha256", "profiles") if key not in known]
         if lacking:
             raise UserError(f"{provenance.FILE} lacks {', '.join(lacking)}")
-        study = load_study(report / str(known["config"]))
-        yield from _study_problems(study, known)
-        yield from _table_problems(report, study)
+        yield from _changes(report, load_study(report / str(known["config"])), known)
     except (UserError, OSError) as error:
         yield str(error)
 
 
-def _study_problems(study: Study, known: dict[str, Any]) -> Iterator[str]:
+def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]:
+    """What is different from when the report was made, of which its provenance is ``known``."""
+    from ..report import layout_of, recompute_table
     from ..study.plan import displays
     from ..study.provenance import text_digest
 
@@ -65,11 +65,6 @@ def _study_problems(study: Study, known: dict[str, Any]) -> Iterator[str]:
         then = dict(known["profiles"]).get(display.name)
         if then != now:
             yield f"profile '{display.name}' was {then}, is now {now}; run the study again"
-
-
-def _table_problems(report: Path, study: Study) -> Iterator[str]:
-    from ..report import layout_of, recompute_table
-
     again = recompute_table((report / "records.csv").read_text(encoding="utf-8"), layout_of(study))
     if again != (report / "table.csv").read_text(encoding="utf-8"):
         yield "table.csv does not follow from records.csv; run 'holoeval report' on its config"

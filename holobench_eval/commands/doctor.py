@@ -120,6 +120,11 @@ def examine() -> list[Finding]:
     return findings
 
 
+def _either(what: str, found: str | None, otherwise: str, remedy: str, state: State = "missing") -> Finding:
+    """What was found, else another state and what to do."""
+    return Finding(what, "ok", found) if found else Finding(what, state, otherwise, remedy)
+
+
 def _python() -> Iterator[Finding]:
     text = f"{platform.python_version()} ({sys.executable}), {platform.system()} {platform.machine()}"
     recent = sys.version_info >= (3, 11)
@@ -179,10 +184,9 @@ def _git() -> Iterator[Finding]:
 
 def _disk() -> Iterator[Finding]:
     free = shutil.disk_usage(Path()).free
-    enough = free >= LEAST_DISK
     text = f"{free / 1e9:.1f} GB free in {Path().resolve()}"
     remedy = f"free some, or write elsewhere with --output; {LEAST_DISK / 1e9:.0f} GB do for most studies"
-    yield Finding("disk", "ok", text) if enough else Finding("disk", "warning", text, remedy)
+    yield _either("disk", text if free >= LEAST_DISK else None, text, remedy, "warning")
 
 
 def _weights() -> Iterator[Finding]:
@@ -192,45 +196,35 @@ def _weights() -> Iterator[Finding]:
     from ..methods.hil.perceptual import find_weights as vgg19
     from ..metrics.lpips import _TRUNKS, find_weights
 
-    for name, found, url, without in (
+    for name, file, url, without in (
         ("LPIPS weights (AlexNet)", find_weights("alex"), _TRUNKS["alex"].url, "no column lpips_alex"),
         ("LPIPS weights (VGG-16)", find_weights("vgg"), _TRUNKS["vgg"].url, "no column lpips_vgg"),
         ("perceptual loss (VGG-19)", vgg19(), URL, "fixed filters in their place, see docs/learned.md"),
     ):
-        if found is not None:
-            yield Finding(name, "ok", str(found))
-            continue
-        file = Path(torch.hub.get_dir()) / "checkpoints" / url.rpartition("/")[2]
-        command = f"curl -L --create-dirs -o {shlex.quote(str(file))} {url}"
-        yield Finding(name, "missing", without, command)
+        target = Path(torch.hub.get_dir()) / "checkpoints" / url.rpartition("/")[2]
+        command = f"curl -L --create-dirs -o {shlex.quote(str(target))} {url}"
+        yield _either(name, None if file is None else str(file), without, command)
 
 
 def _peers() -> Iterator[Finding]:
     for name in ("odak", "torchoptics"):
-        found = installed(name)
-        remedy = "" if found else _install("holobench_eval[peers]")
-        yield Finding(f"peer {name}", "ok" if found else "missing", found or "not installed", remedy)
+        yield _either(f"peer {name}", installed(name), "not installed", _install("holobench_eval[peers]"))
 
 
 def _drivers() -> Iterator[Finding]:
     raw = installed("rawpy")
-    if raw:
-        yield Finding("camera RAW files", "ok", f"rawpy {raw}")
-    else:
-        yield Finding("camera RAW files", "missing", "rawpy: not installed", _install("holobench_eval[raw]"))
+    remedy = _install("holobench_eval[raw]")
+    yield _either("camera RAW files", raw and f"rawpy {raw}", "rawpy: not installed", remedy)
     seen = _ask(DRIVERS, ASKING)
     if isinstance(seen, str):
         remedy = "unplug devices one by one and try again"
         yield Finding("drivers", "warning", f"asking panels and cameras {seen}", remedy)
         return
-    for each in seen:
-        name = f"{'panels' if each['kind'] == 'slm' else 'cameras'}: {each['driver']}"
-        if each["version"] is None:
-            yield Finding(name, "missing", "not installed", each["why"])
-        elif each["devices"]:
-            yield Finding(name, "ok", f"{each['version']}; {', '.join(each['devices'])}", each["why"])
-        else:
-            yield Finding(name, "missing", f"{each['version']}; no device answers", each["why"])
+    for device in seen:
+        what = f"{'panels' if device['kind'] == 'slm' else 'cameras'}: {device['driver']}"
+        found = ", ".join(device["devices"]) or "no device answers"
+        text = "not installed" if device["version"] is None else f"{device['version']}; {found}"
+        yield Finding(what, "ok" if device["devices"] else "missing", text, device["why"])
 
 
 def _ask(code: str, seconds: float, *arguments: str) -> Any:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from rich.markup import escape
 from rich.table import Table
@@ -17,9 +17,8 @@ from .output import console as open_console
 if TYPE_CHECKING:
     from ..study.artifacts import Artifacts
     from ..study.config import Study
-    from ..study.plan import Plan, Task
-    from ..study.preparation import Preparation
-    from ..study.store import State, Store
+    from ..study.plan import Plan
+    from ..study.store import Store
 
 
 def plan(
@@ -40,9 +39,8 @@ def plan(
     console, study = open_console(), load_study(config)
     folder = output_folder(study, output)
     workers = executor("auto", None, is_small(study.display.panel), gpus=gpus(device)).workers
-    grid = plan_cells(study)
-    rows = preview(study, grid, Store(folder), thread_count(threads, workers, study), workers, gpu_name(find(device)))
-    console.print(table(study, rows))
+    grid, many = plan_cells(study), thread_count(threads, workers, study)
+    console.print(table(study, preview(study, grid, Store(folder), many, workers, gpu_name(find(device)))))
     if needed := trainings(grid, Artifacts(artifacts)):
         console.print(training_table(needed))
     console.print(f"output folder: {folder}", highlight=False, soft_wrap=True)
@@ -72,13 +70,14 @@ class Row:
 class TrainingRow:
     """Something that a study's methods or its display must learn.
 
-    name: of its artifact; needed_by: labels, or the display; state: ``unfinished`` and ``failed`` ones go on with the
-    next run; captures, seconds: what it took, or has taken so far (NaN: not known); reason: why it failed.
+    name: of its artifact; needed_by: labels, or the display; state: done, unfinished, failed or missing, of which the
+    next run goes on with the unfinished and the failed; captures, seconds: what it took, or has taken so far (NaN: not
+    known); reason: why it failed.
     """
 
     name: str
     needed_by: tuple[str, ...]
-    state: Literal["done", "unfinished", "failed", "missing"]
+    state: str
     captures: float
     seconds: float
     reason: str = ""
@@ -97,52 +96,40 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
     from ..study import timings
 
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
-    states, kept = store.states(plan.cells, timings.timed(study, plan)), timings.names()
-
-    def seconds(task: Task) -> float | None:
-        name = timings.key(task, threads, workers, gpu)
-        cost = timings.known(name) if name in kept else None
-        return None if cost is None else cost.seconds
-
-    tasks: dict[str, list[Task]] = {}
-    for task in plan.tasks:
-        tasks.setdefault(task.label, []).append(task)
-    return [_row(label, own, limits.get(label), states, seconds) for label, own in tasks.items()]
-
-
-def _row(
-    label: str,
-    tasks: list[Task],
-    limit: int | None,
-    state: dict[str, State],
-    seconds: Callable[[Task], float | None],
-) -> Row:
-    cells = [cell for task in tasks for cell in task.cells]
-    states = [state[cell.id] for cell in cells]
-    unsolved = [task for task in tasks if any(state[cell.id] == "missing" for cell in task.cells)]
-    known = [seconds(task) for task in tasks if not task.is_floor]
-    timed = [duration for duration in known if duration is not None]
-    return Row(
-        label=label,
-        conditions=len({cell.condition for cell in cells}),
-        targets=len({cell.target for cell in cells}),
-        cells=len(cells),
-        captures=limit if isinstance(limit, int) else None,
-        done=states.count("done"),
-        failed=states.count("failed"),
-        missing=states.count("missing"),
-        seconds=sum(timed) / len(timed) * len(unsolved) if timed else None,
-    )
+    states, timed = store.states(plan.cells, timings.timed(study, plan)), timings.names()
+    rows = []
+    for label in dict.fromkeys(task.label for task in plan.tasks):
+        tasks = [task for task in plan.tasks if task.label == label]
+        cells = [cell for task in tasks for cell in task.cells]
+        count = Counter(states[cell.id] for cell in cells)
+        unsolved = [task for task in tasks if any(states[cell.id] == "missing" for cell in task.cells)]
+        keys = [timings.key(task, threads, workers, gpu) for task in tasks if not task.is_floor]
+        seconds = [cost.seconds for key in keys if key in timed and (cost := timings.known(key)) is not None]
+        limit = limits.get(label)
+        rows.append(
+            Row(
+                label,
+                conditions=len({cell.condition for cell in cells}),
+                targets=len({cell.target for cell in cells}),
+                cells=len(cells),
+                captures=limit if isinstance(limit, int) else None,
+                done=count["done"],
+                failed=count["failed"],
+                missing=count["missing"],
+                seconds=sum(seconds) / len(seconds) * len(unsolved) if seconds else None,
+            )
+        )
+    return rows
 
 
 def table(study: Study, rows: list[Row]) -> Table:
     """The rows as a table with a line of sums."""
     result = Table(title=escape(study.title), title_justify="left", show_footer=True)
     result.add_column("method", footer="all", overflow="fold")
-    for name in ("conditions", "targets"):
-        result.add_column(name, justify="right")
-    for name in ("cells", "done", "failed", "missing"):
-        result.add_column(name, justify="right", footer=str(sum(getattr(row, name) for row in rows)))
+    numbers = ("conditions", "targets", "cells", "done", "failed", "missing")
+    for name in numbers:
+        total = str(sum(getattr(row, name) for row in rows)) if name in numbers[2:] else ""
+        result.add_column(name, justify="right", footer=total)
     result.add_column("captures", justify="right")
     known = [row.seconds for row in rows if row.seconds is not None]
     untimed = any(row.seconds is None and row.label != "floor" for row in rows)
@@ -151,13 +138,15 @@ def table(study: Study, rows: list[Row]) -> Table:
     for row in rows:
         limit = "" if row.captures is None else str(row.captures)
         seconds = "" if row.label == "floor" else "not timed" if row.seconds is None else f"{row.seconds:.3g}"
-        numbers = (row.conditions, row.targets, row.cells, row.done, row.failed, row.missing)
-        result.add_row(escape(row.label), *map(str, numbers), limit, seconds)
+        result.add_row(escape(row.label), *(str(getattr(row, name)) for name in numbers), limit, seconds)
     return result
 
 
 def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
     """A row for every artifact that a plan needs; no artifact is loaded."""
+    from ..study.artifacts import FAILURE, UNFINISHED
+    from ..study.training_log import known, progress
+
     rows = []
     for identity, needed in plan.preparations().items():
         labels = {task.label for task in plan.tasks if task.preparation and task.preparation.id == identity}
@@ -167,23 +156,18 @@ def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
             for display in task.conditions
             if display.learned and display.learned.id == identity
         }
-        rows.append(_training(needed, (*sorted(labels), *sorted(displays)), artifacts))
+        folder, reason = artifacts.place(needed), ""
+        if artifacts.has(needed):
+            state, facts = "done", known(folder) or {}
+            captures, seconds = (float(facts.get(key, math.nan)) for key in ("captures", "seconds"))
+        else:
+            state = "unfinished" if (folder / UNFINISHED).is_dir() else "missing"
+            captures, seconds = progress(folder)
+            if (folder / FAILURE).is_file():
+                state, reason = "failed", artifacts.failure(needed)
+        needed_by = (*sorted(labels), *sorted(displays))
+        rows.append(TrainingRow(needed.name, needed_by, state, captures, seconds, reason))
     return rows
-
-
-def _training(needed: Preparation, needed_by: tuple[str, ...], artifacts: Artifacts) -> TrainingRow:
-    from ..study.artifacts import FAILURE, UNFINISHED
-    from ..study.training_log import known, progress
-
-    folder = artifacts.place(needed)
-    if artifacts.has(needed):
-        facts = known(folder) or {}
-        captures, seconds = (float(facts.get(key, math.nan)) for key in ("captures", "seconds"))
-        return TrainingRow(needed.name, needed_by, "done", captures, seconds)
-    if (folder / FAILURE).is_file():
-        return TrainingRow(needed.name, needed_by, "failed", *progress(folder), artifacts.failure(needed))
-    state: Literal["unfinished", "missing"] = "unfinished" if (folder / UNFINISHED).is_dir() else "missing"
-    return TrainingRow(needed.name, needed_by, state, *progress(folder))
 
 
 def training_table(rows: list[TrainingRow]) -> Table:

@@ -57,20 +57,10 @@ def run(
         if study.display.real:
             open_displays(study)
         folder, grid = output_folder(study, output), plan(study)
+        many = thread_count(threads, where.workers, study)
+        again = {"retry_failed": retry_failed, "retime": retime, "retrain": retrain}
         with watching(console) as watch:
-            outcome = compute(
-                study,
-                grid,
-                folder,
-                where,
-                watch,
-                thread_count(threads, where.workers, study),
-                artifacts,
-                retry_failed=retry_failed,
-                retime=retime,
-                retrain=retrain,
-                device=device,
-            )
+            outcome = compute(study, grid, folder, where, watch, many, artifacts, device=device, **again)
         keep_training_records(grid, Artifacts(artifacts), folder)
         draw_sheets(console, study, folder, thread_count(threads, 1, study))
         write_report(console, study, outcome.records, folder, outcome.provenance)

@@ -71,28 +71,30 @@ class Case:
         return self if self.scene is None else replace(self, scene=self.scene.shrunk())
 
 
-def of_scene(kind, scene, version, make):
-    return Case(f"{kind}, {scene.name}", version, make, scene)
+def of_scenes(kind, scenes, makers):
+    """A case for every scene and version; makers: what prepares the work, by version."""
+    return [Case(f"{kind}, {scene.name}", version, make, scene) for scene in scenes for version, make in makers.items()]
 
 
 def gradient_step(version):
     def make(scene):
-        one = steps.STEPS[version](scene)
+        work = steps.STEPS[version](scene)
 
         def facts():
-            padded = {"padded": list(one.padded)}
-            if scene.panel[0] > PAPER[0] or not hasattr(one, "field"):
+            padded = {"padded": list(work.padded)}
+            if scene.panel[0] > PAPER[0] or not hasattr(work, "field"):
                 return padded
             with torch.no_grad():
-                return padded | {"error": scene.error(one.field())}
+                return padded | {"error": scene.error(work.field())}
 
-        return Work(one.step, facts)
+        return Work(work.step, facts)
 
     return make
 
 
-def propagation(scene):
-    model, light = scene.spec.propagator(0), unit_field(scene.phase)
+def propagation(scene, spec=None):
+    """By the ideal model of a display, without one of the scene's."""
+    model, light = (spec or scene.spec).propagator(0), unit_field(scene.phase)
     return Work(lambda: model.forward(light), lambda: {"padded": list(model.padded_shape)})
 
 
@@ -112,9 +114,7 @@ def capture(samples):
 
 
 def its_propagation(scene):
-    model = load_profile("leto-aged").scaled(scene.panel).spec().propagator(0)
-    light = unit_field(scene.phase)
-    return Work(lambda: model.forward(light), lambda: {"padded": list(model.padded_shape)})
+    return propagation(scene, load_profile("leto-aged").scaled(scene.panel).spec())
 
 
 def pictures(scene, channels=3):
@@ -124,11 +124,11 @@ def pictures(scene, channels=3):
     return (target + noise).clamp(0, 1), target
 
 
-def metric(one):
+def metric(measure):
     def make(scene):
         rows, columns = scene.panel
-        pair = pictures(replace(scene, panel=(max(rows, one.smallest), max(columns, one.smallest))))
-        return Work(torch.no_grad()(lambda: one.function(*pair)))
+        pair = pictures(replace(scene, panel=(max(rows, measure.smallest), max(columns, measure.smallest))))
+        return Work(torch.no_grad()(lambda: measure.function(*pair)))
 
     return make
 
@@ -206,39 +206,30 @@ methods: [trivial.py:Trivial]
 repeats: 50
 """
 
+AT_100_MM = [Scene(PAPER, 0.1)]
 CASES = [
-    *(of_scene(STEP, scene, version, gradient_step(version)) for scene in COMPARED for version in steps.STEPS),
-    *(
-        of_scene(STEP, scene, version, gradient_step(version))
-        for scene in SIZES
-        if scene not in COMPARED
-        for version in (steps.BARE, steps.OURS)
+    *of_scenes(STEP, COMPARED, {version: gradient_step(version) for version in steps.STEPS}),
+    *of_scenes(
+        STEP,
+        [scene for scene in SIZES if scene not in COMPARED],
+        {version: gradient_step(version) for version in (steps.BARE, steps.OURS)},
     ),
-    *(
-        of_scene(PROPAGATION, scene, version, make)
-        for scene in SIZES
-        for version, make in (("two bare transforms", two_transforms), (steps.OURS, propagation))
+    *of_scenes(PROPAGATION, SIZES, {"two bare transforms": two_transforms, steps.OURS: propagation}),
+    *of_scenes(
+        "capture",
+        AT_100_MM,
+        {"ideal propagation": its_propagation, "1 sub-sample": capture(1), "3 sub-samples": capture(3)},
     ),
-    *(
-        of_scene("capture", Scene(PAPER, 0.1), version, make)
-        for version, make in (
-            ("ideal propagation", its_propagation),
-            ("1 sub-sample", capture(1)),
-            ("3 sub-samples", capture(3)),
-        )
+    *of_scenes("SSIM, one channel", AT_100_MM, {"scikit-image": ssim_of_scikit_image, steps.OURS: ssim_here}),
+    *of_scenes(
+        "metric, three channels",
+        AT_100_MM,
+        {measure.name: metric(measure) for measure in catalogue() if measure.available() is None},
     ),
-    *(
-        of_scene("SSIM, one channel", Scene(PAPER, 0.1), version, make)
-        for version, make in (("scikit-image", ssim_of_scikit_image), (steps.OURS, ssim_here))
-    ),
-    *(
-        of_scene("metric, three channels", Scene(PAPER, 0.1), one.name, metric(one))
-        for one in catalogue()
-        if one.available() is None
-    ),
-    *(
-        of_scene("approximator, preset small", Scene((256, 256), 0.1), version, make)
-        for version, make in (("forward", network(False)), ("forward and backward", network(True)))
+    *of_scenes(
+        "approximator, preset small",
+        [Scene((256, 256), 0.1)],
+        {"forward": network(False), "forward and backward": network(True)},
     ),
     Case("study", "one cell: Wirtinger, 100 iterations, 192x192, three colours", study(ONE_CELL)),
     Case("study", "50 trivial cells, 118x118", study(TRIVIAL_CELLS)),

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from holobench_eval import commands
 from holobench_eval.commands import main
 from holobench_eval.report.charts import sheet
 
@@ -159,6 +161,26 @@ def test_a_new_method_is_written_and_named(
     assert holoeval(monkeypatch, "new-method", "quiet_phase", "--folder", "mine") == 0
     assert "mine/quiet_phase.py:QuietPhase" in capsys.readouterr().out
     assert holoeval(monkeypatch, "new-method", "quiet_phase", "--folder", "mine") == 2
+
+
+def test_a_new_command_is_one_file_and_one_line(tmp_path: Path) -> None:
+    package = tmp_path / "holobench_eval"
+    shutil.copytree(Path(commands.__file__).parents[1], package, ignore=shutil.ignore_patterns("__pycache__"))
+    folder = package / "commands"
+    (folder / "greet_all.py").write_text('def greet_all() -> None:\n    """Greet everybody."""\n    print("hello")\n')
+    text = (folder / "__init__.py").read_text()
+    (folder / "__init__.py").write_text(text.replace('    "plan",\n', '    "plan",\n    "greet_all",\n'))
+
+    def output(*arguments: str) -> str:
+        call = [sys.executable, "-c", "from holobench_eval.commands import main; main()", *arguments]
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(call, capture_output=True, text=True, check=True, env=environment, cwd=tmp_path)
+        return done.stdout
+
+    lines = [line.split() for line in output("--help").splitlines()]
+    assert [line[0] for line in lines if line][-10:-7] == ["plan", "greet-all", "report"]
+    assert ["greet-all", "Greet", "everybody."] in lines
+    assert output("greet-all") == "hello\n"
 
 
 def test_help_needs_no_heavy_import() -> None:
