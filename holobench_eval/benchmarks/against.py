@@ -88,8 +88,8 @@ def against(revision: str, cases: Sequence[str], advance: Callable[[str, int, in
                 except LookupError as error:
                     faults[case] = str(error)
     return [
-        Comparison(case, "not in both", reason=faults[case]) if case in faults else judge(case, found, len(cases))
-        for case, found in ratios.items()
+        Comparison(case, "not in both", reason=faults[case]) if case in faults else judge(case, logarithms, len(cases))
+        for case, logarithms in ratios.items()
     ]
 
 

@@ -92,10 +92,10 @@ def _positive(number: float, name: str) -> float:
 
 def groups(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
     """Timings of the same work, in their order."""
-    found: dict[str, list[Timing]] = {}
+    work: dict[str, list[Timing]] = {}
     for timing in timings:
-        found.setdefault(timing.group, []).append(timing)
-    return found
+        work.setdefault(timing.group, []).append(timing)
+    return work
 
 
 def beside_others(timings: Sequence[Timing]) -> dict[str, list[Timing]]:

@@ -83,10 +83,10 @@ def _timing(stats: dict[str, Any], extra: dict[str, Any]) -> Timing:
 
 def names(only: str) -> list[str]:
     """The benchmarks whose names hold a text. UserError: none does."""
-    found = [name for name in json.loads(_ask("--names").stdout) if only in name]
-    if not found:
+    matching = [name for name in json.loads(_ask("--names").stdout) if only in name]
+    if not matching:
         raise UserError(f"no benchmark's name holds '{only}'")
-    return found
+    return matching
 
 
 def peak_memory(timing: Timing) -> float | None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..display import CalibratedBench, Profile
     from ..display.simulated.pipeline import SimulatedBench
 
-WANTED = {"double_phase": 15.24, "wirtinger": 17.6}  # PSNR [dB] of hardware captures, paper Table 3
+PUBLISHED = {"double_phase": 15.24, "wirtinger": 17.6}  # PSNR [dB] of hardware captures, paper Table 3
 # Fraction of incident power: up to 0.2 is usual, 0.35 has been reported off the design wavelength.
 UNMODULATED_RANGE = (0.05, 0.35)
 PHASE_RANGE = (-math.pi, math.pi)  # of the unmodulated light [rad]
@@ -35,12 +35,12 @@ def calibrate(profile: ProfileName) -> None:
     from ..display import load_profile
 
     loaded = load_profile(profile)
-    found = fit(loaded, PANEL, SEED)
+    calibration = fit(loaded, PANEL, SEED)
     print(f"\n{loaded.name} on {PANEL[0]} x {PANEL[1]} pixels, captured, registered and scored:")
-    for method, wanted in WANTED.items():
-        print(f"  {method:<14}{found.psnr[method]:6.2f} dB   wanted {wanted:.2f} (paper Table 3)")
+    for method, published in PUBLISHED.items():
+        print(f"  {method:<14}{calibration.psnr[method]:6.2f} dB   wanted {published:.2f} (paper Table 3)")
     print("write into the profile, and raise its version if they differ:")
-    print(f"  zero_order: {{fraction: {found.fraction}, phase: {found.phase}}}")
+    print(f"  zero_order: {{fraction: {calibration.fraction}, phase: {calibration.phase}}}")
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,9 @@ class Calibration:
 
 
 def fit(profile: Profile, panel: tuple[int, int], seed: int) -> Calibration:
-    """Fit the two parameters on the eight photographs of Table 3; a few minutes, mostly solving the holograms once.
+    """Fit the two parameters on the eight photographs of Table 3, mostly by solving their holograms once.
 
-    Parameters
-    ----------
-    profile
-        The display; its own values of the two parameters are those that methods know.
-    panel
-        Rows and columns in pixels.
-    seed
-        Of the display's random patterns and of the camera's noise.
+    panel: rows and columns in pixels; seed: of the display's random patterns and of the camera's noise.
     """
     import numpy as np
     from scipy.optimize import least_squares
@@ -77,7 +70,7 @@ def fit(profile: Profile, panel: tuple[int, int], seed: int) -> Calibration:
     targets = {item: photographs.load(item, spec.region.shape) for item in photographs.items()}
     nominal = open_bench(profile, panel, seed)
     holograms = {
-        name: {item: _solve(name, nominal, target, item) for item, target in targets.items()} for name in WANTED
+        name: {item: _solve(name, nominal, target, item) for item, target in targets.items()} for name in PUBLISHED
     }
 
     def error(parameters: NDArray[np.float64]) -> list[float]:
@@ -88,7 +81,7 @@ def fit(profile: Profile, panel: tuple[int, int], seed: int) -> Calibration:
         }
         print(f"unmodulated {parameters[0]:.3f} at {parameters[1]:+.2f} rad: ", end="")
         print(", ".join(f"{name} {value:.2f} dB" for name, value in psnr.items()), flush=True)
-        return [psnr[name] - wanted for name, wanted in WANTED.items()]
+        return [psnr[name] - published for name, published in PUBLISHED.items()]
 
     low, high = zip(UNMODULATED_RANGE, PHASE_RANGE, strict=True)
     result = least_squares(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -32,18 +33,11 @@ def list_(
         screen.print(table)
 
 
-def methods() -> Entries:
-    """Every registered method."""
-    return _plugins("methods", {"camera": "captures", "privileged": "privileged"})
+def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
+    """Every registered plug-in; one that cannot be imported gives the reason and does not hide the others.
 
-
-def datasets() -> Entries:
-    """Every registered dataset."""
-    return _plugins("datasets", {"training": "for training, never scored"})
-
-
-def _plugins(kind: plugins.Kind, marks: dict[str, str]) -> Entries:
-    """Every plug-in with its marks; one that cannot be imported gives the reason and does not hide the others."""
+    marks: what is noted of a class that has the flag of that name.
+    """
     from ..core import plugins
 
     for name in plugins.names(kind):
@@ -78,8 +72,8 @@ def metrics() -> Entries:
 
 
 KINDS: dict[str, Callable[[], Entries]] = {
-    "methods": methods,
-    "datasets": datasets,
+    "methods": partial(plug_ins, "methods", camera="captures", privileged="privileged"),
+    "datasets": partial(plug_ins, "datasets", training="for training, never scored"),
     "profiles": profiles,
     "metrics": metrics,
 }

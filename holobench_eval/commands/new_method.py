@@ -25,24 +25,9 @@ def new_method(
 
 
 def write_method(name: str, folder: Path) -> tuple[Path, Path, str]:
-    """Write ``NAME.py`` and ``test_NAME.py``; nothing is ever overwritten.
+    """Write ``NAME.py`` and ``test_NAME.py`` and return their paths and the method as a config names it.
 
-    Parameters
-    ----------
-    name
-        Of the method and of its module: lower-case words such as ``my_method``.
-    folder
-        Where to write; made where it does not exist.
-
-    Returns
-    -------
-    tuple of Path, Path and str
-        The method's file, the test's file, and the method as a config names it.
-
-    Raises
-    ------
-    UserError
-        The name is no module name or hides an installed module, or the files exist or cannot be written.
+    UserError for a name that is no module name and for files that exist: nothing is ever overwritten.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise UserError(f"'{name}' is no name for a method; use lower-case words such as 'my_method'")

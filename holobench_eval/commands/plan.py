@@ -41,8 +41,8 @@ def plan(
     workers = executor("auto", None, is_small(study.display.panel), gpus=gpus(device)).workers
     grid, many = plan_cells(study), thread_count(threads, workers, study)
     console.print(table(study, preview(study, grid, Store(folder), many, workers, gpu_name(find(device)))))
-    if needed := trainings(grid, Artifacts(artifacts)):
-        console.print(training_table(needed))
+    if learning := trainings(grid, Artifacts(artifacts)):
+        console.print(training_table(learning))
     console.print(f"output folder: {folder}", highlight=False, soft_wrap=True)
 
 
@@ -84,15 +84,7 @@ class TrainingRow:
 
 
 def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, gpu: str = "") -> list[Row]:
-    """Count the cells of every method of a plan, the floor first.
-
-    Parameters
-    ----------
-    study, plan, store
-        What is asked for, its cells, and the records that are there.
-    threads, workers, gpu
-        How it would be computed, as in ``study.timings.key``: times of other machines say nothing.
-    """
+    """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``timings.key``."""
     from ..study import timings
 
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
@@ -131,9 +123,9 @@ def table(study: Study, rows: list[Row]) -> Table:
         total = str(sum(getattr(row, name) for row in rows)) if name in numbers[2:] else ""
         result.add_column(name, justify="right", footer=total)
     result.add_column("captures", justify="right")
-    known = [row.seconds for row in rows if row.seconds is not None]
+    timed = [row.seconds for row in rows if row.seconds is not None]
     untimed = any(row.seconds is None and row.label != "floor" for row in rows)
-    solving = f"{'at least ' * untimed}{sum(known):.3g}" if known else ""
+    solving = f"{'at least ' * untimed}{sum(timed):.3g}" if timed else ""
     result.add_column(escape("solving [s]"), justify="right", footer=solving)
     for row in rows:
         limit = "" if row.captures is None else str(row.captures)
@@ -148,7 +140,7 @@ def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
     from ..study.training_log import known, progress
 
     rows = []
-    for identity, needed in plan.preparations().items():
+    for identity, preparation in plan.preparations().items():
         labels = {task.label for task in plan.tasks if task.preparation and task.preparation.id == identity}
         displays = {
             f"display {display.name}"
@@ -156,17 +148,17 @@ def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
             for display in task.conditions
             if display.learned and display.learned.id == identity
         }
-        folder, reason = artifacts.place(needed), ""
-        if artifacts.has(needed):
+        folder, reason = artifacts.place(preparation), ""
+        if artifacts.has(preparation):
             state, facts = "done", known(folder) or {}
             captures, seconds = (float(facts.get(key, math.nan)) for key in ("captures", "seconds"))
         else:
             state = "unfinished" if (folder / UNFINISHED).is_dir() else "missing"
             captures, seconds = progress(folder)
             if (folder / FAILURE).is_file():
-                state, reason = "failed", artifacts.failure(needed)
+                state, reason = "failed", artifacts.failure(preparation)
         needed_by = (*sorted(labels), *sorted(displays))
-        rows.append(TrainingRow(needed.name, needed_by, state, captures, seconds, reason))
+        rows.append(TrainingRow(preparation.name, needed_by, state, captures, seconds, reason))
     return rows
 
 

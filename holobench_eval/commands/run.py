@@ -87,8 +87,8 @@ def _where(study: Study, device: str, executor: str, workers: int | None, addres
     elsewhere = executor in executors.ELSEWHERE  # workers there look for their own devices
     device = device if elsewhere else str(find(device))
     shared = int(device.startswith("cuda")) if elsewhere else gpus(device)
-    wanted = executors.executor(executor, workers, is_small(study.display.panel), address, shared)
-    return device, executors.Serial() if study.display.real else wanted  # there is one real bench
+    chosen = executors.executor(executor, workers, is_small(study.display.panel), address, shared)
+    return device, executors.Serial() if study.display.real else chosen  # there is one real bench
 
 
 def open_displays(study: Study) -> None:
@@ -96,8 +96,8 @@ def open_displays(study: Study) -> None:
     from ..study.displays import workbench
     from ..study.plan import displays
 
-    for place in displays(study).values():
-        _ = workbench(place, study.seed)
+    for display in displays(study).values():
+        workbench(display, study.seed)
 
 
 def draw_sheets(console: Console, study: Study, output: Path, threads: int) -> None:

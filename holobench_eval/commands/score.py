@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import platform
 import shlex
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from .. import __version__
 from ..core.errors import UserError, suggest
 from .output import console as open_console
 from .output import print_headline
@@ -55,33 +53,10 @@ def score_folders(
     lpips_weights: str | None,
     console: Console,
 ) -> tuple[Path, Results]:
-    """Score ``captures/<method>/<target>.png`` against ``targets/<target>.png`` and write a report.
+    """Score ``captures/<method>/<target>.png`` against ``targets/<target>.png``: path and numbers of the report.
 
-    What was computed before in ``output`` for the same files by the same code is taken from there. A capture that
-    cannot be aligned is a hole in the report, with its reason.
-
-    Parameters
-    ----------
-    captures, targets, output
-        Folders; ``output`` lies in none of the others.
-    values
-        One of `VALUES`.
-    baseline
-        The method that every other method is tested against.
-    lpips_weights
-        File or folder of the LPIPS trunk.
-    console
-        Where notes and progress are printed.
-
-    Returns
-    -------
-    tuple of Path and Results
-        The report's file and its numbers.
-
-    Raises
-    ------
-    UserError
-        The input cannot be used; one line.
+    What was computed before in ``output`` for the same files by the same code is taken from there. UserError for input
+    that cannot be used, in one line; a capture that cannot be aligned is a hole in the report, with its reason.
     """
     from ..report.build import write_report
     from ..report.charts.alignment import draw_alignment
@@ -90,7 +65,7 @@ def score_folders(
     from ..report.sections.description import Description
     from ..study import provenance
     from ..study.folders.files import read_folders
-    from ..study.folders.scoring import Scoring
+    from ..study.folders.scoring import Scoring, described
     from ..study.store import Store
 
     if values not in VALUES:
@@ -106,15 +81,15 @@ def score_folders(
         console.print(note, markup=False, highlight=False, soft_wrap=True)
     scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment)
     with scoring.store.locked():
-        known = provenance.begin(output, _provenance(folders, values), resumed=True)
+        known = provenance.begin(output, described(folders, values), resumed=True)
         with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
             records = [asdict(record) for record in scoring.records(step)]
         known = provenance.end(output, known)
         words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
         words += ["--baseline", baseline] if baseline else []
-        described = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
+        description = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
         layout = _layout(folders, scoring.domain, values, baseline)
-        report = write_report(layout, records, output, known, described)
+        report = write_report(layout, records, output, known, description)
         return report, Results(records_frame(records, layout), layout)
 
 
@@ -133,26 +108,6 @@ def _layout(folders: Folders, domain: str, values: str, baseline: str | None) ->
         measure=FILES,
         values=values,
     )
-
-
-def _provenance(folders: Folders, values: str) -> dict[str, Any]:
-    from ..core.installed import installed
-    from ..study import provenance
-    from ..study.versions import ALIGNMENT, HARNESS
-
-    files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
-    files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
-    return {
-        "package": __version__,
-        "code_sha256": {"metrics": HARNESS, "alignment": ALIGNMENT},
-        "files": files,
-        "values": values,
-        "python": platform.python_version(),
-        "packages": {name: installed(name) for name in provenance.PACKAGES},
-        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "started": provenance.now(),
-        "ended": None,
-    }
 
 
 def _refuse_nested(output: Path, *sources: Path) -> None:

@@ -49,29 +49,40 @@ class FourTransforms:
             torch.fft.ifft2(torch.fft.fft2(self.fields))
 
 
-class GoodEngineer:
+class Autograd:
+    """A step by autograd through ``field()``, which each version defines."""
+
+    def __init__(self, scene, padded):
+        self.padded, self.phase = tuple(padded), scene.phase.clone().requires_grad_()
+        self.target, self.region, self.leaf = scene.target, scene.spec.region, self.phase
+
+    def step(self):
+        intensity = self.region.crop(self.field().abs().square())
+        scale = (intensity * self.target).sum() / intensity.square().sum()
+        loss = (scale * intensity - self.target).square().sum() / self.target.square().sum()
+        return loss, torch.autograd.grad(loss, self.leaf)[0]
+
+
+class GoodEngineer(Autograd):
     """What a careful engineer writes in ten lines: a cached transfer function, twice padded, and autograd."""
 
     def __init__(self, scene):
-        self.padded = tuple(2 * side for side in scene.panel)
+        super().__init__(scene, (2 * side for side in scene.panel))
         fy, fx = frequencies(self.padded, PITCH)
         phase = angular_spectrum_phase(fy**2 + fx**2, WAVELENGTH, scene.distance)
         self.transfer = torch.polar(torch.ones_like(phase), phase).to(torch.complex64)
-        self.phase, self.target, self.region = scene.phase.clone().requires_grad_(), scene.target, scene.spec.region
 
     def field(self):
         rows, columns = self.phase.shape[-2:]
         light = torch.polar(torch.ones_like(self.phase), self.phase)
         return torch.fft.ifft2(torch.fft.fft2(light, s=self.padded) * self.transfer)[..., :rows, :columns]
 
-    def step(self):
-        return _autograd(self)
 
-
-class Odak:
+class Odak(Autograd):
     """odak's documented way: ``propagate_beam`` with its band-limited angular spectrum, twice padded."""
 
     def __init__(self, scene):
+        super().__init__(scene, (2 * side for side in scene.panel))
         with TemporaryDirectory() as folder, chdir(folder):  # its import opens a log in the working directory
             import odak.learn.wave as wave
         log = logging.getLogger("odak")
@@ -80,8 +91,6 @@ class Odak:
             handler.close()
         log.setLevel(logging.ERROR)
         self.wave, self.distance, self.number = wave, scene.distance, wave.wavenumber(WAVELENGTH)
-        self.padded = tuple(2 * side for side in scene.panel)
-        self.phase, self.target, self.region = scene.phase.clone().requires_grad_(), scene.target, scene.spec.region
 
     def field(self):
         light = self.wave.generate_complex_field(torch.ones_like(self.phase[0]), self.phase[0])
@@ -95,11 +104,8 @@ class Odak:
             zero_padding=[True, False, True],
         )[None]
 
-    def step(self):
-        return _autograd(self)
 
-
-class TorchOptics:
+class TorchOptics(Autograd):
     """torchoptics' documented way: a system of one phase modulator; double precision, as is its default.
 
     padding: added to each side, in panels; 0.5 pads twice, and 2 is torchoptics' own default.
@@ -109,34 +115,18 @@ class TorchOptics:
         import torchoptics
         from torchoptics.elements import PhaseModulator
 
+        self.pad = [round(padding * side) for side in scene.panel]
+        super().__init__(scene, (side + 2 * pad for side, pad in zip(scene.panel, self.pad, strict=True)))
         modulator = PhaseModulator(torch.nn.Parameter(scene.phase[0].clone()), z=0, spacing=PITCH)
-        self.system = torchoptics.System(modulator)
-        (self.parameter,) = self.system.parameters()
+        self.system, self.distance = torchoptics.System(modulator), scene.distance
+        (self.leaf,) = self.system.parameters()
         even = torch.ones(scene.panel, dtype=torch.complex128)
         self.light = torchoptics.Field(even, wavelength=WAVELENGTH, z=0, spacing=PITCH)
-        self.distance, self.pad = scene.distance, [round(padding * side) for side in scene.panel]
-        self.padded = tuple(side + 2 * pad for side, pad in zip(scene.panel, self.pad, strict=True))
-        self.phase, self.target, self.region = self.parameter[None], scene.target.double(), scene.spec.region
+        self.target = scene.target.double()
 
     def field(self):
-        return self.system.measure_at_z(self.light, self.distance, propagation_method="ASM", asm_pad=self.pad).data[
-            None
-        ]
-
-    def step(self):
-        loss = _loss(self)
-        return loss, torch.autograd.grad(loss, self.parameter)[0]
-
-
-def _loss(version):
-    intensity = version.region.crop(version.field().abs().square())
-    scale = (intensity * version.target).sum() / intensity.square().sum()
-    return (scale * intensity - version.target).square().sum() / version.target.square().sum()
-
-
-def _autograd(version):
-    loss = _loss(version)
-    return loss, torch.autograd.grad(loss, version.phase)[0]
+        field = self.system.measure_at_z(self.light, self.distance, propagation_method="ASM", asm_pad=self.pad)
+        return field.data[None]
 
 
 BARE, OURS, AUTOGRAD = "four bare transforms", "holobench_eval", "autograd, twice padded"

@@ -10,7 +10,7 @@ def test_the_fit_comes_as_near_as_two_parameters_allow_and_is_printed(monkeypatc
     build = plugins.build
     two = {"datasets": {"count": 2}, "methods": {}}
     monkeypatch.setattr(plugins, "build", lambda kind, name, params: build(kind, name, two[kind] | params))
-    monkeypatch.setattr(command, "WANTED", {"double_phase": 12.0, "wirtinger": 14.0})
+    monkeypatch.setattr(command, "PUBLISHED", {"double_phase": 12.0, "wirtinger": 14.0})
     found = fit(load_profile("leto-mild"), (128, 128), 0)
     assert UNMODULATED_RANGE[0] <= found.fraction <= UNMODULATED_RANGE[1]
     assert found.psnr["wirtinger"] == pytest.approx(14.0, abs=1.5)

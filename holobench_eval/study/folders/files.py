@@ -75,20 +75,19 @@ def read_folders(captures: Path, targets: Path) -> Folders:
     UserError, one line, for folders that are missing or empty, files that are no pictures of the right kind, links that
     lead out of the folder, a capture without a target of its name.
     """
-    wanted = {path.stem: path for path in _pictures(targets, targets, "a target of each scene, <target>.png")}
+    target_paths = {path.stem: path for path in _pictures(targets, targets, "a target of each scene, <target>.png")}
     folders = _methods(captures)
-    found = {
+    capture_paths = {
         (folder.name, path.stem): path
         for folder in folders
         for path in _pictures(folder, captures, "a capture of each target, <target>.png")
     }
-    for (_, name), path in found.items():
-        if name not in wanted:
-            raise UserError(f"{path}: no target of this name in {targets}; {suggest(name, wanted)}")
-    every = {path: _checked(path) for path in (*wanted.values(), *found.values())}
-    known = {name: every[path] for name, path in wanted.items()}
-    taken = {key: every[path] for key, path in found.items()}
-    return Folders(known, taken, tuple(_notes(known, taken)))
+    for (_, name), path in capture_paths.items():
+        if name not in target_paths:
+            raise UserError(f"{path}: no target of this name in {targets}; {suggest(name, target_paths)}")
+    pictures = {name: _checked(path) for name, path in target_paths.items()}
+    photographs = {key: _checked(path) for key, path in capture_paths.items()}
+    return Folders(pictures, photographs, tuple(_notes(pictures, photographs)))
 
 
 def _methods(captures: Path) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,8 +14,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ... import __version__
 from ...core.errors import CellError
 from ...core.hashing import digest
+from ...core.installed import installed
 from ...core.io import write_atomically
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
@@ -23,6 +26,7 @@ from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
+from .. import provenance
 from ..pictures import write_thumbnail
 from ..plan import FLOORS, REFERENCE
 from ..store import Record, Store
@@ -38,22 +42,29 @@ Step = Callable[[str], None]  # called with the name of each step
 Draw = Callable[[Path, Values, Warp, Values, Values], None]  # file, capture, warp, matched capture, target
 
 
+def described(folders: Folders, values: str) -> dict[str, Any]:
+    """Everything about the present scoring of pictures for their ``provenance.json``."""
+    files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
+    files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
+    return {
+        "package": __version__,
+        "code_sha256": {"metrics": HARNESS, "alignment": ALIGNMENT},
+        "files": files,
+        "values": values,
+        "python": platform.python_version(),
+        "packages": {name: installed(name) for name in provenance.PACKAGES},
+        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "started": provenance.now(),
+        "ended": None,
+    }
+
+
 @dataclass(frozen=True)
 class Scoring:
-    """Given captures and how they are scored.
+    """Given captures, and how they are scored.
 
-    Parameters
-    ----------
-    folders
-        The captures and their targets.
-    store
-        Where records, alignments and pictures are kept.
-    values
-        How files are read: ``stored`` (as they are), ``srgb``, or ``linear`` (captures as linear light).
-    lpips_weights
-        File or folder of the LPIPS trunk.
-    draw
-        Draws the picture of an alignment from display-encoded values.
+    store: of records, alignments and pictures; values: how files are read, ``stored`` (as they are), ``srgb``, or
+    ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values.
     """
 
     folders: Folders
@@ -75,8 +86,8 @@ class Scoring:
 
     def records(self, step: Step) -> list[Record]:
         """A record for every method and target, and for the floor; old pictures of alignments go."""
-        found = self.alignments(step)
-        placed = {**found, **self.common(found)}
+        own = self.alignments(step)
+        placements = {**own, **self.common(own)}
         records = []
         for name in self.folders.targets:
             step(f"floor of {name}")
@@ -87,7 +98,9 @@ class Scoring:
                 key = (method, name)
                 if key in self.folders.captures:
                     step(f"scoring {method}, {name}")
-                records.append(self.scored(key, placed.get(key), shared=key in placed and placed[key] != found[key]))
+                records.append(
+                    self.scored(key, placements.get(key), shared=key in placements and placements[key] != own[key])
+                )
                 kept.add(alignment_name(*key))
         for old in (self.store.output / "figures").glob("alignment-*.jpg"):
             if old.name not in kept:
@@ -96,20 +109,20 @@ class Scoring:
 
     def alignments(self, step: Step) -> Alignments:
         """Every capture's own alignment, from what is kept of an earlier run or computed."""
-        found: Alignments = {}
+        own: Alignments = {}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
             target = self.folders.targets[key[1]]
             identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT])
             path = self.store.folder / f"alignment-{identity}.json"
-            known = _read(path)
-            if known is None:
-                known = self.own(picture, target)
-                write_atomically(path, f"{json.dumps(known, sort_keys=True, allow_nan=False)}\n".encode())
-            found[key] = str(known["refused"]) if "refused" in known else Alignment.from_dict(known)
-        return found
+            plain = _read(path)
+            if plain is None:
+                plain = self.aligned(picture, target)
+                write_atomically(path, f"{json.dumps(plain, sort_keys=True, allow_nan=False)}\n".encode())
+            own[key] = str(plain["refused"]) if "refused" in plain else Alignment.from_dict(plain)
+        return own
 
-    def own(self, picture: Picture, target: Picture) -> dict[str, Any]:
+    def aligned(self, picture: Picture, target: Picture) -> dict[str, Any]:
         """The alignment of a capture by itself, or why it is refused, as plain values."""
         if picture.shape[0] != target.shape[0]:
             kinds = {1: "gray", 3: "in colour"}
@@ -129,59 +142,59 @@ class Scoring:
         bright = max(float(np.percentile(values, 99.5)), 1e-6)
         return srgb_encode(torch.from_numpy(values) / bright).numpy()
 
-    def common(self, found: Alignments) -> Alignments:
+    def common(self, own: Alignments) -> Alignments:
         """The shared alignments: by frame size and shape of the target, for those that agree or that they fit."""
         captures, targets = self.folders.captures, self.folders.targets
         groups: dict[tuple[int, ...], list[Key]] = {}
         for key, picture in captures.items():
             groups.setdefault((*picture.shape, *targets[key[1]].shape), []).append(key)
-        placed: Alignments = {}
+        placements: Alignments = {}
         for keys in groups.values():
-            common = shared({key: own for key in keys if isinstance(own := found[key], Alignment)})
+            common = shared({key: found for key in keys if isinstance(found := own[key], Alignment)})
             if common is None:
                 continue
             warp, agreeing = common
             for key in keys:
-                if key in agreeing or isinstance(found[key], str):
-                    fits = confirmed(self.viewable(captures[key].load()), targets[key[1]].load(), warp)
-                    placed |= {key: fits} if fits is not None else {}
-        return placed
+                if key in agreeing or isinstance(own[key], str):
+                    fit = confirmed(self.viewable(captures[key].load()), targets[key[1]].load(), warp)
+                    placements |= {key: fit} if fit is not None else {}
+        return placements
 
-    def scored(self, key: Key, place: Alignment | str | None, shared: bool) -> Record:
+    def scored(self, key: Key, alignment: Alignment | str | None, shared: bool) -> Record:
         """The record of a capture: kept, or computed."""
         method, name = key
-        described = self.cell(method, name, place, "shared" if shared else "own")
-        if place is None:
-            return Record(described, "missing", method, f"no capture of '{name}' in the folder of {method}")
-        if isinstance(place, str):
-            record = Record(described, "failed", method, f"CellError: {place}")
+        cell = self.cell(method, name, alignment, "shared" if shared else "own")
+        if alignment is None:
+            return Record(cell, "missing", method, f"no capture of '{name}' in the folder of {method}")
+        if isinstance(alignment, str):
+            record = Record(cell, "failed", method, f"CellError: {alignment}")
             self.store.write(record)
             return record
         figure = self.store.output / "figures" / alignment_name(*key)
-        known = self.store.read(digest(described))
-        if known is not None and figure.is_file() and self.store.thumbnail(known.id).is_file():
-            return known
+        kept = self.store.read(digest(cell))
+        if kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file():
+            return kept
         capture, target = self.folders.captures[key].load(), self.folders.targets[name].load()
-        image = torch.from_numpy(sampled(self.capture_values(capture), place.warp))
-        wanted = torch.from_numpy(self.target_values(target))
-        scores = self.scores(image, wanted) | self.second(capture, target, place.warp)
-        full = sampled((capture >= 1).astype(np.float32), place.warp)
-        record = Record(described, "done", method, scores=scores, saturated=float((full > 0.5).mean()))
-        matched, _ = match(image, wanted)
+        image = torch.from_numpy(sampled(self.capture_values(capture), alignment.warp))
+        reference = torch.from_numpy(self.target_values(target))
+        scores = self.scores(image, reference) | self.second(capture, target, alignment.warp)
+        full = sampled((capture >= 1).astype(np.float32), alignment.warp)
+        record = Record(cell, "done", method, scores=scores, saturated=float((full > 0.5).mean()))
+        matched, _ = match(image, reference)
         write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
-        self.draw(figure, self.viewable(capture), place.warp, self.encoded(matched), target)
+        self.draw(figure, self.viewable(capture), alignment.warp, self.encoded(matched), target)
         self.store.write(record)
         return record
 
     def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
         """PSNR and SSIM by the geometry that another algorithm finds, and how far apart the two are."""
-        frame, wanted = self.capture_values(capture), torch.from_numpy(self.target_values(target))
-        light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(wanted)
+        frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
+        light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(compared)
         other = second_warp(gray(light.numpy()), gray(reference.numpy()), first)
         if other is None:
             return {}
         image = torch.from_numpy(sampled(frame, other))
-        again = score(image, wanted, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored")
+        again = score(image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored")
         scores = {f"{name}_{self.domain}_second": again[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return scores | {"second_aligner_px": disagreement(first, other)}
 
@@ -193,24 +206,23 @@ class Scoring:
         wrong = [other for other in after if self.folders.targets[other].shape == shape][:1]
         rows = [row for row in FLOORS if wrong or row != "floor_wrong_target"]
         cells = {row: self.cell(row, name, None, "reference", wrong[0] if "wrong" in row else "") for row in rows}
-        known = {row: self.store.read(digest(cell)) for row, cell in cells.items()}
-        kept = [record for record in known.values() if record is not None]
+        kept = [record for cell in cells.values() if (record := self.store.read(digest(cell))) is not None]
         thumbnail = self.store.target_thumbnail(name)
         if len(kept) == len(rows) and thumbnail.is_file():
             return kept
         pair = (self.folders.targets[target].load() for target in (name, *wrong))
-        wanted, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
-        write_thumbnail(thumbnail, self.as_light(wanted))
-        pictures = floor_captures(wanted, others, name)
-        records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], wanted)) for row in rows]
+        reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
+        write_thumbnail(thumbnail, self.as_light(reference))
+        pictures = floor_captures(reference, others, name)
+        records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], reference)) for row in rows]
         for record in records:
             self.store.write(record)
         return records
 
-    def scores(self, image: Tensor, wanted: Tensor) -> dict[str, float]:
+    def scores(self, image: Tensor, reference: Tensor) -> dict[str, float]:
         """All of the protocol, in the domains that the values have."""
-        found = score(image, wanted, lpips_weights=self.lpips_weights, stored=self.values == "stored")
-        return found if len(image) > 1 else {"match_factor" if k == "scale_0" else k: v for k, v in found.items()}
+        scores = score(image, reference, lpips_weights=self.lpips_weights, stored=self.values == "stored")
+        return scores if len(image) > 1 else {"match_factor" if k == "scale_0" else k: v for k, v in scores.items()}
 
     def target_values(self, target: Values) -> Values:
         """A target in the values that are compared."""
@@ -229,12 +241,14 @@ class Scoring:
         values = compared if self.values == "stored" else srgb_encode(compared)
         return values.float().numpy()
 
-    def cell(self, method: str, name: str, place: Alignment | str | None, kind: str, wrong: str = "") -> dict[str, Any]:
+    def cell(
+        self, method: str, name: str, alignment: Alignment | str | None, kind: str, wrong: str = ""
+    ) -> dict[str, Any]:
         """The plain description of a number."""
         capture = self.folders.captures.get((method, name))
         geometry: dict[str, Any] = {"kind": kind}
         if kind != "reference":
-            geometry = {"kind": kind, **place.to_dict()} if isinstance(place, Alignment) else {"kind": "none"}
+            geometry = {"kind": kind, **alignment.to_dict()} if isinstance(alignment, Alignment) else {"kind": "none"}
         return {
             "method": method,
             "params": {"target": wrong, "target_sha256": self.folders.targets[wrong].sha256} if wrong else {},
@@ -258,8 +272,8 @@ class Scoring:
 def _read(path: Path) -> dict[str, Any] | None:
     """A kept alignment; None where there is none, or none that can be read."""
     try:
-        known = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    keys = set(known) if isinstance(known, Mapping) else set()
-    return known if keys in ({"refused"}, {"shape", "homography", "correlation"}) else None
+    keys = set(content) if isinstance(content, Mapping) else set()
+    return content if keys in ({"refused"}, {"shape", "homography", "correlation"}) else None

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from holobench_eval.commands.list_ import methods
+from holobench_eval.commands.list_ import KINDS
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.methods.peers.loading import load
@@ -29,7 +29,7 @@ def test_it_is_listed_and_built_and_says_in_one_line_what_to_install(name, packa
 
     odak_sgd._odak.cache_clear()
     hide(package, monkeypatch)
-    assert "needs the extra 'peers'" in dict(methods())[name]
+    assert "needs the extra 'peers'" in dict(KINDS["methods"]())[name]
     method = plugins.build("methods", name, {})
     assert method.available() == f"{package} is not installed; pip install 'holobench_eval[peers]'"
     with pytest.raises(UserError, match="is not installed"):
