@@ -7,18 +7,8 @@ from holobench_eval.benchmarks import against, machine, suite
 from holobench_eval.benchmarks.against import Comparison
 from holobench_eval.benchmarks.suite import Timing
 from holobench_eval.commands import app
+from tests.bench.test_report import MACHINE
 
-DESCRIBED = {
-    "revision": "abc",
-    "dirty": False,
-    "date": "now",
-    "cpu": "one",
-    "platform": "Linux",
-    "python": "3.11",
-    "packages": {},
-    "threads": 2,
-    "bandwidth": 1e10,
-}
 STEP = "gradient step"
 
 
@@ -32,7 +22,7 @@ def measured(monkeypatch):
         ]
         monkeypatch.setattr(suite, "measure", lambda only: (rows, complete))
         monkeypatch.setattr(suite, "peak_memory", lambda timing: 2.0**20)
-        monkeypatch.setattr(machine, "describe", lambda load: DESCRIBED | {"load_before": load})
+        monkeypatch.setattr(machine, "describe", lambda load: MACHINE | {"load_before": load})
 
     return fix
 
