@@ -13,7 +13,7 @@ from typing import Any
 from ..core.errors import UserError
 from ..core.io import write_atomically
 from ..report.charts.style import COLOURS, GREY, new_figure, save, style
-from ..report.markdown import render, table
+from ..report.markdown import table
 from .suite import Timing
 
 TIMINGS, MACHINE, REPORT, CHART = "timings.csv", "machine.json", "report.md", "ratios.png"
@@ -114,17 +114,40 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
         for row in rows
         if name not in compared and name not in pairs
     ]
-    context = {
-        "machine": {"dirty": False, "load_before": None, **machine},
-        "packages": ", ".join(f"{name} {number}" for name, number in machine["packages"].items()),
-        "bandwidth": bandwidth,
-        "chart": CHART,
-        "passes": PASSES,
-        "compared": [(name, _compared(rows)) for name, rows in compared.items()],
-        "sizes": pairs and table(SIZES, [_size(name, *pair, bandwidth) for name, pair in pairs.items()]),
-        "others": others and table(OTHERS, others),
-    }
-    return render("speed.md.j2", context)
+    dirty = ", with changes" if machine.get("dirty") else ""
+    packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
+    load = machine.get("load_before")
+    busy = "" if load is None else f"; load before: {load}"
+    parts = [
+        "# Speed",
+        "Medians of repeated calls in one run, after a warm-up, with arrays at new places in memory for each, on "
+        f"{machine['threads']} threads of {machine['cpu']} ({machine['platform']}), {machine['date']}; revision "
+        f"{machine['revision']}{dirty}; Python {machine['python']}, {packages}{busy}. Memory copies "
+        f"{bandwidth / 1e9:.1f} GB/s (read and written). Compare ratios, not seconds; another machine has others. "
+        "`holoeval bench` makes this report.",
+    ]
+    if compared:
+        parts += [
+            "## One gradient step beside others",
+            "Loss and gradient of the squared intensity error, from a random phase, which fills the band: the hardest "
+            "case. *error*: relative rms error of the field at the image plane against the reference setting (four "
+            "times padded, complex128). *over ours*: its median over that of this package. *memory*: the most that a "
+            "process of its own holds beyond what it had before. odak's frequencies lie half a sample off, so its "
+            "picture is displaced; every package's documented way is timed, whatever more it computes.",
+            f"![Times over that of holobench_eval, for each version and distance]({CHART})",
+            *(f"### {name}\n\n{_compared(rows)}" for name, rows in compared.items()),
+        ]
+    if pairs:
+        parts += [
+            "## Sizes and distances",
+            "*bare* is the same number of Fourier transforms of the padded size and nothing else; *memory bound* what "
+            f"{PASSES} passes of a step over the padded array ({PASSES // 2} for a propagation) would take at the "
+            "bandwidth above. Padding is what the stated accuracy needs.",
+            table(SIZES, [_size(name, *pair, bandwidth) for name, pair in pairs.items()]),
+        ]
+    if others:
+        parts += ["## The rest", table(OTHERS, others)]
+    return "\n\n".join(map(str, parts)) + "\n"
 
 
 def _bare(rows: Sequence[Timing]) -> Timing | None:
