@@ -107,7 +107,11 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
     """The report in Markdown."""
     bandwidth = _positive(machine["bandwidth"], f"{MACHINE}: bandwidth")
     work, compared = groups(timings), beside_others(timings)
-    pairs = {name: (ours, bare) for name, rows in work.items() if (ours := _ours(rows)) and (bare := _bare(rows))}
+    pairs = {
+        name: (ours, bare)
+        for name, rows in work.items()
+        if (ours := _version(rows, OURS)) and (bare := _version(rows, BARE))
+    }
     others = [
         (name, row.version, *_times(row), f"{row.median_s / rows[0].median_s:.2f}", row.rounds)
         for name, rows in work.items()
@@ -150,12 +154,8 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
     return "\n\n".join(map(str, parts)) + "\n"
 
 
-def _bare(rows: Sequence[Timing]) -> Timing | None:
-    return next((row for row in rows if row.version.endswith(BARE)), None)
-
-
-def _ours(rows: Sequence[Timing]) -> Timing | None:
-    return next((row for row in rows if row.version == OURS), None)
+def _version(rows: Sequence[Timing], ending: str) -> Timing | None:
+    return next((row for row in rows if row.version.endswith(ending)), None)
 
 
 def _milliseconds(seconds: float) -> str:
@@ -171,7 +171,7 @@ def _padded(row: Timing) -> str:
 
 
 def _compared(rows: Sequence[Timing]) -> str:
-    ours = _ours(rows)
+    ours = _version(rows, OURS)
     lines = [
         (
             row.version,
@@ -199,7 +199,7 @@ def _size(name: str, ours: Timing, bare: Timing, bandwidth: float) -> tuple[str,
 
 def chart(timings: Sequence[Timing], path: Path) -> None:
     """Bars: the time of every version of a step over this package's, a panel a distance; nothing without rivals."""
-    compared = [(rows, ours) for rows in beside_others(timings).values() if (ours := _ours(rows))]
+    compared = [(rows, ours) for rows in beside_others(timings).values() if (ours := _version(rows, OURS))]
     if not compared:
         path.unlink(missing_ok=True)  # of benchmarks that were timed before
         return

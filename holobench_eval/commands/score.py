@@ -70,7 +70,10 @@ def score_folders(
 
     if values not in VALUES:
         raise UserError(f"--values {values}: {suggest(values, VALUES)}")
-    _refuse_nested(output, captures, targets)
+    for source in (captures, targets):
+        if output.resolve().is_relative_to(source.resolve()):
+            mixed = f"lies in {source}, whose files it would mix with"
+            raise UserError(f"--output {output}: {mixed}; expected another folder")
     folders = read_folders(captures, targets)
     if baseline is not None and baseline not in folders.methods:
         raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
@@ -108,14 +111,6 @@ def _layout(folders: Folders, domain: str, values: str, baseline: str | None) ->
         measure=FILES,
         values=values,
     )
-
-
-def _refuse_nested(output: Path, *sources: Path) -> None:
-    for source in sources:
-        if output.resolve().is_relative_to(source.resolve()):
-            raise UserError(
-                f"--output {output}: lies in {source}, whose files it would mix with; expected another folder"
-            )
 
 
 @contextmanager
