@@ -10,8 +10,8 @@ from typing import Any
 import torch
 
 from ..core.installed import installed
+from ..study.cost import cpu_model
 from ..study.provenance import now, revision
-from ..study.timings import cpu_model
 from .suite import THREADS
 
 COPIED = 256 * 2**20

@@ -16,7 +16,7 @@ from .output import write_report
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..study.config import Study
+    from ..study.definition import Study
 
 INTERRUPTED = 130
 LARGE_PANEL = 512 * 1024
@@ -139,11 +139,11 @@ def _run(
 
 def _prepare_bench(study: Study) -> None:
     """Open a real bench before anything is computed, so that what is wrong with it is told first."""
-    from ..study.displays import workbench
-    from ..study.plan import displays
+    from ..study.displays import displays
+    from ..study.opening import open_display
 
     for place in displays(study).values():
-        _ = workbench(place, study.seed)
+        _ = open_display(place, study.seed)
 
 
 def _sheets(console: Console, study: Study, output: Path, threads: int) -> None:
@@ -153,7 +153,8 @@ def _sheets(console: Console, study: Study, output: Path, threads: int) -> None:
     from ..core.hashing import digest
     from ..display import load_profile
     from ..report.charts.sheet import drawn_from, save_sheet
-    from ..study.displays import condition, simulated
+    from ..study.displays import condition
+    from ..study.opening import simulated
     from ..study.versions import HARNESS
 
     for source in study.display.profiles:  # learned and real displays have no stages

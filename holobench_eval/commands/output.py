@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..report import Results
-    from ..study.config import Study
+    from ..study.definition import Study
 
 
 def console() -> Console:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Literal
 from rich.markup import escape
 from rich.table import Table
 
-from ..study import timings
+from ..study import cost
 from ..study.artifacts import FAILURE, UNFINISHED, Artifacts
+from ..study.displays import Preparation
 from ..study.plan import Plan, Task
-from ..study.preparation import Preparation
 from ..study.store import State, Store
 from ..study.training_log import known, progress
 
 if TYPE_CHECKING:
-    from ..study.config import Study
+    from ..study.definition import Study
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ def training_table(rows: list[TrainingRow]) -> Table:
 
 
 def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, gpu: str = "") -> list[Row]:
-    """A row per method, the floor first. gpu: as in ``timings.key``, as are threads and workers."""
+    """A row per method, the floor first. gpu: as in ``cost.key``, as are threads and workers."""
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     labels = dict.fromkeys(task.label for task in plan.tasks)
-    states, kept = store.states(plan.cells, timings.timed(study, plan)), timings.names()
+    states, kept = store.states(plan.cells, cost.timed(study, plan)), cost.names()
 
     def seconds(task: Task) -> float | None:
-        name = timings.key(task, threads, workers, gpu)
-        effort = timings.known(name) if name in kept else None
+        name = cost.key(task, threads, workers, gpu)
+        effort = cost.known(name) if name in kept else None
         return None if effort is None else effort.seconds
 
     return [

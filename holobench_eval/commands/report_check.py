@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from ..core.errors import UserError
 from ..study import provenance
 from ..study.config import load_study
-from ..study.plan import displays
+from ..study.displays import displays
 
 if TYPE_CHECKING:
-    from ..study.config import Study
+    from ..study.definition import Study
 
 
 def check(folder: Path) -> tuple[int, list[str]]:

@@ -20,7 +20,7 @@ import torch
 
 from ..core.errors import UserError
 from ..core.io import TEMPORARY, file_name, write_atomically
-from .preparation import Preparation
+from .displays import Preparation
 
 STATE, PROVENANCE, LOG, FAILURE = "learned.pt", "provenance.json", "training.csv", "failure.log"
 UNFINISHED = "unfinished"

@@ -11,19 +11,18 @@ import torch
 
 from .. import __version__
 from ..core import plugins
-from ..core.device import CPU, find, gpu_name, moved
+from ..core.device import CPU, find, gpu_name, moved, repeatable
 from ..core.errors import CellError, LostDeviceError, Pending
+from ..core.io import now
 from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
 from ..display.simulated.effects import effects
 from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
 from ..lab.real import RealBench
+from . import opening
 from .artifacts import Artifacts
-from .displays import workbench
-from .job import repeatable
-from .preparation import Preparation
-from .provenance import now
+from .displays import Preparation
 from .versions import HARNESS, method_version
 
 WAITS = "waits for photographs"
@@ -62,7 +61,7 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torc
     method = plugins.build("methods", needed.method, dict(needed.params), needed.folder)
     images = _images(needed, device)
     split = len(images) - needed.held_out
-    place = workbench(needed.place, needed.seed, device)
+    place = opening.open_display(needed.place, needed.seed, device)
     bench = TrainingBench(
         place,
         needed.method,

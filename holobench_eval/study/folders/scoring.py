@@ -25,8 +25,8 @@ from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
 from ...report.charts.alignment import alignment_name, draw_alignment
 from ...report.data.text import FILES
-from ..pictures import write_thumbnail
 from ..plan import FLOORS, REFERENCE
+from ..scoring.pictures import write_thumbnail
 from ..store import Record, Store
 from ..versions import ALIGNMENT, HARNESS
 from .files import Folders, Picture, Values
