@@ -114,7 +114,7 @@ def _run(
     from ..study.artifacts import Artifacts
     from ..study.config import load_study
     from ..study.run import run as compute
-    from ..study.training_log import keep_training_records
+    from ..study.training import keep_training_records
 
     console, study = console_for_people(), load_study(config)
     name, workers, address = where

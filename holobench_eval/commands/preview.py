@@ -11,11 +11,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..study import cost
-from ..study.artifacts import FAILURE, UNFINISHED, Artifacts
+from ..study.artifacts import FAILURE, UNFINISHED, Artifacts, known, progress
 from ..study.displays import Preparation
 from ..study.plan import Plan, Task
 from ..study.store import State, Store
-from ..study.training_log import known, progress
 
 if TYPE_CHECKING:
     from ..study.definition import Study
