@@ -27,7 +27,28 @@ from .plan import FLOORS, REFERENCE
 
 
 def load_study(path: Path | str) -> Study:
-    """Read and check a study completely; every fault is a UserError that starts with file:line:column."""
+    """Read a study and check all of it.
+
+    Parameters
+    ----------
+    path
+        A YAML file; relative paths in it start in its folder.
+
+    Returns
+    -------
+    Study
+        With every default filled in. Nothing is computed, opened or written.
+
+    Raises
+    ------
+    UserError
+        One line that starts with ``file:line:column`` of the first fault.
+
+    Examples
+    --------
+    >>> load_study("configs/quick.yaml").labels
+    ('double_phase', 'gerchberg_saxton', 'wirtinger', 'oracle')
+    """
     document = load(Path(path))
     check_keys(document, Study, document.data)
     study = replace(typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text)

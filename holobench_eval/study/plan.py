@@ -138,7 +138,31 @@ class Plan:
 
 
 def plan(study: Study) -> Plan:
-    """The grid of a study. Reads profiles and the digests of target images, and nothing else."""
+    """The grid of a study: every number of its tables, and how it is measured.
+
+    Parameters
+    ----------
+    study
+        A checked study, see ``config.load_study``.
+
+    Returns
+    -------
+    Plan
+        Tasks in the order in which they are run and reported. Profiles and digests of target images are read;
+        nothing is computed.
+
+    Raises
+    ------
+    UserError
+        An image that a method trains on is scored, too.
+
+    Examples
+    --------
+    >>> from holobench_eval.study.config import load_study
+    >>> grid = plan(load_study("configs/quick.yaml"))
+    >>> len(grid.tasks), len(grid.cells)
+    (10, 20)
+    """
     targets = [(item, study.dataset.digest(item)) for item in study.dataset.items()]
     shown = displays(study)
     ground = _Ground(study, _metrics(study))

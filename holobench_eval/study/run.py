@@ -84,11 +84,40 @@ def run(
 ) -> Outcome:
     """Train what is not trained, compute the missing cells of a plan and write their records.
 
-    artifacts: folder of what methods learned; retry_failed: compute failed cells again; retime: measure wall times
-    again (see ``cost``); retrain: train again, and compute again what depends on it; device: name of where every
-    worker computes (see ``device.find``).
-    UserError: the folder is in use by another run, or holds a damaged record. An interrupt passes through;
-    every record written before it stays, and the next run goes on from there.
+    An interrupt passes through; every record written before it stays, and the next run goes on from there.
+
+    Parameters
+    ----------
+    study, plan
+        See ``config.load_study`` and ``plan.plan``.
+    output
+        Folder of the study's records and report.
+    executor
+        Where tasks are computed, see ``executors.executor``.
+    watch
+        Sees the progress.
+    threads
+        Torch threads of a worker.
+    artifacts
+        Folder of what methods learned.
+    retry_failed
+        Compute failed cells again.
+    retime
+        Measure wall times again, see ``cost``.
+    retrain
+        Train again, and compute again what depends on it.
+    device
+        Name of where every worker computes, see ``device.find``.
+
+    Returns
+    -------
+    Outcome
+        A record for every planned cell, and the provenance of the run.
+
+    Raises
+    ------
+    UserError
+        The folder is in use by another run, or holds a damaged record.
     """
     store = Store(output)
     with store.locked():
