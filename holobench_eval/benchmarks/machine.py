@@ -10,8 +10,9 @@ import torch
 from torch.utils.benchmark import Timer
 
 from ..core.installed import installed
-from ..study.provenance import now, revision
-from ..study.timings import cpu_model
+from ..core.io import now
+from ..study.cost import cpu_model
+from ..study.provenance import revision
 from .suite import THREADS
 
 COPIED = 256 * 2**20  # bytes, far more than a cache holds

@@ -11,7 +11,7 @@ import typer
 from ..core.errors import UserError
 
 if TYPE_CHECKING:
-    from ..study.config import Study
+    from ..study.definition import Study
 
 
 def check(folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports")) -> None:
@@ -55,7 +55,7 @@ def _problems(report: Path) -> Iterator[str]:
 def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]:
     """What is different from when the report was made, of which its provenance is ``known``."""
     from ..report import layout_of, recompute_table
-    from ..study.plan import displays
+    from ..study.displays import displays
     from ..study.provenance import text_digest
 
     if text_digest(study.text) != known["config_sha256"]:

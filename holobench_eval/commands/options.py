@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from ..study.config import Study
+    from ..study.definition import Study
 
 Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as configs/table3.yaml.")]
 Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]

@@ -11,7 +11,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from ..report import Results
-    from ..study.config import Study
+    from ..study.definition import Study
 
 
 def console() -> Console:

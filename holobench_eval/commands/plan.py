@@ -16,7 +16,7 @@ from .output import console as open_console
 
 if TYPE_CHECKING:
     from ..study.artifacts import Artifacts
-    from ..study.config import Study
+    from ..study.definition import Study
     from ..study.plan import Plan
     from ..study.store import Store
 
@@ -84,19 +84,19 @@ class TrainingRow:
 
 
 def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, gpu: str = "") -> list[Row]:
-    """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``timings.key``."""
-    from ..study import timings
+    """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``cost.key``."""
+    from ..study import cost
 
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
-    states, timed = store.states(plan.cells, timings.timed(study, plan)), timings.names()
+    states, timed = store.states(plan.cells, cost.timed(study, plan)), cost.names()
     rows = []
     for label in dict.fromkeys(task.label for task in plan.tasks):
         tasks = [task for task in plan.tasks if task.label == label]
         cells = [cell for task in tasks for cell in task.cells]
         count = Counter(states[cell.id] for cell in cells)
         unsolved = [task for task in tasks if any(states[cell.id] == "missing" for cell in task.cells)]
-        keys = [timings.key(task, threads, workers, gpu) for task in tasks if not task.is_floor]
-        seconds = [cost.seconds for key in keys if key in timed and (cost := timings.known(key)) is not None]
+        keys = [cost.key(task, threads, workers, gpu) for task in tasks if not task.is_floor]
+        seconds = [earlier.seconds for key in keys if key in timed and (earlier := cost.known(key)) is not None]
         limit = limits.get(label)
         rows.append(
             Row(
@@ -136,8 +136,7 @@ def table(study: Study, rows: list[Row]) -> Table:
 
 def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
     """A row for every artifact that a plan needs; no artifact is loaded."""
-    from ..study.artifacts import FAILURE, UNFINISHED
-    from ..study.training_log import known, progress
+    from ..study.artifacts import FAILURE, UNFINISHED, known, progress
 
     rows = []
     for identity, preparation in plan.preparations().items():

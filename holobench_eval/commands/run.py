@@ -22,7 +22,7 @@ from .output import write_report
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..study.config import Study
+    from ..study.definition import Study
     from ..study.executors import Executor
 
 INTERRUPTED = 130
@@ -50,7 +50,7 @@ def run(
         from ..study.plan import plan
         from ..study.progress import watching
         from ..study.run import run as compute
-        from ..study.training_log import keep_training_records
+        from ..study.training import keep_training_records
 
         console, study = open_console(), load_study(config)
         device, where = _where(study, device, executor, workers, address)
@@ -93,11 +93,11 @@ def _where(study: Study, device: str, executor: str, workers: int | None, addres
 
 def open_displays(study: Study) -> None:
     """Open and calibrate the displays of a study, so that what is wrong with a real one is reported first."""
-    from ..study.displays import workbench
-    from ..study.plan import displays
+    from ..study.displays import displays
+    from ..study.opening import open_display
 
     for display in displays(study).values():
-        workbench(display, study.seed)
+        open_display(display, study.seed)
 
 
 def draw_sheets(console: Console, study: Study, output: Path, threads: int) -> None:
@@ -107,7 +107,8 @@ def draw_sheets(console: Console, study: Study, output: Path, threads: int) -> N
     from ..core.hashing import digest
     from ..display import load_profile
     from ..report.charts.sheet import drawn_from, save_sheet
-    from ..study.displays import condition, simulated
+    from ..study.displays import condition
+    from ..study.opening import simulated
     from ..study.versions import HARNESS
 
     for source in study.display.profiles:  # learned and real displays have no stages

@@ -1,10 +1,11 @@
-"""Files: written whole or not at all, under names that any folder takes."""
+"""Files: written whole or not at all, under names that any folder takes, dated alike."""
 
 from __future__ import annotations
 
 import os
 import re
 import tempfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,11 @@ from .hashing import digest
 
 TEMPORARY = ".writing-"
 """How the name of a file begins that is not whole yet."""
+
+
+def now() -> str:
+    """The present time, UTC, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def write_atomically(path: Path, content: bytes) -> None:

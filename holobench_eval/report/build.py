@@ -31,7 +31,7 @@ from .sections.findings import blur_keys, findings
 from .sections.training import Trained
 
 if TYPE_CHECKING:
-    from ..study.config import Study
+    from ..study.definition import Study
 
 TEMPLATE = "report.md.j2"
 

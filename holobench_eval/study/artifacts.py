@@ -7,9 +7,10 @@ import fcntl
 import hashlib
 import io
 import json
+import math
 import shutil
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,11 +20,15 @@ from typing import Any
 import torch
 
 from ..core.errors import UserError
+from ..core.hashing import digest
 from ..core.io import TEMPORARY, file_name, write_atomically
-from .preparation import Preparation
+from .displays import Preparation
 
 STATE, PROVENANCE, LOG, FAILURE = "learned.pt", "provenance.json", "training.csv", "failure.log"
 UNFINISHED = "unfinished"
+RECORDS = "training"
+"""Folder beside a report with the log and the provenance of everything that its study had to learn: ``<name>.csv`` and
+``<name>.json``, small enough to be committed. A report does not need the tensors."""
 FORMAT = 1
 
 
@@ -234,3 +239,95 @@ def check_matches(place: Path, provenance: Mapping[str, Any], needed: Preparatio
 def _short(value: Any) -> str:
     text = json.dumps(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+@dataclass(frozen=True)
+class Round:
+    """The state at the end of a round; NaN for what was not logged.
+
+    captures, seconds: taken so far, held-out captures included. predicted, captured: PSNR [dB] of predictions and of
+    captures of held-out images against the images; fidelity: PSNR [dB] of the predictions against the captures.
+    """
+
+    number: int
+    captures: float
+    seconds: float
+    predicted: float
+    captured: float
+    fidelity: float
+
+
+@dataclass(frozen=True)
+class TrainingRecord:
+    """A finished training: its provenance as in the artifact, and its rounds, none if the method logged none."""
+
+    provenance: Mapping[str, Any]
+    rounds: tuple[Round, ...]
+
+    @property
+    def id(self) -> str:
+        """The ``Preparation.id`` that the training is for."""
+        return digest(self.provenance["description"])
+
+
+def known(place: Path) -> dict[str, Any] | None:
+    """An artifact's provenance without its tensors; None where there is none that can be read."""
+    try:
+        content = json.loads((place / PROVENANCE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) and isinstance(content.get("description"), dict) else None
+
+
+def training_records(output: Path) -> dict[str, TrainingRecord]:
+    """The trainings beside a report by the id of what was to be learned; a file that is none is passed over."""
+    found = []
+    for path in sorted((output / RECORDS).glob("*.json")):
+        try:
+            provenance = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError:
+            continue
+        if isinstance(provenance, dict) and isinstance(provenance.get("description"), dict):
+            found.append(TrainingRecord(provenance, rounds_of(path.with_suffix(".csv"))))
+    return {one.id: one for one in found}
+
+
+def rounds_of(log: Path) -> tuple[Round, ...]:
+    """The rounds in a log, which may have other columns or none of these: then there are no rounds."""
+    try:
+        with log.open(encoding="utf-8", newline="") as file:
+            return rounds_in(csv.DictReader(file))
+    except (OSError, ValueError, csv.Error):
+        return ()
+
+
+def rounds_in(rows: Iterable[Mapping[str | Any, Any]]) -> tuple[Round, ...]:
+    """The rounds in the rows of a log: of each round the last figure of every kind."""
+    rounds: dict[int, dict[str, float]] = {}
+    for row in rows:
+        number = _number(row.get("round"))
+        if math.isfinite(number):
+            names = ("captures", "seconds", "predicted_psnr", "captured_psnr", "fidelity_psnr")
+            figures = {name: _number(row.get(name)) for name in names}
+            rounds.setdefault(int(number), {}).update({k: v for k, v in figures.items() if math.isfinite(v)})
+    return tuple(
+        Round(
+            number,
+            *(found.get(name, math.nan) for name in ("captures", "seconds")),
+            *(found.get(f"{name}_psnr", math.nan) for name in ("predicted", "captured", "fidelity")),
+        )
+        for number, found in sorted(rounds.items())
+    )
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
+
+
+def progress(place: Path) -> tuple[float, float]:
+    """Captures and seconds of an unfinished training by the last row of its log; NaN where it has none."""
+    rows = rounds_in(read_log(place))
+    return (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)

@@ -1,5 +1,4 @@
-"""A study as written in ``configs/*.yaml``, checked before anything runs: a grid of methods, displays,
-targets.
+"""Read a study from ``configs/*.yaml`` and check all of it before anything runs.
 
 Every mistake in a config is one line that starts with its place, ``configs/table3.yaml:12:5: ...``.
 """
@@ -7,206 +6,49 @@ Every mistake in a config is one line that starts with its place, ``configs/tabl
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from annotated_types import Interval, MinLen
+from typing import Any
 
 from ..core import plugins
 from ..core.errors import UserError, suggest
 from ..core.plugins import params_of
 from ..core.schema import check_keys, placed, typed
 from ..core.yaml_source import Document, Keys, load
-from .config_metrics import check_metrics
-from .config_sweeps import subset, sweep_of
-from .displays import LEARNED, condition, real_condition
-from .focal_stacks import planes_of
-from .plan import FLOORS, REFERENCE, scored_dataset
-
-PanelSide = Annotated[int, Interval(ge=64, le=8192)]
-Text = Annotated[str, MinLen(1)]
-
-
-@dataclass(frozen=True)
-class Learned:
-    """A display that is the frozen network of a trained method (paper 6.3), trained on captures of ``profile``."""
-
-    method: Text
-    profile: Text
-    params: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class DisplayGrid:
-    """The displays of a study.
-
-    profiles: names of profiles or paths of profile files; in their place learned: a trained network, or bench: the file
-    of a real bench (``lab.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
-    exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures). session:
-    the folder that stands for the display, when photographs are exchanged as files.
-    """
-
-    profiles: tuple[Text, ...] = ()
-    learned: Learned | None = None
-    bench: Text | None = None
-    panel: tuple[PanelSide, PanelSide] | None = None
-    exposure: Literal["equal", "matched"] = "equal"
-    session: Path | None = field(default=None, metadata={"key": False})
-
-    @property
-    def sources(self) -> tuple[str, ...]:
-        """The displays by the names they have in a config."""
-        return (LEARNED,) if self.learned else (self.bench,) if self.bench else self.profiles
-
-    @property
-    def real(self) -> bool:
-        """Whether the display exists."""
-        return self.bench is not None or self.session is not None
-
-
-@dataclass(frozen=True)
-class Targets:
-    """The images that are scored: a registered dataset and its parameters."""
-
-    dataset: Text
-    params: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Training:
-    """The images that methods may train on, never scored; equal for all methods of a study.
-
-    held_out: how many of the last images are kept back to watch the training; captures: the most captures that a
-    method may take for its training, those of held-out images included (None: no limit).
-    """
-
-    dataset: Text = "dead_leaves"
-    params: Mapping[str, Any] = field(default_factory=dict)
-    held_out: Annotated[int, Interval(ge=1, le=1000)] = 4
-    captures: Annotated[int, Interval(ge=1)] | None = None
-
-
-@dataclass(frozen=True)
-class Probe:
-    """The method whose holograms are shown when predictions of captures are scored (paper Table 1)."""
-
-    name: Text = "wirtinger"
-    params: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """A change of the displays at test time, by one value after another; methods were prepared without it.
-
-    condition: its kind, see ``display.simulated.changes``; values: numbers, or names; count: so many siblings or draws
-    in their place; profiles: the displays that are changed, a subset of the study's.
-    """
-
-    condition: Text
-    values: tuple[float | Text, ...] = ()
-    count: Annotated[int, Interval(ge=1, le=10_000)] | None = None
-    profiles: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class MethodEntry:
-    """A method of a study.
-
-    name: registered name or ``path/to/file.py:Class``; label: its name in tables; params: every parameter of
-    the method, defaults filled in; profiles: the displays it is shown on, a subset of the study's; captures: the most
-    that the display allows a method with a camera for one target (None: no limit).
-    """
-
-    name: Text
-    label: str = ""
-    params: Mapping[str, Any] = field(default_factory=dict)
-    profiles: tuple[str, ...] = ()
-    captures: Annotated[int, Interval(ge=1)] | None = None
-
-
-@dataclass(frozen=True)
-class Protocol:
-    """Version of the metric protocol; names of the metrics to compute (None: all; they take 10 s for a capture of
-    1080 x 1920 pixels); a file or folder of LPIPS trunk weights (None: torch's hub cache)."""
-
-    version: Literal["v1"] = "v1"
-    metrics: tuple[Text, ...] | None = None
-    lpips_weights: Text | None = None
-
-
-@dataclass(frozen=True)
-class Save:
-    """What else is written beside the scores: rectified captures (16 bit) and phases (8 bit)."""
-
-    captures: bool = False
-    phases: bool = False
-
-
-@dataclass(frozen=True)
-class Reported:
-    """Published figures to print beside the measured ones, by method label, and where they were published.
-
-    beside: the profile whose rows they stand beside, as ``display.profiles`` names it; none: every profile's.
-    """
-
-    source: Text
-    rows: Mapping[str, Mapping[str, float]]
-    beside: Text | None = None
-
-
-@dataclass(frozen=True)
-class Study:
-    """A grid of cells and the tables drawn from it; see ``load_study``.
-
-    measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
-    captures of ``holograms`` against those captures; ``focus`` scores the planes of focal stacks, each at its own
-    distance. note: a paragraph that the report prints beside its tables.
-    repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
-    whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
-    changes of the displays at test time; baseline: label that paired tests compare against (the first method when the
-    config names none); headline: the column the report leads with.
-    file, text: the config file as the user named it, and what is in it.
-    """
-
-    title: Text
-    display: DisplayGrid
-    targets: Targets
-    methods: Annotated[tuple[MethodEntry, ...], MinLen(1)]
-    measure: Literal["picture", "prediction", "focus"] = "picture"
-    holograms: Probe = Probe()
-    training: Training = Training()
-    sweeps: tuple[Sweep, ...] = ()
-    note: str = ""
-    seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
-    repeats: Annotated[int, Interval(ge=1, le=1000)] = 1
-    timing: Literal["shared", "alone"] = "shared"
-    protocol: Protocol = Protocol()
-    baseline: str = ""
-    headline: Text = "psnr_linear"
-    save: Save = Save()
-    reported: Reported | None = None
-    file: Path = field(default=Path(), metadata={"key": False})
-    text: str = field(default="", metadata={"key": False})
-
-    @property
-    def folder(self) -> Path:
-        """The config's folder; relative paths in a config start here."""
-        return self.file.parent
-
-    @property
-    def name(self) -> str:
-        """The config's file name without its ending; the default name of the output folder."""
-        return self.file.stem
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Labels of the methods, in the order of the config."""
-        return tuple(entry.label for entry in self.methods)
+from ..display.simulated.changes import KINDS, altered, checked
+from ..display.simulated.profile import load_profile
+from ..imaging.grid import SMALLEST_REGION
+from ..metrics import Metric, catalogue
+from ..metrics.lpips import find_weights
+from .definition import DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
+from .displays import condition, displays, real_condition
+from .focal_stacks import SCORES, planes_of
+from .plan import FLOORS, REFERENCE
 
 
 def load_study(path: Path | str) -> Study:
-    """Read and check a study completely; every fault is a UserError that starts with file:line:column."""
+    """Read a study and check all of it.
+
+    Parameters
+    ----------
+    path
+        A YAML file; relative paths in it start in its folder.
+
+    Returns
+    -------
+    Study
+        With every default filled in. Nothing is computed, opened or written.
+
+    Raises
+    ------
+    UserError
+        One line that starts with ``file:line:column`` of the first fault.
+
+    Examples
+    --------
+    >>> load_study("configs/quick.yaml").labels
+    ('double_phase', 'gerchberg_saxton', 'wirtinger', 'oracle')
+    """
     document = load(Path(path))
     check_keys(document, Study, document.data)
     study = replace(typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text)
@@ -240,7 +82,7 @@ def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _targets(study: Study, document: Document) -> Targets:
     with placed(document, ("targets", "dataset"), ("targets", "params")):
-        dataset = scored_dataset(study)
+        dataset = study.dataset
         if not dataset.items():
             raise UserError(f"dataset '{study.targets.dataset}' has no images")
         if study.measure == "focus":
@@ -297,8 +139,6 @@ def _bench(study: Study, document: Document) -> DisplayGrid:
 
 
 def _protocol(study: Study, document: Document) -> Protocol:
-    from ..metrics.lpips import find_weights
-
     given = study.protocol.lpips_weights
     if given is None:
         return study.protocol
@@ -311,8 +151,6 @@ def _protocol(study: Study, document: Document) -> Protocol:
 
 
 def _check_profiles(study: Study, document: Document) -> None:
-    from ..imaging.grid import SMALLEST_REGION
-
     seen: dict[str, str] = {}
     learned = study.display.learned
     bench = study.display.bench
@@ -376,3 +214,73 @@ def _check_twins(study: Study, document: Document) -> None:
             if same and set(entry.profiles) & set(other.profiles):
                 message = f"methods[{index}] has the method, parameters and display of '{other.label}'; remove one"
                 raise document.error(("methods", index), message)
+
+
+def sweep_of(study: Study, document: Document, index: int) -> Sweep:
+    """A sweep of a config, its values and displays checked. UserError with the place of what is wrong."""
+    sweep, where = study.sweeps[index], ("sweeps", index)
+    if study.display.learned or study.display.real or study.measure != "picture":
+        raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
+    if sweep.condition not in KINDS:
+        near = suggest(sweep.condition, KINDS)
+        raise document.error((*where, "condition"), f"unknown condition '{sweep.condition}'; {near}")
+    if sweep.condition == "laser_power" and study.display.exposure == "matched":
+        raise document.error(where, "exposure: matched undoes laser_power; leave one of the two out")
+    countable = KINDS[sweep.condition].counted
+    if bool(sweep.values) == (sweep.count is not None) or (sweep.count is not None and not countable):
+        raise document.error(where, "a sweep has values; one of siblings or draws may have a count in their place")
+    given = sweep.values or tuple(str(number) for number in range(1, (sweep.count or 0) + 1))
+    profiles = subset(study, document, sweep.profiles, (*where, "profiles"))
+    same = [other for other in study.sweeps[:index] if other.condition == sweep.condition]
+    values = [value for other in same if set(other.profiles) & set(profiles) for value in other.values]
+    known = len(values)
+    loaded = [load_profile(profile, folder=study.folder) for profile in profiles]
+    for number, value in enumerate(given):
+        place: Keys = (*where, "values", number) if sweep.values else (*where, "count")
+        with placed(document, place, place):
+            values.append(checked(sweep.condition, value))
+            for profile in loaded:
+                altered(profile, sweep.condition, values[-1])
+        if values[-1] in values[:-1]:
+            raise document.error(place, f"{sweep.condition} {value} is listed twice")
+    return replace(sweep, values=tuple(values[known:]), count=None, profiles=profiles)
+
+
+def subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:
+    """The named displays of the study, in its order; all for none."""
+    for number, profile in enumerate(named):
+        if profile not in study.display.sources:
+            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
+            raise document.error((*where, number), message)
+    return tuple(p for p in study.display.sources if p in named or not named)
+
+
+def check_metrics(study: Study, document: Document) -> None:
+    """Refuse unknown metrics, a headline that is of none of them, and one that needs a larger window.
+
+    Weights that are missing here are no fault of the study: see ``study.available``.
+    """
+    wanted, known = study.protocol.metrics, {metric.name: metric for metric in catalogue()}
+    for index, name in enumerate(wanted or ()):
+        if name not in (*known, "speckle_contrast"):
+            message = f"unknown metric '{name}'; {suggest(name, [*known, 'speckle_contrast'])}"
+            raise document.error(("protocol", "metrics", index), message)
+    if study.measure == "focus" and study.headline in SCORES:
+        return
+    columns = {column: metric for metric in known.values() for column in metric.columns}
+    if study.headline not in columns:
+        choice = [*columns, *(SCORES if study.measure == "focus" else ())]
+        raise document.error(("headline",), f"unknown metric '{study.headline}'; {suggest(study.headline, choice)}")
+    metric = columns[study.headline]
+    if wanted is not None and metric.name not in wanted:
+        message = f"the headline is '{study.headline}'; add {metric.name} to the metrics, or set another 'headline'"
+        raise document.error(("protocol", "metrics"), message)
+    _check_window(metric, study, document)
+
+
+def _check_window(metric: Metric, study: Study, document: Document) -> None:
+    for place in displays(study).values() if metric.smallest > SMALLEST_REGION else ():
+        height, width = place.spec.region.shape
+        if min(height, width) < metric.smallest:
+            message = f"'{place.name}' scores {height} x {width} pixels; {metric.name} needs {metric.smallest} a side"
+            raise document.error(("headline",), message)

@@ -1,37 +1,30 @@
-"""The calls a study makes on displays, all in one place."""
+"""The displays of a study, as its config names them; nothing is opened here."""
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-import torch
-
-from ..core.device import CPU
-from ..core.errors import CellError, UserError
-
-if TYPE_CHECKING:
-    from ..display import CalibratedBench
-    from ..display.api import DisplaySpec
-    from ..display.simulated.changes import Value
-    from ..lab.real import RealBench
-    from .preparation import Preparation
+from ..core import plugins
+from ..core.hashing import digest
+from ..display import DisplaySpec, load_profile
+from ..display.simulated.changes import KINDS, Value, altered
+from ..lab.bench_file import load_bench_file
+from ..lab.session import read_manifest
+from .definition import LEARNED, Study
 
 Panel = tuple[int, int]
-LEARNED = "learned"
-"""How a config names the display that is a trained network."""
-OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
-"""Pixels of all benches that a process keeps open, and their number, at most; but two are."""
 
 
 @dataclass(frozen=True)
-class Rig:
-    """A real bench.
+class RealSource:
+    """Where the photographs of a display that exists come from.
 
-    bench: the file that describes it (None: it is described by a profile's panel); folder, session: the folder that
-    photographs are exchanged in, and its name (none: the devices of the bench file take them).
+    bench: the file that describes it (None: a profile's panel does); folder, session: the folder that photographs are
+    exchanged in, and its name (none: the devices of the bench file take them).
     """
 
     bench: Path | None = None
@@ -58,7 +51,7 @@ class Condition:
     spec: DisplaySpec
     learned: Preparation | None = None
     change: tuple[str, Value] | None = None
-    real: Rig | None = None
+    real: RealSource | None = None
 
     @property
     def nominal(self) -> Condition:
@@ -67,93 +60,145 @@ class Condition:
 
     @property
     def title(self) -> str:
-        """Its name in tables, with the change."""
-        return self.name if self.change is None else f"{self.name}, {change_text(*self.change)}"
+        """Its name in tables, with the change: ``leto-aged, drift 30 days``."""
+        if self.change is None:
+            return self.name
+        kind, value = self.change
+        amount = f"{value:.10g}" if isinstance(value, float) else value
+        return f"{self.name}, " + " ".join(part for part in (kind.replace("_", " "), amount, KINDS[kind].unit) if part)
 
 
-def change_text(kind: str, value: Value) -> str:
-    """A change in words: ``drift 30 days``."""
-    from ..display.simulated.changes import KINDS
+@dataclass(frozen=True)
+class Preparation:
+    """What a method has to learn before it can solve: the name of its artifact follows from it.
 
-    shown = f"{value:.10g}" if isinstance(value, float) else value
-    return " ".join(part for part in (kind.replace("_", " "), shown, KINDS[kind].unit) if part)
+    method, params: as in a cell; version: the method's own ``version``, raised when its training changes; folder: the
+    config's folder; place: the display it is trained on; dataset, dataset_params: source of the images; images: name
+    and digest of each; held_out: how many of the last only watch the training; captures: the most it may take; seed:
+    the study's.
+    """
+
+    method: str
+    version: int
+    params: Mapping[str, Any]
+    folder: Path
+    place: Condition
+    dataset: str
+    dataset_params: Mapping[str, Any]
+    images: tuple[tuple[str, str], ...]
+    held_out: int
+    captures: int | None
+    seed: int
+
+    def description(self) -> dict[str, Any]:
+        """Everything that the learned state depends on, as plain JSON values. The version of the harness is not part of
+        it: a faster bench need not cost a day of training; ``provenance.json`` says with which one it was made."""
+        spec = self.place.spec
+        return {
+            "method": self.method,
+            "version": self.version,
+            "params": dict(self.params),
+            "profile": self.place.name,
+            "profile_version": self.place.version,
+            "panel": list(spec.shape),
+            "wavelengths": list(spec.wavelengths),
+            "pitch": spec.pitch,
+            "distance": spec.distance,
+            "profile_sha256": self.place.digest,
+            "training": self.dataset,
+            "training_params": dict(self.dataset_params),
+            "training_sha256": digest([list(image) for image in self.images]),
+            "held_out": self.held_out,
+            "captures": self.captures,
+            "seed": self.seed,
+            **({"session": self.place.real.session} if self.place.real else {}),
+        }
+
+    @cached_property
+    def id(self) -> str:
+        """sha256 of the description."""
+        return digest(self.description())
+
+    @property
+    def name(self) -> str:
+        """The folder of its artifact: readable, and different for every description."""
+        rows, columns = self.place.spec.shape
+        method = self.method.rpartition(":")[2]
+        return f"{method}-{self.place.name}-{rows}x{columns}-{self.id[:10]}"
+
+
+def preparation(study: Study, method: str, params: Mapping[str, Any], place: Condition) -> Preparation | None:
+    """What ``method`` has to learn to be shown on ``place``; None for a method that learns nothing.
+
+    On a learned display a method is trained on the display that this one was learned from.
+    """
+    cls = plugins.find("methods", method, study.folder)
+    if not getattr(cls, "trains", False):
+        return None
+    training = study.training
+    return Preparation(
+        method=method,
+        version=int(getattr(cls, "version", 1)),
+        params=params,
+        folder=study.folder,
+        place=place.learned.place if place.learned else place,
+        dataset=training.dataset,
+        dataset_params=training.params,
+        images=study.training_images,
+        held_out=training.held_out,
+        captures=training.captures,
+        seed=study.seed,
+    )
+
+
+def displays(study: Study) -> dict[str, Condition]:
+    """The displays of a study by the names they have in its config."""
+    grid, learned = study.display, study.display.learned
+    if grid.bench is not None:
+        return {grid.bench: _real(study, real_condition(grid.bench, study.folder))}
+    if learned is None:
+        shown = {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
+        return {source: _real(study, place) for source, place in shown.items()}
+    place = condition(learned.profile, grid.panel, study.folder)
+    name = f"{learned.method.rpartition(':')[2]} trained on {place.name}"
+    return {LEARNED: replace(place, name=name, learned=preparation(study, learned.method, learned.params, place))}
 
 
 def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
     """Read a profile without building its bench. UserError: unknown profile, or a panel it cannot have."""
-    from ..display import load_profile
-
     profile = load_profile(source, folder=folder)
     return Condition(source, folder, profile.name, profile.version, profile.digest, profile.spec(panel))
 
 
 def real_condition(source: str, folder: Path) -> Condition:
     """Read the file of a real bench without opening its devices. UserError for a file that is none."""
-    from ..lab.bench_file import load_bench_file
-
     path = folder / source
     bench = load_bench_file(path)
     spec = bench.panel.spec(bench.name)
-    return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=Rig(bench=path))
+    return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=RealSource(bench=path))
 
 
-def workbench(shown: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench | RealBench:
-    """The bench of a condition, built and calibrated once in a process; a simulated one is computed on ``device``.
-
-    CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
-    """
-    place = None if shown.real else device  # a real one is opened once, whoever computes
-    key = (shown.source, shown.folder, shown.digest, shown.spec.shape, shown.change, shown.real, seed, place)
-    if key not in _open:
-        _open[key] = _opened(shown, seed, device)
-        pixels = shown.spec.shape[0] * shown.spec.shape[1]
-        while len(_open) > max(2, min(OPEN_BENCHES, OPEN_PIXELS // pixels)):
-            _open.popitem(last=False)
-    _open.move_to_end(key)
-    opened = _open[key]
-    if isinstance(opened, CellError):
-        raise CellError(str(opened)) from opened
-    return opened
+def _real(study: Study, place: Condition) -> Condition:
+    """The display with a session folder in its place, if the study has one."""
+    folder = study.display.session
+    if folder is None:
+        return place
+    session = read_manifest(folder).session
+    return replace(place, real=replace(place.real or RealSource(), folder=folder, session=session))
 
 
-_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()
-"""Those used least recently come first."""
-
-
-def simulated(shown: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
-    """``workbench`` of a display that does not exist."""
-    from ..display import CalibratedBench
-
-    opened = workbench(shown, seed, device)
-    assert isinstance(opened, CalibratedBench)
-    return opened
-
-
-def forget_sessions() -> None:
-    """Open the benches behind session folders anew when they are next asked for: their files may have changed."""
-    for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
-        del _open[key]
-
-
-def _opened(shown: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
-    if shown.real is not None:
-        from ..lab.opening import open_real
-
-        return open_real(shown, shown.real, seed)
-    from ..display import load_profile, open_bench
-    from ..display.simulated.changes import KINDS, altered
-
-    profile = load_profile(shown.source, folder=shown.folder)
-    if profile.digest != shown.digest:
-        raise UserError(f"profile '{shown.source}' has changed since the study was planned; start the run again")
-    unmoved = None
-    try:
-        if shown.change is not None:
-            if not KINDS[shown.change[0]].moves:
-                unmoved = simulated(shown.nominal, seed, device)
-            profile = altered(profile, *shown.change)
-        opened = open_bench(profile, shown.spec.shape, seed, unmoved, device)
-        _ = opened.registration  # calibrated now, so that no method's time includes it
-    except CellError as error:
-        return error
-    return opened
+def changed(study: Study, source: str, place: Condition) -> list[Condition]:
+    """A display as methods were prepared for it, and after every change that the study's sweeps make to it."""
+    changes = [
+        (sweep.condition, value)
+        for sweep in study.sweeps
+        if source in sweep.profiles
+        for value in sweep.values
+        if value != KINDS[sweep.condition].nominal
+    ]
+    if not changes:
+        return [place]
+    profile = load_profile(place.source, folder=place.folder)
+    eyes = [altered(profile, *change).spec().eye for change in changes]
+    pairs = zip(changes, eyes, strict=True)
+    return [place, *(replace(place, change=change, spec=replace(place.spec, eye=eye)) for change, eye in pairs)]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..core.errors import UserError
+from ..display import load_profile
 from .displays import Condition
 
 SCORES = ("psnr_linear_infocus", "ssim_linear_infocus")
@@ -61,7 +62,5 @@ def _at(place: Condition, kind: str, millimetres: float) -> Condition:
 
 def offset(place: Condition, change: Mapping[str, Any]) -> float:
     """How far a cell's plane lies from that of its display [m], on the display's own panel."""
-    from ..display import load_profile
-
     full = load_profile(place.source, folder=place.folder).panel.distance
     return float(sum(change.values())) * 1e-3 * place.spec.distance / full

@@ -6,19 +6,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from ..core import plugins
 from ..core.errors import UserError
 from ..core.hashing import digest
-from .displays import LEARNED, Condition, Rig, condition, real_condition
+from ..metrics import catalogue
+from .definition import MethodEntry, Study
+from .displays import Condition, Preparation, changed, displays, preparation
 from .focal_stacks import VERSION as IN_FOCUS
 from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
-from .preparation import Preparation, check_unseen, preparation
 from .versions import HARNESS, method_version
-
-if TYPE_CHECKING:
-    from .config import MethodEntry, Study
 
 REFERENCE = "reference"
 """The condition of the floor cells."""
@@ -139,29 +137,33 @@ class Plan:
         return {one.id: one for one in needed if one is not None}
 
 
-def scored_dataset(study: Study) -> Any:
-    """The dataset whose images are scored. UserError for one that methods may train on."""
-    targets = study.targets
-    dataset = plugins.build("datasets", targets.dataset, dict(targets.params), study.folder)
-    try:
-        dataset.items()
-    except UserError:
-        raise
-    except Exception as error:  # a stranger's dataset
-        raise UserError(
-            f"dataset '{targets.dataset}' cannot list its items: {type(error).__name__}: {error}"
-        ) from error
-    if getattr(dataset, "training", False):
-        raise UserError(
-            f"dataset '{targets.dataset}' holds training images, which are never scored; choose another one"
-        )
-    return dataset
-
-
 def plan(study: Study) -> Plan:
-    """The grid of a study. Reads profiles and the digests of target images, and nothing else."""
-    dataset = scored_dataset(study)
-    targets = [(item, dataset.digest(item)) for item in dataset.items()]
+    """The grid of a study: every number of its tables, and how it is measured.
+
+    Parameters
+    ----------
+    study
+        A checked study, see ``config.load_study``.
+
+    Returns
+    -------
+    Plan
+        Tasks in the order in which they are run and reported. Profiles and digests of target images are read;
+        nothing is computed.
+
+    Raises
+    ------
+    UserError
+        An image that a method trains on is scored, too.
+
+    Examples
+    --------
+    >>> from holobench_eval.study.config import load_study
+    >>> grid = plan(load_study("configs/quick.yaml"))
+    >>> len(grid.tasks), len(grid.cells)
+    (10, 20)
+    """
+    targets = [(item, study.dataset.digest(item)) for item in study.dataset.items()]
     shown = displays(study)
     ground = _Ground(study, _metrics(study))
     first = next(iter(shown.values()))
@@ -175,48 +177,6 @@ def plan(study: Study) -> Plan:
     return made
 
 
-def displays(study: Study) -> dict[str, Condition]:
-    """The displays of a study by the names they have in its config."""
-    grid, learned = study.display, study.display.learned
-    if grid.bench is not None:
-        return {grid.bench: _real(study, real_condition(grid.bench, study.folder))}
-    if learned is None:
-        shown = {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
-        return {source: _real(study, place) for source, place in shown.items()}
-    place = condition(learned.profile, grid.panel, study.folder)
-    needed = preparation(study, learned.method, learned.params, place)
-    name = f"{learned.method.rpartition(':')[2]} trained on {place.name}"
-    return {LEARNED: replace(place, name=name, learned=needed)}
-
-
-def _real(study: Study, place: Condition) -> Condition:
-    """The display with a session folder in its place, if the study has one."""
-    folder = study.display.session
-    if folder is None:
-        return place
-    from ..lab.session import read_manifest
-
-    return replace(place, real=replace(place.real or Rig(), folder=folder, session=read_manifest(folder).session))
-
-
-def changed(study: Study, source: str, place: Condition) -> list[Condition]:
-    """A display as methods were prepared for it, and after every change that the study's sweeps make to it."""
-    from ..display import load_profile
-    from ..display.simulated.changes import KINDS, altered
-
-    changes = [
-        (sweep.condition, value)
-        for sweep in study.sweeps
-        if source in sweep.profiles
-        for value in sweep.values
-        if value != KINDS[sweep.condition].nominal
-    ]
-    profile = load_profile(place.source, folder=place.folder) if changes else None
-    eyes = [altered(profile, *change).spec().eye for change in changes] if profile else []
-    pairs = zip(changes, eyes, strict=True)
-    return [place, *(replace(place, change=one, spec=replace(place.spec, eye=eye)) for one, eye in pairs)]
-
-
 @dataclass(frozen=True)
 class _Ground:
     """What all cells of a study have in common."""
@@ -227,7 +187,7 @@ class _Ground:
     @cached_property
     def planes(self) -> dict[str, tuple[str, float]]:
         """Scene and plane [mm] of every target of focal stacks."""
-        return planes_of(scored_dataset(self.study), self.study.targets.dataset)
+        return planes_of(self.study.dataset, self.study.targets.dataset)
 
     @cached_property
     def probe_sha256(self) -> str:
@@ -325,8 +285,6 @@ def _ids(*needed: Preparation | None) -> tuple[str, ...]:
 def _metrics(study: Study) -> tuple[str, ...]:
     """Name and version of the metrics that the study names, wherever it is planned; else of all that can be computed
     here, and the headline's: LPIPS needs weights that may come later."""
-    from ..metrics import catalogue
-
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics
     known = catalogue(None if weights is None else Path(weights))
     if wanted is None:
@@ -350,3 +308,12 @@ def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ..
     for place in shown:
         groups.setdefault((place.name, place.spec) if trains else replace(place.spec, name=""), []).append(place)
     return [tuple(group) for group in groups.values()]
+
+
+def check_unseen(needed: Mapping[str, Preparation], targets: list[tuple[str, str]]) -> None:
+    """Refuse a study that scores an image it trains on. targets: name and digest of each. UserError names the image."""
+    scored = {sha256: name for name, sha256 in targets}
+    for one in needed.values():
+        for item, sha256 in one.images:
+            if sha256 in scored:
+                raise UserError(f"training image '{item}' is the scored target '{scored[sha256]}'; train on others")

@@ -9,27 +9,19 @@ import platform
 import shlex
 import subprocess
 import sys
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .. import __version__
 from ..core.errors import UserError
 from ..core.installed import installed
-from ..core.io import write_atomically
+from ..core.io import now, write_atomically
+from .cost import cpu_model
+from .definition import Study
 from .plan import Plan
-from .timings import cpu_model
-
-if TYPE_CHECKING:
-    from .config import Study
 
 PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "scikit-image", "kornia", "torchmetrics")
 FILE = "provenance.json"
-
-
-def now() -> str:
-    """The present time, UTC, to the second."""
-    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def text_digest(text: str) -> str:

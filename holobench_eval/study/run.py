@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
+from ..core import plugins
 from ..core.device import find, gpu_name
 from ..core.errors import UserError
-from . import provenance, timings
+from ..core.hashing import canonical
+from ..metrics import catalogue
+from . import cost, provenance
 from .artifacts import Artifacts
-from .available import refuse_unavailable, refuse_unscored
-from .clusters import Address, Local
-from .executors import Executor, Serial
-from .job import Job, Setting
-from .plan import Plan, Task
-from .preparation import Preparation
-from .queue import Made, Step, queue, step
+from .definition import Study
+from .displays import Preparation
+from .executors import Address, Executor, Local, Serial
+from .plan import Cell, Plan, Task
+from .scoring.cell import work
+from .scoring.job import Job, Setting
 from .store import Record, Store
-from .training import TrainingJob
-
-if TYPE_CHECKING:
-    from .config import Study
-
+from .training import TrainingJob, train
 
 LATE = 10.0
 """Seconds after which a record on a shared disk should be seen by all."""
+Step = TrainingJob | Job
+Made = str | list[Record]
+"""Of a training why it failed, empty if it did not; of a task its records."""
 
 
 class Watch(Protocol):
@@ -83,11 +84,40 @@ def run(
 ) -> Outcome:
     """Train what is not trained, compute the missing cells of a plan and write their records.
 
-    artifacts: folder of what methods learned; retry_failed: compute failed cells again; retime: measure wall times
-    again (see ``timings``); retrain: train again, and compute again what depends on it; device: name of where every
-    worker computes (see ``device.find``).
-    UserError: the folder is in use by another run, or holds a damaged record. An interrupt passes through;
-    every record written before it stays, and the next run goes on from there.
+    An interrupt passes through; every record written before it stays, and the next run goes on from there.
+
+    Parameters
+    ----------
+    study, plan
+        See ``config.load_study`` and ``plan.plan``.
+    output
+        Folder of the study's records and report.
+    executor
+        Where tasks are computed, see ``executors.executor``.
+    watch
+        Sees the progress.
+    threads
+        Torch threads of a worker.
+    artifacts
+        Folder of what methods learned.
+    retry_failed
+        Compute failed cells again.
+    retime
+        Measure wall times again, see ``cost``.
+    retrain
+        Train again, and compute again what depends on it.
+    device
+        Name of where every worker computes, see ``device.find``.
+
+    Returns
+    -------
+    Outcome
+        A record for every planned cell, and the provenance of the run.
+
+    Raises
+    ------
+    UserError
+        The folder is in use by another run, or holds a damaged record.
     """
     store = Store(output)
     with store.locked():
@@ -95,7 +125,7 @@ def run(
             refuse_unscored(study)
             refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
             forget(plan, store, Artifacts(artifacts))
-        timed = timings.timed(study, plan)
+        timed = cost.timed(study, plan)
         missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed, timed))
         if missing:
             refuse_unscored(study)
@@ -221,3 +251,81 @@ def _lost(job: Job, error: Exception, store: Store) -> list[Record]:
     for record in records:
         store.write(record)
     return records
+
+
+def step(one: Step) -> Made:
+    """Carry out a training (see ``train``) or the cells of a task (see ``work``). This is what a worker runs."""
+    return train(one) if isinstance(one, TrainingJob) else work(one)
+
+
+def queue(
+    trainings: Iterable[TrainingJob], jobs: Iterable[Job], unlearned: set[str], at_work: Collection[Step]
+) -> Iterator[Step | None]:
+    """Trainings first, since they take longest; then jobs, those that need nothing of ``unlearned`` before the others;
+    at the end, one by one, the jobs that are to be alone.
+
+    unlearned: ids of the preparations that are not there yet; at_work: the steps that were taken; whoever takes the
+    results removes both as they come. None: all that is left waits for a step that is still at work.
+    """
+    yield from trainings
+    every = list(jobs)
+    waiting = [job for job in every if not job.alone]
+    while waiting:
+        ready = [job for job in waiting if unlearned.isdisjoint(_needs(job))]
+        waiting = [job for job in waiting if not unlearned.isdisjoint(_needs(job))]
+        yield from ready
+        if not ready:
+            yield None
+    for job in every:
+        if job.alone:
+            while at_work:
+                yield None
+            yield job
+
+
+def _needs(job: Job) -> set[str]:
+    return {identity for cell, _ in job.cells for identity in cell.prepared}
+
+
+def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> None:
+    """UserError, in one line, if a method of a missing cell says by ``available()`` that it cannot run here.
+
+    Only what is to be computed is asked for: a report of what was computed elsewhere needs no method of its study.
+    """
+    seen: set[str] = set()
+    for task in plan.tasks:
+        if task.is_floor or not missing.intersection(one.id for one in task.cells):
+            continue
+        for name, params in _used(task.cells[0]):
+            made = canonical([name, params])
+            if made not in seen:
+                seen.add(made)
+                reason = _reason(name, params, folder)
+                if reason is not None:
+                    raise UserError(f"method '{name}' cannot run here: {reason}")
+
+
+def refuse_unscored(study: Study) -> None:
+    """UserError, in one line, if a metric that the study names, or that its headline is of, cannot be computed here."""
+    weights, wanted = study.protocol.lpips_weights, study.protocol.metrics or ()
+    for metric in catalogue(None if weights is None else Path(weights)):
+        if (metric.name in wanted or study.headline in metric.columns) and (reason := metric.available()):
+            raise UserError(f"metric '{metric.name}' cannot be computed here: {reason}")
+
+
+def _used(cell: Cell) -> list[tuple[str, dict[str, Any]]]:
+    """Names and parameters of a cell's method and of the one whose holograms it predicts."""
+    used = [(cell.method, dict(cell.params))]
+    return [*used, (cell.holograms["name"], dict(cell.holograms["params"]))] if cell.holograms else used
+
+
+def _reason(name: str, params: dict[str, Any], folder: Path) -> str | None:
+    method: Any = plugins.build("methods", name, params, folder)
+    ask = getattr(method, "available", None)
+    if not callable(ask):
+        return None
+    try:
+        reason: str | None = ask()
+    except Exception as error:  # a stranger's code
+        return " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    return reason

@@ -6,26 +6,25 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ..core import plugins
 from ..core.errors import Pending, UserError, suggest
 from ..core.hashing import digest
 from ..core.io import write_atomically
 from ..core.yaml_source import load
 from ..imaging.convention import Convention
 from ..lab.bench_file import load_bench_file
-from ..lab.opening import session_photographer
+from ..lab.real import RealBench
 from ..lab.session import Manifest, Pattern, read_manifest, write_manifest
 from ..lab.session.geometry import look
 from ..lab.session.manifest import refuse_links_out
-from .displays import condition, forget_sessions, real_condition, workbench
+from .config import load_study
+from .definition import Study
+from .displays import condition, displays, real_condition
 from .executors import Serial
-from .plan import displays, plan
+from .opening import forget_sessions, open_display, session_photographer
+from .plan import plan
 from .run import Outcome, Watch, run
-
-if TYPE_CHECKING:
-    from ..lab.real import RealBench
-    from .config import Study
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
@@ -63,8 +62,6 @@ def export(
     """
     if folder.exists() and any(folder.iterdir()):
         raise UserError(f"{folder}: not empty; give a new folder, or go on there with holoeval session import {folder}")
-    from .config import load_study
-
     study = load_study(config)
     chosen = _on_one_display(study, bench, display)
     if fixed_exposure and chosen.display.exposure == "matched":
@@ -143,8 +140,6 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
     A session folder comes from somewhere else, so its copy of the config is used only where it names nothing but what
     is installed: code in files, datasets in folders and weights need the user's own config.
     """
-    from .config import load_study
-
     path = folder / STUDY if config is None else config
     if not path.is_file() or (config is None and path.is_symlink()):
         raise UserError(f"{path}: no such file; give --study with the config that was exported")
@@ -207,14 +202,12 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
         grid = study.display
     else:
         grid = replace(study.display, profiles=(_profile(study, display),))
-    from ..core.plugins import find
-
     source = grid.sources[0]
     methods = tuple(
         replace(entry, profiles=(source,))
         for entry in study.methods
         if (bench is not None or source in entry.profiles)
-        and not getattr(find("methods", entry.name, study.folder), "privileged", False)
+        and not getattr(plugins.find("methods", entry.name, study.folder), "privileged", False)
     )
     if not methods:
         raise UserError(f"{study.file}: no method of it can be shown on a real display")
@@ -240,9 +233,7 @@ def _profile(study: Study, display: str | None) -> str:
 
 
 def _bench(study: Study) -> RealBench:
-    from ..lab.real import RealBench
-
-    bench = workbench(next(iter(displays(study).values())), study.seed)
+    bench = open_display(next(iter(displays(study).values())), study.seed)
     assert isinstance(bench, RealBench)
     return bench
 

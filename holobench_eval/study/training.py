@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,19 +13,19 @@ import torch
 
 from .. import __version__
 from ..core import plugins
-from ..core.device import CPU, find, gpu_name, moved
+from ..core.device import CPU, find, gpu_name, moved, repeatable
 from ..core.errors import CellError, LostDeviceError, Pending
+from ..core.io import now, write_atomically
 from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
 from ..display.simulated.effects import effects
 from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
 from ..lab.real import RealBench
-from .artifacts import Artifacts
-from .displays import workbench
-from .job import repeatable
-from .preparation import Preparation
-from .provenance import now
+from . import opening
+from .artifacts import LOG, RECORDS, Artifacts, known
+from .displays import Preparation
+from .plan import Plan
 from .versions import HARNESS, method_version
 
 WAITS = "waits for photographs"
@@ -62,7 +64,7 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torc
     method = plugins.build("methods", needed.method, dict(needed.params), needed.folder)
     images = _images(needed, device)
     split = len(images) - needed.held_out
-    place = workbench(needed.place, needed.seed, device)
+    place = opening.open_display(needed.place, needed.seed, device)
     bench = TrainingBench(
         place,
         needed.method,
@@ -120,3 +122,38 @@ def _images(needed: Preparation, device: torch.device) -> list[TrainingImage]:
         target = dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))
         images.append(TrainingImage(item, target.to(device)))
     return images
+
+
+def keep_training_records(plan: Plan, artifacts: Artifacts, output: Path) -> None:
+    """Copy logs and provenance of what a plan had to learn into ``output/training``.
+
+    What is there stays when its artifact is not at hand any more; what the plan does not need goes.
+    """
+    needed, names = plan.preparations(), _names(plan)
+    folder = output / RECORDS
+    for old in (*folder.glob("*.json"), *folder.glob("*.csv")):
+        if old.stem not in names.values():
+            old.unlink()
+    for identity, name in names.items():
+        place = artifacts.place(needed[identity])
+        provenance = known(place)
+        if provenance is not None:
+            log = place / LOG
+            write_atomically(folder / f"{name}.csv", log.read_bytes() if log.is_file() else b"")
+            write_atomically(folder / f"{name}.json", f"{json.dumps(provenance, indent=1)}\n".encode())
+
+
+def _names(plan: Plan) -> dict[str, str]:
+    """File names by preparation: the first label that needs it, and the display it is trained on."""
+    titles = {
+        task.preparation.id: f"{task.label} {task.preparation.place.name}"
+        for task in reversed(plan.tasks)
+        if task.preparation
+    }
+    names: dict[str, str] = {}
+    for identity, needed in plan.preparations().items():
+        title = titles.get(identity, f"display {needed.method} {needed.place.name}")
+        stem = re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-.")
+        taken = {name.lower() for name in names.values()}  # some file systems do not tell A from a
+        names[identity] = f"{stem}-{identity[:8]}" if stem.lower() in taken or not stem else stem
+    return names

@@ -11,7 +11,7 @@ from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.drivers import catalogue as drivers
-from holobench_eval.study.displays import forget_sessions
+from holobench_eval.study.opening import forget_sessions
 from tests.support import simulated_devices as simulated
 
 BENCH = """\

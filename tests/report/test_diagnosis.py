@@ -10,7 +10,7 @@ from markupsafe import Markup
 from holobench_eval.display.estimates import estimate, joined
 from holobench_eval.report.sections.diagnosis import diagnoses, difference, missing
 from holobench_eval.report.sections.training import Trained
-from holobench_eval.study.training_log import TrainingRecord
+from holobench_eval.study.artifacts import TrainingRecord
 
 FOUND = [
     *(estimate("lut_exponent", colour, value) for colour, value in enumerate((1.27, 1.24, 1.21))),

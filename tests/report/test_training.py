@@ -11,7 +11,7 @@ from holobench_eval.report import csv_text, recompute_table, records_frame, tabl
 from holobench_eval.report.charts.training import CURVES, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.sections.description import Description
-from holobench_eval.study.training_log import Round, rounds_in, rounds_of
+from holobench_eval.study.artifacts import Round, rounds_in, rounds_of
 from tests.support import synthetic_study as made
 
 TARGETS = made.TARGETS[1:4]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study import timings
+from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
@@ -137,8 +137,7 @@ def test_a_budget_makes_another_cell_and_no_budget_leaves_its_name_as_it_was(tmp
 def test_a_time_is_kept_for_each_budget(tmp_path: Path) -> None:
     task = plan(load_study(study_of(tmp_path, "Modest"))).tasks[-1]
     keys = {
-        timings.key(replace(task, cells=(replace(task.cells[0], captures=captures),)), 1, 1)
-        for captures in (None, 2, 3)
+        cost.key(replace(task, cells=(replace(task.cells[0], captures=captures),)), 1, 1) for captures in (None, 2, 3)
     }
     assert len(keys) == 3
 

@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study.config import Study, load_study
-from holobench_eval.study.displays import condition, workbench
+from holobench_eval.study.config import load_study
+from holobench_eval.study.definition import Study
+from holobench_eval.study.displays import condition
+from holobench_eval.study.opening import open_display
 from holobench_eval.study.plan import Task, plan
 from tests.support.fake_study import write_config
 
@@ -95,8 +97,8 @@ def test_a_display_is_opened_once_for_every_change(tmp_path: Path) -> None:
     place = condition("ideal", (128, 128), tmp_path)
     grid = plan(study_with(tmp_path, SWEEPS))
     shown = {place.title: place for task in grid.tasks for place in task.conditions}
-    benches = {title: workbench(place, 5) for title, place in shown.items()}
-    assert workbench(shown["ideal"], 5) is benches["ideal"]
+    benches = {title: open_display(place, 5) for title, place in shown.items()}
+    assert open_display(shown["ideal"], 5) is benches["ideal"]
     assert benches["ideal, drift 30 days"].bench.profile.drift.days == 30
     assert benches["ideal, known eye -2"].registration is benches["ideal"].registration
     assert benches["ideal, drift 30 days"].registration is not benches["ideal"].registration

@@ -13,10 +13,9 @@ from typing import Any
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study import clusters
 from holobench_eval.study import run as running
-from holobench_eval.study.clusters import Address, Local, Slurm
-from holobench_eval.study.executors import Serial, executor
+from holobench_eval.study.executors import Serial, clusters, executor
+from holobench_eval.study.executors.clusters import Address, Local, Slurm
 from tests.study.test_executors import compute, untimed
 from tests.support.fake_study import fake_work, write_config
 
@@ -108,7 +107,7 @@ def test_workers_with_several_threads_are_refused() -> None:
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("holobench_eval.study.clusters.ANSWER", 1.0)
+    monkeypatch.setattr("holobench_eval.study.executors.clusters.ANSWER", 1.0)
     with pytest.raises(UserError, match="no Dask scheduler answers at 'tcp:") as caught:
         _ = Address("tcp://127.0.0.1:9").workers
     assert "\n" not in str(caught.value)

@@ -12,12 +12,11 @@ import pytest
 import torch
 
 from holobench_eval.commands import main
-from holobench_eval.core.device import CPU
+from holobench_eval.core.device import CPU, repeatable
 from holobench_eval.report.sections.description import environment
-from holobench_eval.study import clusters, provenance, timings
+from holobench_eval.study import cost, provenance
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Local, Serial, executor
-from holobench_eval.study.job import repeatable
+from holobench_eval.study.executors import Local, Serial, clusters, executor
 from holobench_eval.study.plan import plan
 from tests.study.test_run import compute
 from tests.support import trained_study
@@ -69,9 +68,9 @@ def test_the_provenance_has_the_gpu_and_so_has_the_report(tmp_path: Path) -> Non
 
 def test_the_seconds_of_a_gpu_are_kept_apart_and_those_of_the_cpu_where_they_were(tmp_path: Path) -> None:
     task = plan(load_study(write_config(tmp_path))).tasks[-1]
-    keys = {timings.key(task, 1, 1), timings.key(task, 1, 1, "one GPU"), timings.key(task, 1, 1, "another GPU")}
+    keys = {cost.key(task, 1, 1), cost.key(task, 1, 1, "one GPU"), cost.key(task, 1, 1, "another GPU")}
     assert len(keys) == 3
-    assert timings.key(task, 1, 1) == timings.key(task, 1, 1, "")
+    assert cost.key(task, 1, 1) == cost.key(task, 1, 1, "")
 
 
 def test_a_gpu_is_told_to_repeat_itself_and_to_keep_single_precision(monkeypatch: pytest.MonkeyPatch) -> None:

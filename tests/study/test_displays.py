@@ -7,7 +7,9 @@ import pytest
 
 from holobench_eval import display
 from holobench_eval.core.errors import CellError, UserError
-from holobench_eval.study.displays import condition, workbench
+from holobench_eval.study import opening
+from holobench_eval.study.displays import condition
+from holobench_eval.study.opening import open_display
 
 TEXT = Path(display.__file__).parent.joinpath("simulated", "profiles", "ideal.yaml").read_text()
 
@@ -30,7 +32,7 @@ def test_a_profile_that_changes_under_a_run_is_refused(tmp_path: Path) -> None:
     shown = condition("mine.yaml", (128, 128), tmp_path)
     (tmp_path / "mine.yaml").write_text(f"{TEXT}# later\n")
     with pytest.raises(UserError, match="has changed since the study was planned"):
-        workbench(shown, seed=0)
+        open_display(shown, seed=0)
 
 
 def test_a_failed_calibration_is_found_out_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -41,8 +43,8 @@ def test_a_failed_calibration_is_found_out_once(tmp_path: Path, monkeypatch: pyt
         opened.append(1)
         return Uncalibrated()
 
-    monkeypatch.setattr(display, "open_bench", open_bench)
+    monkeypatch.setattr(opening, "open_bench", open_bench)
     for _ in range(2):
         with pytest.raises(CellError, match="no circles found"):
-            workbench(shown, seed=0)
+            open_display(shown, seed=0)
     assert len(opened) == 1

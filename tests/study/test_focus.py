@@ -11,8 +11,8 @@ import torch
 from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.metrics import score
 from holobench_eval.study.config import load_study
-from holobench_eval.study.focus import in_focus
 from holobench_eval.study.plan import REFERENCE, Task, plan
+from holobench_eval.study.scoring.focus import in_focus
 from tests.support.trained_study import compute
 
 CONFIG = """\

@@ -7,7 +7,8 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import displays, plan
+from holobench_eval.study.displays import displays
+from holobench_eval.study.plan import plan
 from tests.support.trained_study import compute, needs, rounds, write
 
 LEARNED = ("profiles: [ideal]", 'learned: {method: "trained.py:Gain", profile: ideal, params: {rounds: 3}}')

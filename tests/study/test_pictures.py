@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from holobench_eval.study.pictures import write_capture, write_phase, write_thumbnail
+from holobench_eval.study.scoring.pictures import write_capture, write_phase, write_thumbnail
 
 
 def read(path: Path) -> NDArray[np.integer]:

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study.config import Study, load_study
+from holobench_eval.study.config import load_study
+from holobench_eval.study.definition import Study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
 from tests.study.test_run import add_other_profile
 from tests.support.fake_study import write_config

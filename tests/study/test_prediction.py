@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study import timings
+from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from tests.support import fake_trained
@@ -65,7 +65,7 @@ def test_cells_of_predictions_name_the_hologram_and_are_no_cells_of_pictures(tmp
 
 def test_the_time_of_a_prediction_is_not_that_of_a_solution(tmp_path: Path) -> None:
     pictures, predictions = (plan(load_study(write(tmp_path, *change))).tasks[-1] for change in ((), (PREDICTION,)))
-    assert timings.key(pictures, 1, 1) != timings.key(predictions, 1, 1)
+    assert cost.key(pictures, 1, 1) != cost.key(predictions, 1, 1)
 
 
 REFUSED = [

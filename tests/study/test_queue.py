@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from holobench_eval.study.queue import queue
+from holobench_eval.study.run import queue
 
 
 @dataclass(frozen=True)

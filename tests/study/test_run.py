@@ -10,9 +10,9 @@ from holobench_eval.commands.plan import preview
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.io import file_name
 from holobench_eval.study import provenance
-from holobench_eval.study.clusters import Address
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
+from holobench_eval.study.executors.clusters import Address
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import Outcome, run
@@ -102,7 +102,7 @@ def test_failed_cells_run_again_only_when_asked(tmp_path: Path) -> None:
 
 
 def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("holobench_eval.study.scoring.score", lambda *_, **__: {"psnr_linear": float("nan")})
+    monkeypatch.setattr("holobench_eval.study.scoring.picture.score", lambda *_, **__: {"psnr_linear": float("nan")})
     outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"failed"}
     assert outcome.records[0]["reason"] == "CellError: the score psnr_linear is nan"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from holobench_eval.study import timings
+from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.cost import Cost
 from holobench_eval.study.plan import Task, plan
@@ -18,24 +18,24 @@ def task(tmp_path: Path) -> Task:
 
 
 def test_the_first_measurement_is_the_one_reported() -> None:
-    assert timings.keep("a", Cost(2.5, 40.0)) == Cost(2.5, 40.0)
-    assert timings.keep("a", Cost(9.0, 50.0)) == Cost(2.5, 40.0)
-    assert timings.keep("a", Cost(9.0, None)) == Cost(2.5, 40.0)
-    assert timings.known("a") == Cost(2.5, 40.0)
+    assert cost.keep("a", Cost(2.5, 40.0)) == Cost(2.5, 40.0)
+    assert cost.keep("a", Cost(9.0, 50.0)) == Cost(2.5, 40.0)
+    assert cost.keep("a", Cost(9.0, None)) == Cost(2.5, 40.0)
+    assert cost.known("a") == Cost(2.5, 40.0)
 
 
 def test_measuring_again_replaces_it() -> None:
-    timings.keep("a", Cost(2.5, 40.0))
-    assert timings.keep("a", Cost(9.0, 50.0), again=True) == Cost(9.0, 50.0)
-    assert timings.keep("a", Cost(1.0, 10.0)) == Cost(9.0, 50.0)
+    cost.keep("a", Cost(2.5, 40.0))
+    assert cost.keep("a", Cost(9.0, 50.0), again=True) == Cost(9.0, 50.0)
+    assert cost.keep("a", Cost(1.0, 10.0)) == Cost(9.0, 50.0)
 
 
 def test_a_time_that_was_kept_without_memory_stays_and_gets_the_first_memory() -> None:
-    timings.folder().mkdir(parents=True)
-    (timings.folder() / "a.json").write_text('{"seconds": 2.5}')
-    assert timings.keep("a", Cost(9.0)) == Cost(2.5)
-    assert timings.keep("a", Cost(9.0, 40.0)) == Cost(2.5, 40.0)
-    assert timings.keep("a", Cost(9.0, 50.0)) == Cost(2.5, 40.0)
+    cost.folder().mkdir(parents=True)
+    (cost.folder() / "a.json").write_text('{"seconds": 2.5}')
+    assert cost.keep("a", Cost(9.0)) == Cost(2.5)
+    assert cost.keep("a", Cost(9.0, 40.0)) == Cost(2.5, 40.0)
+    assert cost.keep("a", Cost(9.0, 50.0)) == Cost(2.5, 40.0)
 
 
 DAMAGED = ["", "[]", "{}", '{"seconds": "x"}', '{"seconds": -1}', '{"seconds": NaN}', "\xff"]
@@ -44,10 +44,10 @@ DAMAGED += ['{"seconds": 1, "memory_mib": -1}', '{"seconds": 1, "memory_mib": [2
 
 @pytest.mark.parametrize("content", DAMAGED)
 def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
-    timings.keep("a", Cost(2.5))
-    (timings.folder() / "a.json").write_text(content, encoding="latin-1")
-    assert timings.known("a") is None
-    assert timings.keep("a", Cost(3.0)) == Cost(3.0)
+    cost.keep("a", Cost(2.5))
+    (cost.folder() / "a.json").write_text(content, encoding="latin-1")
+    assert cost.known("a") is None
+    assert cost.keep("a", Cost(3.0)) == Cost(3.0)
 
 
 def test_without_a_folder_to_write_to_what_was_measured_is_reported(
@@ -55,8 +55,8 @@ def test_without_a_folder_to_write_to_what_was_measured_is_reported(
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert timings.keep("a", Cost(2.5)) == Cost(2.5)
-    assert timings.keep("a", Cost(3.5)) == Cost(3.5)
+    assert cost.keep("a", Cost(2.5)) == Cost(2.5)
+    assert cost.keep("a", Cost(3.5)) == Cost(3.5)
 
 
 def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repeat(tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repe
     config.write_text(f"{config.read_text()}repeats: 2\ntiming: alone\n")
     study = load_study(config)
     grid = plan(study)
-    timed = [cell for cell in grid.cells if cell.id in timings.timed(study, grid)]
+    timed = [cell for cell in grid.cells if cell.id in cost.timed(study, grid)]
     assert [(cell.method.rpartition(":")[2], cell.condition) for cell in timed] == [
         ("Toy", "ideal"),
         ("Toy", "other"),
@@ -75,11 +75,11 @@ def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repe
         ("Seeing", "other"),
     ]
     assert {(cell.target, cell.repeat) for cell in timed} == {("gray 2", 0)}
-    assert not timings.timed(replace(study, timing="shared"), grid)
+    assert not cost.timed(replace(study, timing="shared"), grid)
 
 
 def test_threads_workers_and_the_method_make_another_solution(task: Task) -> None:
     other = replace(task, cells=(replace(task.cells[0], method_sha256="changed"),))
-    keys = {timings.key(task, 1, 1), timings.key(task, 2, 1), timings.key(task, 1, 2), timings.key(other, 1, 1)}
+    keys = {cost.key(task, 1, 1), cost.key(task, 2, 1), cost.key(task, 1, 2), cost.key(other, 1, 1)}
     assert len(keys) == 4
-    assert timings.key(task, 1, 1) == timings.key(replace(task, label="renamed"), 1, 1)
+    assert cost.key(task, 1, 1) == cost.key(replace(task, label="renamed"), 1, 1)

@@ -15,7 +15,10 @@ from torch import Tensor
 
 from holobench_eval.core.seeds import generator
 from holobench_eval.display import CalibratedBench, MeteredDisplay, load_profile
-from holobench_eval.study import cell, job, scoring, training
+from holobench_eval.study import opening
+from holobench_eval.study.scoring import picture
+from holobench_eval.study.scoring.cell import work
+from holobench_eval.study.scoring.job import Job
 from holobench_eval.study.store import Record
 
 PLUGINS = '''
@@ -155,7 +158,7 @@ class FakeSession:
         return phase.mean((1, 2))[:, None, None] + noise
 
 
-def fake_workbench(place: Any, seed: int, device: torch.device | None = None) -> FakeBench:
+def fake_display(place: Any, seed: int, device: torch.device | None = None) -> FakeBench:
     return FakeBench(load_profile("ideal").spec(place.spec.shape))
 
 
@@ -165,10 +168,8 @@ def fake_score(image: Tensor, target: Tensor, **_: Any) -> dict[str, float]:
 
 
 FAKES: tuple[tuple[types.ModuleType, str, Any], ...] = (
-    (job, "workbench", fake_workbench),
-    (scoring, "workbench", fake_workbench),
-    (training, "workbench", fake_workbench),
-    (scoring, "score", fake_score),
+    (opening, "open_display", fake_display),
+    (picture, "score", fake_score),
 )
 """Where the machinery calls the physics, and what stands there instead."""
 
@@ -179,20 +180,20 @@ def install() -> None:
         setattr(module, name, fake)
 
 
-def fake_work(task: job.Job) -> list[Record]:
-    """``cell.work`` with the fakes, for worker processes that are started fresh."""
+def fake_work(task: Job) -> list[Record]:
+    """``scoring.cell.work`` with the fakes, for worker processes that are started fresh."""
     install()
-    return cell.work(task)
+    return work(task)
 
 
-def lose_a_worker(task: job.Job) -> list[Record]:
+def lose_a_worker(task: Job) -> list[Record]:
     """Work that kills its process on one target."""
     if task.task.cells[0].target == "gray 1" and not task.task.is_floor:
         os.kill(os.getpid(), 9)
     return fake_work(task)
 
 
-def noted_work(task: job.Job) -> list[Record]:
+def noted_work(task: Job) -> list[Record]:
     """Work that writes when it began and ended into ``solves.txt`` of the output folder."""
     begun = time.time()
     records = fake_work(task)

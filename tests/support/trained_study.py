@@ -15,9 +15,9 @@ from holobench_eval.commands import main
 from holobench_eval.commands import run as run_command
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
+from holobench_eval.study.displays import Preparation
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
-from holobench_eval.study.preparation import Preparation
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import Outcome, run
 from tests.support import fake_trained

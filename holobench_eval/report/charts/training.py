@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from ...study.training_log import Round
+from ...study.artifacts import Round
 from .style import COLOURS, PALE, new_figure, save, style
 
 Rounds = tuple[str, tuple[Round, ...]]

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from ...core import plugins
 from ...display.simulated.changes import draws
 from ...display.simulated.profile import load_profile
+from ...study.displays import changed, displays
 from ...study.focal_stacks import planes_of
-from ...study.plan import changed, displays, scored_dataset
 from .categories import CALIBRATED, CEILING, GIVEN, ONLINE, OPEN_LOOP
 from .text import FILES, Wording, from_files, plain, wording
 
 if TYPE_CHECKING:
-    from ...study.config import Study
+    from ...study.definition import Study
     from ...study.displays import Condition
 
 
@@ -160,7 +160,7 @@ def layout_of(study: Study) -> Layout:
             for source in entry.profiles
             for place in changed(study, source, shown[source])
         ),
-        targets=tuple(scored_dataset(study).items()),
+        targets=tuple(study.dataset.items()),
         seed=study.seed,
         headline=study.headline,
         baseline=study.baseline,
@@ -177,7 +177,7 @@ def layout_of(study: Study) -> Layout:
         training=_training_set(study) if trained or study.display.learned else None,
         camera=marked("camera"),
         sweeps=tuple(_sweeps(study, shown)),
-        planes=planes_of(scored_dataset(study), study.targets.dataset) if study.measure == "focus" else {},
+        planes=planes_of(study.dataset, study.targets.dataset) if study.measure == "focus" else {},
         real=study.display.real,
         stacked=marked("planes") if study.measure == "focus" else frozenset(),
     )

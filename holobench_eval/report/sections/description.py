@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from ...display.simulated.profile import Panel, Profile, load_profile
+from ...study.displays import displays as conditions
 from ...study.plan import REFERENCE
-from ...study.plan import displays as conditions
 from ..data.layout import TrainingSet
 from ..data.results import Results
 from ..data.tables import DONE
@@ -18,7 +18,7 @@ from ..data.text import FILES, plain
 from .alignment import agreement
 
 if TYPE_CHECKING:
-    from ...study.config import Study
+    from ...study.definition import Study
     from ...study.displays import Condition
 
 TARGETS_NAMED = 40

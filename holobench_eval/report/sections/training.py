@@ -10,8 +10,8 @@ from typing import Any
 
 from markupsafe import Markup
 
+from ...study.artifacts import TrainingRecord, training_records
 from ...study.plan import REFERENCE
-from ...study.training_log import TrainingRecord, training_records
 from ..data.layout import Layout
 from ..data.tables import DONE
 from ..data.text import words

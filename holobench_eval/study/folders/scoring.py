@@ -18,7 +18,7 @@ from ... import __version__
 from ...core.errors import CellError
 from ...core.hashing import digest
 from ...core.installed import installed
-from ...core.io import write_atomically
+from ...core.io import now, write_atomically
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared
@@ -27,8 +27,8 @@ from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
 from .. import provenance
-from ..pictures import write_thumbnail
 from ..plan import FLOORS, REFERENCE
+from ..scoring.pictures import write_thumbnail
 from ..store import Record, Store
 from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
@@ -54,7 +54,7 @@ def described(folders: Folders, values: str) -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": {name: installed(name) for name in provenance.PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "started": provenance.now(),
+        "started": now(),
         "ended": None,
     }
 

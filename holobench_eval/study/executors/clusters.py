@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..core.errors import UserError
+from ...core.errors import UserError
 
 J = TypeVar("J")
 R = TypeVar("R")

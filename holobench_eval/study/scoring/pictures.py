@@ -9,8 +9,8 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from ..core.io import write_atomically, write_png
-from ..optics.colour import srgb_encode
+from ...core.io import write_atomically, write_png
+from ...optics.colour import srgb_encode
 
 LONGEST_THUMBNAIL = 512
 

@@ -7,10 +7,10 @@ from rich.console import Console
 from holobench_eval.commands.plan import training_table, trainings
 from holobench_eval.core.io import write_atomically
 from holobench_eval.report import layout_of
-from holobench_eval.study.artifacts import FAILURE, Artifacts
+from holobench_eval.study.artifacts import FAILURE, Artifacts, training_records
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from holobench_eval.study.training_log import keep_training_records, training_records
+from holobench_eval.study.training import keep_training_records
 
 METHOD = """
 from dataclasses import dataclass

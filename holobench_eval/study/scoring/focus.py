@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 from torch import Tensor
 
-from ..core import plugins
-from ..core.errors import CellError
-from ..metrics import match
-from ..metrics.psnr import psnr
-from ..metrics.ssim import RADIUS, LocalStatistics
-from . import scoring
-from .focal_stacks import SCORES, offset
-from .job import Job, target_of
-from .plan import Cell
-from .scoring import Measure, captured, plain, solution
-
-if TYPE_CHECKING:
-    from ..display.calibrated import MeteredDisplay
+from ...core import plugins
+from ...core.errors import CellError
+from ...display import MeteredDisplay
+from ...metrics import match
+from ...metrics.psnr import psnr
+from ...metrics.ssim import RADIUS, LocalStatistics
+from ..focal_stacks import SCORES, offset
+from ..plan import Cell
+from .job import Job, Measured
+from .picture import captured, protocol_scores, references
+from .solution import solution
 
 
-def focus(job: Job) -> Measure:
+def focus(job: Job) -> Measured:
     """Solve for one plane, or for all planes of a scene at once, on the display before any change; the result shows the
     phase at any of the task's planes and displays."""
-    cells, place, folder = job.task.cells, job.task.conditions[0].nominal, job.setting.folder
-    targets = {cell.target: target_of(cell, place, folder) for cell in cells}
+    cells, place = job.task.cells, job.task.conditions[0].nominal
+    targets = {cell.target: job.target(cell, place) for cell in cells}
     offsets = {cell.target: offset(place, cell.change) for cell in cells}
 
     def solve(method: Any, handle: MeteredDisplay) -> Any:
@@ -35,20 +33,20 @@ def focus(job: Job) -> Measure:
             return method.solve_planes(pictures, list(offsets.values()), handle)[None]
         return method.solve(pictures, handle)
 
-    made = solution(job, place, targets[cells[0].target], solve)
-    return lambda cell, place: captured(job, made, cell, place, targets[cell.target], scored)
+    solved = solution(job, place, targets[cells[0].target], solve)
+    return lambda cell, shown_on: captured(job, solved, cell, shown_on, targets[cell.target], scored)
 
 
-def floor(job: Job) -> Measure:
+def floor(job: Job) -> Measured:
     """What images that no display made score on the task's target."""
-    return scoring.floor(job, scored)
+    return references(job, job.target, scored)
 
 
 def scored(job: Job, cell: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
     """The scores of the whole picture, and those of what is in focus."""
     dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
     mask = dataset.mask(cell.target, tuple(wanted.shape[-2:]))
-    return plain(job, cell, image, wanted) | in_focus(image, wanted, mask)
+    return protocol_scores(job, cell, image, wanted) | in_focus(image, wanted, mask)
 
 
 def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
@@ -60,11 +58,11 @@ def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
     inner = mask[RADIUS:-RADIUS, RADIUS:-RADIUS]
     if not bool(inner.any()):
         raise CellError("nothing of this picture is in focus")
-    truth = wanted.double()
-    matched, _ = match(image.double(), truth)
-    luminance, structure = LocalStatistics(truth).maps(matched)
+    target = wanted.double()
+    matched, _ = match(image.double(), target)
+    luminance, structure = LocalStatistics(target).maps(matched)
     values = (
-        psnr(matched[:, mask][:, None], truth[:, mask][:, None]),
+        psnr(matched[:, mask][:, None], target[:, mask][:, None]),
         (luminance * structure)[:, inner].mean(),
     )
     return {name: float(value) for name, value in zip(SCORES, values, strict=True)}

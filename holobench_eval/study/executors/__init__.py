@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from ..core.errors import UserError, suggest
+from ...core.errors import UserError, suggest
 from .clusters import Address, Local, Slurm
 
 J = TypeVar("J")

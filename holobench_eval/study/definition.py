@@ -1,0 +1,218 @@
+"""A study as its config describes it: a grid of methods, displays and targets; see ``config`` for the checks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from annotated_types import Interval, MinLen
+
+from ..core import plugins
+from ..core.errors import UserError
+
+LEARNED = "learned"
+"""How a config names the display that is a trained network."""
+PanelSide = Annotated[int, Interval(ge=64, le=8192)]
+Text = Annotated[str, MinLen(1)]
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A display that is the frozen network of a trained method (paper 6.3), trained on captures of ``profile``."""
+
+    method: Text
+    profile: Text
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class DisplayGrid:
+    """The displays of a study.
+
+    profiles: names of profiles or paths of profile files; in their place learned: a trained network, or bench: the file
+    of a real bench (``lab.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
+    exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures). session:
+    the folder that stands for the display, when photographs are exchanged as files.
+    """
+
+    profiles: tuple[Text, ...] = ()
+    learned: Learned | None = None
+    bench: Text | None = None
+    panel: tuple[PanelSide, PanelSide] | None = None
+    exposure: Literal["equal", "matched"] = "equal"
+    session: Path | None = field(default=None, metadata={"key": False})
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The displays by the names they have in a config."""
+        return (LEARNED,) if self.learned else (self.bench,) if self.bench else self.profiles
+
+    @property
+    def real(self) -> bool:
+        """Whether the display exists."""
+        return self.bench is not None or self.session is not None
+
+
+@dataclass(frozen=True)
+class Targets:
+    """The images that are scored: a registered dataset and its parameters."""
+
+    dataset: Text
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Training:
+    """The images that methods may train on, never scored; equal for all methods of a study.
+
+    held_out: how many of the last images are kept back to watch the training; captures: the most captures that a
+    method may take for its training, those of held-out images included (None: no limit).
+    """
+
+    dataset: Text = "dead_leaves"
+    params: Mapping[str, Any] = field(default_factory=dict)
+    held_out: Annotated[int, Interval(ge=1, le=1000)] = 4
+    captures: Annotated[int, Interval(ge=1)] | None = None
+
+
+@dataclass(frozen=True)
+class Probe:
+    """The method whose holograms are shown when predictions of captures are scored (paper Table 1)."""
+
+    name: Text = "wirtinger"
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A change of the displays at test time, by one value after another; methods were prepared without it.
+
+    condition: its kind, see ``display.simulated.changes``; values: numbers, or names; count: so many siblings or draws
+    in their place; profiles: the displays that are changed, a subset of the study's.
+    """
+
+    condition: Text
+    values: tuple[float | Text, ...] = ()
+    count: Annotated[int, Interval(ge=1, le=10_000)] | None = None
+    profiles: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MethodEntry:
+    """A method of a study.
+
+    name: registered name or ``path/to/file.py:Class``; label: its name in tables; params: every parameter of
+    the method, defaults filled in; profiles: the displays it is shown on, a subset of the study's; captures: the most
+    that the display allows a method with a camera for one target (None: no limit).
+    """
+
+    name: Text
+    label: str = ""
+    params: Mapping[str, Any] = field(default_factory=dict)
+    profiles: tuple[str, ...] = ()
+    captures: Annotated[int, Interval(ge=1)] | None = None
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Version of the metric protocol; names of the metrics to compute (None: all; they take 10 s for a capture of
+    1080 x 1920 pixels); a file or folder of LPIPS trunk weights (None: torch's hub cache)."""
+
+    version: Literal["v1"] = "v1"
+    metrics: tuple[Text, ...] | None = None
+    lpips_weights: Text | None = None
+
+
+@dataclass(frozen=True)
+class Save:
+    """What else is written beside the scores: rectified captures (16 bit) and phases (8 bit)."""
+
+    captures: bool = False
+    phases: bool = False
+
+
+@dataclass(frozen=True)
+class Reported:
+    """Published figures to print beside the measured ones, by method label, and where they were published.
+
+    beside: the profile whose rows they stand beside, as ``display.profiles`` names it; none: every profile's.
+    """
+
+    source: Text
+    rows: Mapping[str, Mapping[str, float]]
+    beside: Text | None = None
+
+
+@dataclass(frozen=True)
+class Study:
+    """A grid of cells and the tables drawn from it; see ``load_study``.
+
+    measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
+    captures of ``holograms`` against those captures; ``focus`` scores the planes of focal stacks, each at its own
+    distance. note: a paragraph that the report prints beside its tables.
+    repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
+    whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
+    changes of the displays at test time; baseline: label that paired tests compare against (the first method when the
+    config names none); headline: the column the report leads with.
+    file, text: the config file as the user named it, and what is in it.
+    """
+
+    title: Text
+    display: DisplayGrid
+    targets: Targets
+    methods: Annotated[tuple[MethodEntry, ...], MinLen(1)]
+    measure: Literal["picture", "prediction", "focus"] = "picture"
+    holograms: Probe = Probe()
+    training: Training = Training()
+    sweeps: tuple[Sweep, ...] = ()
+    note: str = ""
+    seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
+    repeats: Annotated[int, Interval(ge=1, le=1000)] = 1
+    timing: Literal["shared", "alone"] = "shared"
+    protocol: Protocol = Protocol()
+    baseline: str = ""
+    headline: Text = "psnr_linear"
+    save: Save = Save()
+    reported: Reported | None = None
+    file: Path = field(default=Path(), metadata={"key": False})
+    text: str = field(default="", metadata={"key": False})
+
+    @property
+    def folder(self) -> Path:
+        """The config's folder; relative paths in a config start here."""
+        return self.file.parent
+
+    @property
+    def name(self) -> str:
+        """The config's file name without its ending; the default name of the output folder."""
+        return self.file.stem
+
+    @cached_property
+    def dataset(self) -> Any:
+        """The dataset whose images are scored. UserError for one that methods may train on."""
+        name = self.targets.dataset
+        dataset = plugins.build("datasets", name, dict(self.targets.params), self.folder)
+        try:
+            dataset.items()
+        except UserError:
+            raise
+        except Exception as error:  # a stranger's dataset
+            raise UserError(f"dataset '{name}' cannot list its items: {type(error).__name__}: {error}") from error
+        if getattr(dataset, "training", False):
+            raise UserError(f"dataset '{name}' holds training images, which are never scored; choose another one")
+        return dataset
+
+    @cached_property
+    def training_images(self) -> tuple[tuple[str, str], ...]:
+        """Name and digest of every image that methods may train on."""
+        training = self.training
+        dataset = plugins.build("datasets", training.dataset, dict(training.params), self.folder)
+        return tuple((item, dataset.digest(item)) for item in dataset.items())
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the methods, in the order of the config."""
+        return tuple(entry.label for entry in self.methods)

@@ -1,0 +1,103 @@
+"""Open the displays of a study, each calibrated once in a process."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from functools import lru_cache
+from pathlib import Path
+
+import torch
+
+from ..core.device import CPU
+from ..core.errors import CellError, UserError
+from ..display import CalibratedBench, load_profile, open_bench
+from ..display.simulated.changes import KINDS, altered
+from ..lab.bench_file import load_bench_file
+from ..lab.live import open_live
+from ..lab.real import RealBench
+from ..lab.session import FolderPhotographer
+from .displays import Condition, RealSource
+
+OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
+"""Pixels of all benches that a process keeps open, and their number, at most; but two are."""
+
+
+def open_display(place: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench | RealBench:
+    """The bench of a condition, built and calibrated once in a process; a simulated one is computed on ``device``.
+
+    CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
+    """
+    return _cached(place, seed, device)
+
+
+def simulated(place: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
+    """``open_display`` of a display that does not exist."""
+    bench = _cached(place, seed, device)
+    assert isinstance(bench, CalibratedBench)
+    return bench
+
+
+def _cached(place: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench:
+    where = None if place.real else device  # a real one is opened once, whoever computes
+    key = (place.source, place.folder, place.digest, place.spec.shape, place.change, place.real, seed, where)
+    if key not in _open:
+        _open[key] = _opened(place, seed, device)
+        pixels = place.spec.shape[0] * place.spec.shape[1]
+        while len(_open) > max(2, min(OPEN_BENCHES, OPEN_PIXELS // pixels)):
+            _open.popitem(last=False)
+    _open.move_to_end(key)
+    opened = _open[key]
+    if isinstance(opened, CellError):
+        raise CellError(str(opened)) from opened
+    return opened
+
+
+_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()
+"""Those used least recently come first."""
+
+
+def forget_sessions() -> None:
+    """Open the benches behind session folders anew when they are next asked for: their files may have changed."""
+    for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
+        del _open[key]
+
+
+def _opened(place: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
+    if place.real is not None:
+        return _open_real(place, place.real, seed)
+    profile = load_profile(place.source, folder=place.folder)
+    if profile.digest != place.digest:
+        raise UserError(f"profile '{place.source}' has changed since the study was planned; start the run again")
+    unmoved = None
+    try:
+        if place.change is not None:
+            if not KINDS[place.change[0]].moves:
+                unmoved = simulated(place.nominal, seed, device)
+            profile = altered(profile, *place.change)
+        opened = open_bench(profile, place.spec.shape, seed, unmoved, device)
+        _ = opened.registration  # calibrated now, so that no method's time includes it
+    except CellError as error:
+        return error
+    return opened
+
+
+def _open_real(place: Condition, source: RealSource, seed: int) -> RealBench:
+    """The bench of a condition; its devices are opened once in a process. UserError for a file that has changed."""
+    if source.bench is not None:
+        bench = load_bench_file(source.bench)
+        found, panel, bound = bench.digest, bench.panel, bench.residual_bound
+    else:
+        profile = load_profile(place.source, folder=place.folder).scaled(place.spec.shape)
+        found, panel, bound = profile.digest, profile.panel, profile.residual_bound
+    if found != place.digest:
+        raise UserError(f"'{place.source}' has changed since the study was planned; start the run again")
+    if source.folder is not None:
+        return RealBench(place.spec, session_photographer(source.folder), panel.blaze, bound, seed)
+    assert source.bench is not None
+    return open_live(load_bench_file(source.bench), source.bench.parent, seed)
+
+
+@lru_cache(maxsize=1)
+def session_photographer(folder: Path) -> FolderPhotographer:
+    """The photographer of a session folder, one for a process: what it notes is written at the end of a run."""
+    return FolderPhotographer(folder)

@@ -1,0 +1,72 @@
+"""From a task to its records: solve, show, photograph, score. This is what a worker runs."""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections.abc import Mapping
+
+from ...core.device import repeatable
+from ...core.errors import CellError, LostDeviceError, Pending
+from ...core.io import write_atomically
+from ..displays import Condition
+from ..plan import Cell
+from ..store import Record
+from . import focus, picture, prediction
+from .job import Job, Measure, Measured
+
+MEASURES: Mapping[str, Measure] = {
+    "picture": picture.picture,
+    "prediction": prediction.prediction,
+    "focus": focus.focus,
+}
+"""By the name that a study's config gives as ``measure``."""
+FLOORS: Mapping[str, Measure] = {
+    "picture": picture.floor,
+    "prediction": prediction.floor,
+    "focus": focus.floor,
+}
+"""The same for images that no method made."""
+
+
+def work(job: Job) -> list[Record]:
+    """Compute and write the wanted records of a task. A failure of a cell becomes a failed record, never an error.
+
+    A cell that waits for a photograph (``Pending``) gets no record.
+    """
+    with repeatable(job.setting.threads, job.device):
+        try:
+            measured = (FLOORS if job.task.is_floor else MEASURES)[job.task.cells[0].measure](job)
+        except LostDeviceError:
+            raise
+        except Pending:
+            return []
+        except (Exception, SystemExit) as error:
+            return [_note_failure(job, cell, error) for cell, _ in job.cells]
+        records = [_recorded(job, cell, place, measured) for cell, place in job.cells]
+        return [record for record in records if record is not None]
+
+
+def _recorded(job: Job, cell: Cell, place: Condition, measured: Measured) -> Record | None:
+    """The record; None for a cell that waits for a photograph."""
+    try:
+        record = measured(cell, place)
+        for name, value in record.scores.items():
+            if not math.isfinite(value):
+                raise CellError(f"the score {name} is {value}")
+        job.store.write(record)
+    except LostDeviceError:
+        raise
+    except Pending:
+        return None
+    except Exception as error:
+        return _note_failure(job, cell, error)
+    job.store.log(cell.id).unlink(missing_ok=True)
+    return record
+
+
+def _note_failure(job: Job, cell: Cell, error: BaseException) -> Record:
+    record = job.failed(cell, error)
+    job.store.write(record)
+    write_atomically(job.store.log(cell.id), "".join(traceback.format_exception(error)).encode())
+    return record

@@ -1,0 +1,152 @@
+"""A task with all that a worker needs to compute it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ...core import plugins
+from ...core.device import find, gpu_name, moved
+from ...core.errors import CellError, Pending
+from ...core.hashing import canonical
+from ...display import CalibratedBench
+from ...display.learned import LearnedBench
+from ...lab.real import RealBench
+from .. import cost, opening
+from ..artifacts import Artifact, Artifacts
+from ..definition import Save
+from ..displays import Condition, Preparation
+from ..plan import Cell, Task
+from ..store import Record, Store
+
+TARGETS_KEPT = 16
+"""Targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels."""
+
+TargetSource = tuple[str, str, Path, str, str]
+"""Dataset, its parameters as JSON, folder of the config, name of the image and its digest."""
+
+Measured = Callable[[Cell, Condition], Record]
+"""Makes the record of a cell on its display."""
+Measure = Callable[["Job"], Measured]
+"""Does for a job what all of its cells share."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a worker needs to know of a run besides its task.
+
+    output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
+    what trained methods learned; metrics: names of those to compute (None: all); threads: torch threads of a worker;
+    workers: tasks computed side by side; retime: measure wall times again, see ``cost``; device: name of where a
+    worker computes, see ``device.find``.
+    """
+
+    output: Path
+    folder: Path
+    artifacts: Path
+    save: Save
+    metrics: tuple[str, ...] | None
+    lpips_weights: str | None
+    threads: int
+    workers: int
+    retime: bool = False
+    device: str = "cpu"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A task, the cells of it that are wanted, and the setting of the run.
+
+    alone: whether nothing else of the run is at work meanwhile, so that its time can be compared.
+    """
+
+    task: Task
+    wanted: frozenset[str]
+    setting: Setting
+    alone: bool
+
+    @property
+    def device(self) -> torch.device:
+        """Where this worker computes. UserError for a GPU that is not there."""
+        return find(self.setting.device)
+
+    @property
+    def store(self) -> Store:
+        """Where its records are written."""
+        return Store(self.setting.output)
+
+    @property
+    def timing(self) -> str:
+        """The name of its timing; what was measured alone serves a run with one worker, too."""
+        workers = 1 if self.alone else max(2, self.setting.workers)  # one on a cluster may be joined by others
+        return cost.key(self.task, self.setting.threads, workers, gpu_name(self.device))
+
+    @property
+    def cells(self) -> list[tuple[Cell, Condition]]:
+        """The wanted cells and their displays."""
+        pairs = zip(self.task.cells, self.task.conditions, strict=True)
+        return [(cell, place) for cell, place in pairs if cell.id in self.wanted]
+
+    def failed(self, cell: Cell, error: BaseException) -> Record:
+        """The record of a cell that has no score, with the reason in one line."""
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        label = cell.method if self.task.is_floor else self.task.label
+        return Record(cell.description(), "failed", label, reason)
+
+    def method(self, name: str, params: Any) -> Any:
+        """An instance of a method, built anew: no cell may depend on those computed before."""
+        return plugins.build("methods", name, dict(params), self.setting.folder)
+
+    def learned(self, needed: Preparation | None) -> Artifact | None:
+        """What a method learned; None if it had nothing to learn. CellError when its training failed."""
+        if needed is None:
+            return None
+        artifacts = Artifacts(self.setting.artifacts)
+        if not artifacts.has(needed):
+            if needed.place.real and not artifacts.has_failed(needed):
+                raise Pending("its training waits for photographs")
+            raise CellError(f"not trained: {artifacts.failure(needed)}")
+        return artifacts.load(needed)
+
+    def display(self, cell: Cell, place: Condition) -> CalibratedBench | RealBench | LearnedBench:
+        """The display of a cell: a simulated bench, a real one, or a trained network."""
+        needed, learned = place.learned, self.learned(place.learned)
+        if needed is None or learned is None:
+            return opening.open_display(place, cell.seed, self.device)
+        method = self.method(needed.method, needed.params)
+        return LearnedBench(place.spec, method, moved(learned.state, self.device), cell.seed, self.device)
+
+    def source(self, cell: Cell) -> TargetSource:
+        """Where the target of a cell comes from."""
+        params = canonical(dict(cell.dataset_params))
+        return cell.dataset, params, self.setting.folder, cell.target, cell.target_sha256
+
+    def target(self, cell: Cell, place: Condition) -> Tensor:
+        """The target of a cell at the size of the scored region; see ``load_target``."""
+        return load_target(self.source(cell), place)
+
+
+def load_target(source: TargetSource, place: Condition) -> Tensor:
+    """A target at the size of the scored region, ``(C, h, w)`` linear light in [0, 1].
+
+    CellError for a source that has changed since the study was planned.
+    """
+    return _target(source, place.spec.region.shape, len(place.spec.wavelengths)).clone()
+
+
+@lru_cache(maxsize=TARGETS_KEPT)
+def _target(source: TargetSource, shape: tuple[int, int], channels: int) -> Tensor:
+    """A target, loaded once in a process for all methods and repeats."""
+    name, params, folder, item, sha256 = source
+    dataset = plugins.build("datasets", name, json.loads(params), folder)
+    if dataset.digest(item) != sha256:
+        raise CellError(f"target '{item}' has changed since the study was planned; start the run again")
+    target: Tensor = dataset.load(item, shape, channels=channels)
+    return target

@@ -1,0 +1,128 @@
+"""A picture against its target: solve, show, photograph, score; and what images that no method made would score."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from ...core.errors import CellError
+from ...core.io import file_name
+from ...display import CalibratedBench, RectifiedCapture
+from ...display.learned import LearnedBench
+from ...lab.photograph import MOST_SATURATED
+from ...lab.real import RealBench
+from ...metrics import floor_captures, match, score
+from ..artifacts import Artifact
+from ..displays import Condition
+from ..plan import Cell
+from ..store import Record
+from .job import Job, Measured
+from .pictures import write_capture, write_phase, write_thumbnail
+from .solution import Solution, kept, solution
+
+Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]
+"""The scores of an image ``(C, h, w)`` against the wanted one."""
+
+
+def picture(job: Job) -> Measured:
+    """Solve the task's target on its first display; the result shows the phase on any of its displays."""
+    place = job.task.conditions[0]
+    target = job.target(job.task.cells[0], place)
+
+    def make() -> Solution:
+        own = target[None].to(job.device, copy=True)
+        return solution(job, place, target, lambda method, handle: method.solve(own, handle))
+
+    in_session = place.real is not None and place.real.folder is not None
+    solved = kept(job, make) if in_session else make()
+    return lambda cell, shown_on: captured(job, solved, cell, shown_on, target)
+
+
+def floor(job: Job) -> Measured:
+    """What images that no display made score on the task's target."""
+    return references(job, job.target)
+
+
+def protocol_scores(job: Job, _: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
+    """The scores of the metric protocol."""
+    return score(image, wanted, metrics=job.setting.metrics, lpips_weights=job.setting.lpips_weights)
+
+
+def captured(
+    job: Job, solved: Solution, cell: Cell, place: Condition, target: Tensor, scored: Scored = protocol_scores
+) -> Record:
+    """Show a solution on a display, photograph it and score it against ``target`` ``(C, h, w)``."""
+    display = job.display(cell, place)
+    capture = display.photograph(
+        solved.phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure, label=job.task.label
+    )
+    refuse_saturated(capture)
+    keep_pictures(job, cell, capture.image, target, solved.phase)
+    scores = scored(job, cell, capture.image, target) | _second_scores(display, capture, target)
+    return Record(
+        cell=cell.description(),
+        state="done",
+        label=job.task.label,
+        scores=scores | {"efficiency": capture.efficiency},
+        captures=solved.captures,
+        seconds=solved.cost.seconds,
+        alone=job.alone,
+        memory_mib=solved.cost.memory_mib,
+        registration_residual_px=capture.residual,
+        saturated=capture.saturated,
+        learned=account(solved.learned),
+        stopped=solved.stopped,
+    )
+
+
+def references(job: Job, wanted: Callable[[Cell, Condition], Tensor], scored: Scored = protocol_scores) -> Measured:
+    """What images that no method made score against what a cell's image is compared with."""
+    cells, place = job.task.cells, job.task.conditions[0]
+    others = [replace(cell, **cell.params) for cell in cells if cell.params]
+    target, *wrong = (wanted(cell, place) for cell in (cells[0], *others))
+    captures = floor_captures(target, wrong, cells[0].seed, cells[0].target)
+    write_thumbnail(job.store.target_thumbnail(cells[0].target), target)
+
+    def reference(cell: Cell, _: Condition) -> Record:
+        scores = scored(job, cell, captures[cell.method], target)
+        return Record(cell.description(), "done", cell.method, scores=scores)
+
+    return reference
+
+
+def _second_scores(
+    display: CalibratedBench | RealBench | LearnedBench, capture: RectifiedCapture, target: Tensor
+) -> dict[str, float]:
+    """PSNR and SSIM of a real photograph by the geometry that another algorithm found."""
+    image = display.second_image(capture, target) if isinstance(display, RealBench) else None
+    if image is None:
+        return {}
+    again = score(image, target, refine=False, blur=(), metrics=("psnr", "ssim"))
+    return {f"{name}_linear_second": again[f"{name}_linear"] for name in ("psnr", "ssim")}
+
+
+def refuse_saturated(capture: RectifiedCapture) -> None:
+    """CellError for a capture of which too much is saturated."""
+    if capture.saturated > MOST_SATURATED:
+        raise CellError(f"{capture.saturated:.2%} of the capture is saturated, more than {MOST_SATURATED:.1%}")
+
+
+def account(learned: Artifact | None) -> dict[str, Any] | None:
+    """What a record says of the training behind it."""
+    return None if learned is None else {key: learned.provenance[key] for key in ("sha256", "captures", "seconds")}
+
+
+def keep_pictures(job: Job, cell: Cell, image: Tensor, wanted: Tensor, phase: Tensor) -> None:
+    """Write the thumbnail of an image ``(C, h, w)``, and what else the study wants to keep."""
+    setting = job.setting
+    name = file_name(cell.target) + (f"-{cell.repeat}" if cell.repeat else "") + ".png"
+    path = Path(file_name(job.task.label), file_name(cell.condition), name)
+    if setting.save.captures:
+        write_capture(setting.output / "captures" / path, image)
+    if setting.save.phases:
+        write_phase(setting.output / "phases" / path, phase)
+    write_thumbnail(job.store.thumbnail(cell.id), match(image, wanted)[0])

@@ -1,0 +1,114 @@
+"""What a method predicts of the capture of another method's hologram, against that capture (paper 6.1)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from ...core import plugins
+from ...core.device import moved
+from ...core.hashing import canonical
+from ...display import RectifiedCapture
+from ...display.calibrated import Exposure
+from ...metrics import match
+from .. import cost, opening
+from ..displays import Condition
+from ..plan import Cell
+from ..store import Record
+from .job import Job, Measured, TargetSource, load_target
+from .picture import account, keep_pictures, protocol_scores, references, refuse_saturated
+from .solution import wrong_output
+
+
+def prediction(job: Job) -> Measured:
+    """Predict the capture of the hologram that the study shows for the task's target.
+
+    Capture and prediction get the factors that match the capture to the target, so that the capture is a picture in
+    [0, 1]; the protocol's own match of the prediction follows.
+    """
+    task, cell, place = job.task, job.task.cells[0], job.task.conditions[0]
+    method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
+    target = job.target(cell, place)
+    phase, capture = _shown(job, cell, place)
+    refuse_saturated(capture)
+    wanted, factors = match(capture.image, target)
+    handle = opening.open_display(place, cell.seed, job.device).for_method(
+        method,
+        task.label,
+        target.to(job.device),
+        item=cell.target,
+        repeat=cell.repeat,
+        budget=0,  # the capture is what is to be predicted
+        learned=moved(learned.state, job.device) if learned else None,
+    )
+    own = phase[None].to(job.device, copy=True)
+    watch = cost.start(job.device)
+    predicted = method.predict(own, handle)
+    taken = watch.stop()
+    if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *wanted.shape):
+        raise wrong_output(job, "predict", predicted, f"an image {(1, *wanted.shape)}")
+    image = factors.view(-1, 1, 1) * predicted.detach().cpu()[0]
+    taken = cost.keep(job.timing, taken, job.setting.retime)
+
+    def compare(cell: Cell, _: Condition) -> Record:
+        keep_pictures(job, cell, image, wanted, phase)
+        return Record(
+            cell=cell.description(),
+            state="done",
+            label=task.label,
+            scores=protocol_scores(job, cell, image, wanted),
+            seconds=taken.seconds,
+            alone=job.alone,
+            memory_mib=taken.memory_mib,
+            registration_residual_px=capture.residual,
+            saturated=capture.saturated,
+            learned=account(learned),
+        )
+
+    return compare
+
+
+def floor(job: Job) -> Measured:
+    """What images that no display made score on the capture that is to be predicted."""
+
+    def wanted(cell: Cell, place: Condition) -> Tensor:
+        return match(_shown(job, cell, place)[1].image, job.target(cell, place))[0]
+
+    return references(job, wanted)
+
+
+@dataclass(frozen=True)
+class _Hologram:
+    """The hologram whose capture is predicted; equal for all methods that predict it. params: as JSON."""
+
+    method: str
+    params: str
+    source: TargetSource
+    repeat: int
+    seed: int
+    exposure: Exposure
+
+
+def _shown(job: Job, cell: Cell, place: Condition) -> tuple[Tensor, RectifiedCapture]:
+    """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture."""
+    name, params = cell.holograms["name"], canonical(dict(cell.holograms["params"]))
+    hologram = _Hologram(name, params, job.source(cell), cell.repeat, cell.seed, cell.exposure)
+    return _photographed(hologram, place, job.setting.folder, job.device)
+
+
+@lru_cache(maxsize=64)
+def _photographed(
+    hologram: _Hologram, place: Condition, folder: Path, device: torch.device
+) -> tuple[Tensor, RectifiedCapture]:
+    """Solved and photographed once in a process."""
+    bench, target = opening.open_display(place, hologram.seed, device), load_target(hologram.source, place)
+    item, own = hologram.source[3], target.to(device, copy=True)
+    method = plugins.build("methods", hologram.method, json.loads(hologram.params), folder)
+    handle = bench.for_method(method, hologram.method, own, item=item, repeat=hologram.repeat)
+    phase = method.solve(own[None], handle).detach().cpu()[0]
+    return phase, bench.photograph(phase, target, item=item, repeat=hologram.repeat, exposure=hologram.exposure)

@@ -1,0 +1,99 @@
+"""Let a method solve a target; what it made for a session is kept, since its photographs come later."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ...core.device import moved
+from ...core.errors import BudgetError, CellError
+from ...core.io import write_atomically
+from ...display import MeteredDisplay
+from .. import cost
+from ..artifacts import Artifact, read_tensors
+from ..cost import Cost
+from ..displays import Condition
+from .job import Job
+
+FOLDER = "solutions"
+
+Solve = Callable[[Any, MeteredDisplay], Any]
+"""Calls a method with the handle that it gets of its display."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method made: the phase ``(C, H, W)`` [rad], the captures and the cost of it, why the display ended it
+    (empty: it did not), and what it had learned."""
+
+    phase: Tensor
+    captures: int
+    cost: Cost
+    stopped: str
+    learned: Artifact | None
+
+
+def solution(job: Job, place: Condition, target: Tensor, solve: Solve) -> Solution:
+    """Let the task's method ``solve`` on a display, in the name of the task's first cell.
+
+    target: ``(C, h, w)``, which the display is exposed for. What a method does to its own must not reach the score.
+    What the method is given is on the job's device, and what it made comes back to the CPU.
+    """
+    task, first = job.task, job.task.cells[0]
+    learned = job.learned(task.preparation)
+    method = job.method(first.method, first.params)
+    handle = job.display(first, place).for_method(
+        method,
+        task.label,
+        target.to(job.device),
+        item=first.target,
+        repeat=first.repeat,
+        budget=first.captures,
+        learned=moved(learned.state, job.device) if learned else None,
+    )
+    watch = cost.start(job.device)
+    phase, stopped = _within_budget(method, solve, handle)
+    taken = watch.stop()
+    if not isinstance(phase, Tensor) or tuple(phase.shape[:2]) != (1, len(target)):
+        raise wrong_output(job, "solve", phase, f"a phase (1, {len(target)}, H, W)")
+    taken = cost.keep(job.timing, taken, job.setting.retime)
+    return Solution(phase.detach().cpu()[0], handle.captures, taken, stopped, learned)
+
+
+def wrong_output(job: Job, function: str, output: Any, wanted: str) -> CellError:
+    """The error for what a method returned in the place of ``wanted``."""
+    found = tuple(output.shape) if isinstance(output, Tensor) else type(output).__name__
+    return CellError(f"{job.task.label}: {function} returned {found}, not {wanted}")
+
+
+def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[Any, str]:
+    """What ``solve`` returns and an empty line; the best hologram so far and why, if the display ended its captures,
+    whatever the method made of that."""
+    phase = None
+    try:
+        phase = solve(method, handle)
+    except BudgetError:
+        if not handle.over or handle.kept is None:
+            raise
+    if handle.over and handle.kept is not None:
+        phase = handle.kept[None]
+    return phase, handle.over
+
+
+def kept(job: Job, make: Callable[[], Solution]) -> Solution:
+    """The solution of a task, made once; kept in the output folder by the name of the task's first cell."""
+    path = job.setting.output / FOLDER / f"{job.task.cells[0].id}.pt"
+    if path.is_file():
+        known = read_tensors(path)
+        learned = job.learned(job.task.preparation)
+        return Solution(known["phase"], known["captures"], Cost(**known["taken"]), known["stopped"], learned)
+    fresh, buffer = make(), io.BytesIO()
+    account = {"captures": fresh.captures, "taken": asdict(fresh.cost), "stopped": fresh.stopped}
+    torch.save({"phase": fresh.phase, **account}, buffer)
+    write_atomically(path, buffer.getvalue())
+    return fresh
