@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
-import importlib.util
 import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Annotated, Protocol
 
 from annotated_types import Interval
 
 from ..core.errors import UserError
+from ..core.plugins import import_file
 from .devices import DeviceError
 
 
@@ -107,8 +105,10 @@ class CommandLaser:
         except (OSError, ValueError) as error:
             raise DeviceError(f"laser: '{arguments[0]}' does not run: {error}") from error
         if done.returncode:
-            said = (done.stderr.strip() or done.stdout.strip() or "without a word").splitlines()[-1]
-            raise DeviceError(f"laser: '{arguments[0]}' ended with {done.returncode} for channel {word}: {said[:200]}")
+            answer = (done.stderr.strip() or done.stdout.strip() or "without a word").splitlines()[-1]
+            raise DeviceError(
+                f"laser: '{arguments[0]}' ended with {done.returncode} for channel {word}: {answer[:200]}"
+            )
 
     def close(self) -> None:
         """Switch off."""
@@ -135,25 +135,14 @@ class FunctionLaser:
 
 
 def _function(name: str, folder: Path) -> Callable[[int | None], object]:
-    place, _, attribute = name.rpartition(":")
-    if not place:
+    source, _, attribute = name.rpartition(":")
+    if not source:
         raise UserError(f"laser.callable '{name}' should be path/to/file.py:function or module:function")
     try:
-        module = _file(folder / place) if place.endswith(".py") else importlib.import_module(place)
+        module = import_file(folder / source) if source.endswith(".py") else importlib.import_module(source)
     except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
         raise UserError(f"laser.callable '{name}' cannot be imported: {type(error).__name__}: {error}") from error
-    found = getattr(module, attribute, None)
-    if not callable(found):
-        raise UserError(f"laser.callable '{name}': there is no function '{attribute}' in {place}")
-    function: Callable[[int | None], object] = found
+    function: Callable[[int | None], object] | None = getattr(module, attribute, None)
+    if not callable(function):
+        raise UserError(f"laser.callable '{name}': there is no function '{attribute}' in {source}")
     return function
-
-
-def _file(path: Path) -> ModuleType:
-    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
-    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}_{unique}", path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{path} is no Python file")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

@@ -16,7 +16,7 @@ from annotated_types import Interval, MinLen
 from ..core import plugins
 from ..core.errors import UserError, suggest
 from ..core.plugins import params_of
-from ..core.schema import check_keys, placed, typed
+from ..core.schema import placed, typed
 from ..core.yaml_source import Document, Keys, load
 from .config_metrics import check_metrics
 from .config_sweeps import subset, sweep_of
@@ -208,7 +208,6 @@ class Study:
 def load_study(path: Path | str) -> Study:
     """Read and check a study completely; every fault is a UserError that starts with file:line:column."""
     document = load(Path(path))
-    check_keys(document, Study, document.data)
     study = replace(typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text)
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))

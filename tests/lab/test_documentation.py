@@ -10,7 +10,7 @@ from holobench_eval.lab.drivers.catalogue import checked_params
 from holobench_eval.lab.laser import laser
 from holobench_eval.lab.settings import CaptureSettings
 
-PAGE = Path(__file__).parents[3] / "docs" / "real-bench.md"
+PAGE = Path(__file__).parents[2] / "docs" / "real-bench.md"
 
 
 def test_the_documented_bench_file_is_read_and_its_settings_are_those_that_exist(tmp_path):

@@ -17,6 +17,7 @@ from annotated_types import Interval, Len, MaxLen, MinLen
 
 from ...core.errors import UserError
 from ...core.io import write_atomically
+from ...core.schema import FieldError, checked
 from ...imaging.convention import Convention
 
 FILE, PATTERNS, CAPTURES = "manifest.json", "patterns", "captures"
@@ -110,10 +111,13 @@ def read_manifest(folder: Path) -> Manifest:
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path}: larger than {LARGEST // 2**20} MB; not a manifest that holoeval wrote")
     content = _json(path)
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
-        raise UserError(f"{path}: format {str(found)[:20]!r} should be {FORMAT}; not a manifest of this version")
-    manifest = _typed(path, content)
+    version = content.get("format") if isinstance(content, dict) else None
+    if version != FORMAT:
+        raise UserError(f"{path}: format {str(version)[:20]!r} should be {FORMAT}; not a manifest of this version")
+    try:
+        manifest = checked(Manifest, content)
+    except FieldError as error:
+        raise UserError(f"{path}: {error}") from None
     _check(path, manifest.patterns)
     return manifest
 
@@ -126,17 +130,6 @@ def _json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: not JSON ({str(error)[:100]})") from None
-
-
-def _typed(path: Path, content: Any) -> Manifest:
-    from pydantic import TypeAdapter, ValidationError
-
-    try:
-        return TypeAdapter(Manifest).validate_json(json.dumps(content), strict=True)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))[:100]
-        raise UserError(f"{path}: {where}: {first['msg'].lower()}, got {json.dumps(first['input'])[:60]}") from None
 
 
 def _check(path: Path, patterns: Sequence[Pattern]) -> None:
