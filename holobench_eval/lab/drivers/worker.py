@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
@@ -87,6 +87,16 @@ class Worker:
         except Exception:  # shows itself at the next call, whose answer somebody waits for
             return False
         return True
+
+
+@contextlib.contextmanager
+def closed_on_failure(close: Callable[[], object]) -> Iterator[None]:
+    """Give a device back whose opening fails half-way."""
+    try:
+        yield
+    except BaseException:
+        close()
+        raise
 
 
 def line(error: BaseException) -> str:
