@@ -12,7 +12,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-import cv2
 import numpy as np
 import torch
 from annotated_types import Interval, MinLen
@@ -21,6 +20,7 @@ from PIL import Image
 from torch import Tensor
 
 from ..core.errors import UserError, suggest
+from ..core.io import decode_levels
 from . import still_life
 from .base import fit, from_srgb, known, named_digest, with_channels
 from .defocus import defocus
@@ -229,8 +229,8 @@ def _files(scene: str) -> tuple[bytes, bytes]:
 def _depth_levels(content: bytes, name: str) -> NDArray[np.float64]:
     if opened(content, name).format != "PNG":
         raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")
-    levels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if levels is None or levels.ndim != 2 or levels.dtype not in (np.uint8, np.uint16):
+    levels = decode_levels(content)
+    if levels is None or levels.ndim != 2:
         raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")
     return levels.astype(np.float64)
 

@@ -11,13 +11,13 @@ import warnings
 from pathlib import Path
 from typing import Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 from torch import Tensor
 
 from ..core.errors import UserError
+from ..core.io import decode_levels
 from .base import from_srgb, planes
 
 SixteenBit = Literal["refuse", "srgb", "linear"]
@@ -171,10 +171,10 @@ def _load(image: Image.Image, name: str) -> tuple[Image.Image, bool]:
 
 def _deep(content: bytes, name: str) -> NDArray[np.uint16]:
     """``(H, W)`` or ``(H, W, 3)`` 16-bit levels, by OpenCV, which keeps them in RGB where Pillow does not."""
-    pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if pixels is None or pixels.dtype != np.uint16:
+    levels = decode_levels(content)
+    if levels is None or levels.dtype != np.uint16:
         raise UserError(f"{name}: a 16-bit image that OpenCV cannot read; {RIGHT}, or a 16-bit PNG")
-    return (pixels if pixels.ndim == 2 else pixels[..., ::-1]).astype(np.uint16)
+    return levels.astype(np.uint16)
 
 
 def _line(error: Exception) -> str:

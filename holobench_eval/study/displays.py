@@ -137,9 +137,7 @@ def forget_sessions() -> None:
 
 def _opened(shown: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
     if shown.real is not None:
-        from ..lab.opening import open_real
-
-        return open_real(shown, shown.real, seed)
+        return _opened_real(shown, shown.real, seed)
     from ..display import load_profile, open_bench
     from ..display.simulated.changes import KINDS, altered
 
@@ -157,3 +155,23 @@ def _opened(shown: Condition, seed: int, device: torch.device) -> CalibratedBenc
     except CellError as error:
         return error
     return opened
+
+
+def _opened_real(shown: Condition, rig: Rig, seed: int) -> RealBench:
+    """The bench behind a session folder, or that of devices. UserError for a description that has changed."""
+    from ..display import load_profile
+    from ..lab.bench_file import load_bench_file
+    from ..lab.live import open_live
+    from ..lab.real import RealBench
+    from ..lab.session import session_photographer
+
+    bench = None if rig.bench is None else load_bench_file(rig.bench)
+    described = bench or load_profile(shown.source, folder=shown.folder).scaled(shown.spec.shape)
+    if described.digest != shown.digest:
+        raise UserError(f"'{shown.source}' has changed since the study was planned; start the run again")
+    if rig.folder is not None:
+        photographer = session_photographer(rig.folder)
+        return RealBench(shown.spec, photographer, described.panel.blaze, described.residual_bound, seed)
+    assert bench is not None
+    assert rig.bench is not None
+    return open_live(bench, rig.bench.parent, seed)

@@ -14,8 +14,7 @@ from ..core.io import write_atomically
 from ..core.yaml_source import load
 from ..imaging.convention import Convention
 from ..lab.bench_file import load_bench_file
-from ..lab.opening import session_photographer
-from ..lab.session import Manifest, Pattern, read_manifest, write_manifest
+from ..lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
 from ..lab.session.geometry import look
 from ..lab.session.manifest import refuse_links_out
 from .displays import condition, forget_sessions, real_condition, workbench

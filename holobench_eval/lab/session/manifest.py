@@ -22,8 +22,7 @@ from ...imaging.convention import Convention
 
 FILE, PATTERNS, CAPTURES = "manifest.json", "patterns", "captures"
 FORMAT = 1
-LARGEST = 64 * 2**20
-"""Bytes of a manifest; about 200,000 patterns."""
+LARGEST_MANIFEST = 64 * 2**20  # bytes, about 200,000 patterns
 SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 DARK, FIDUCIAL, HOLOGRAM, REPEAT = "dark", "fiducial", "hologram", "repeat"
 
@@ -108,8 +107,8 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / FILE
     if not path.is_file() or path.is_symlink():
         raise UserError(f"{path}: no such file; holoeval session export makes a session folder")
-    if path.stat().st_size > LARGEST:
-        raise UserError(f"{path}: larger than {LARGEST // 2**20} MB; not a manifest that holoeval wrote")
+    if path.stat().st_size > LARGEST_MANIFEST:
+        raise UserError(f"{path}: larger than {LARGEST_MANIFEST // 2**20} MB; not a manifest that holoeval wrote")
     content = _json(path)
     version = content.get("format") if isinstance(content, dict) else None
     if version != FORMAT:
@@ -118,7 +117,7 @@ def read_manifest(folder: Path) -> Manifest:
         manifest = checked(Manifest, content)
     except FieldError as error:
         raise UserError(f"{path}: {error}") from None
-    _check(path, manifest.patterns)
+    _check_names(path, manifest.patterns)
     return manifest
 
 
@@ -132,28 +131,28 @@ def _json(path: Path) -> Any:
         raise UserError(f"{path}: not JSON ({str(error)[:100]})") from None
 
 
-def _check(path: Path, patterns: Sequence[Pattern]) -> None:
+def _check_names(path: Path, patterns: Sequence[Pattern]) -> None:
     """Refuse numbers that are not 1, 2, 3, ... and names that do not follow from them."""
     last = (1, 0)
     for pattern in patterns:
         here = (pattern.round, pattern.number)
         if here not in ((last[0], last[1] + 1), (last[0] + 1, 1)):
             raise UserError(f"{path}: pattern {here[1]} of round {here[0]} stands after {last[1]} of round {last[0]}")
-        if pattern.file != file_of(*here):
-            raise UserError(f"{path}: file {pattern.file[:60]!r} should be {file_of(*here)!r}")
-        if pattern.capture != capture_of(*here):
-            raise UserError(f"{path}: capture {pattern.capture[:60]!r} should be {capture_of(*here)!r}")
+        for what, name, right in (
+            ("file", pattern.file, file_of(*here)),
+            ("capture", pattern.capture, capture_of(*here)),
+        ):
+            if name != right:
+                raise UserError(f"{path}: {what} {name[:60]!r} should be {right!r}")
         last = here
 
 
 def refuse_links_out(folder: Path) -> None:
     """UserError for any link in a session folder that leads out of it: nothing else is read, or written to."""
     home = folder.resolve()
-    for place, folders, files in os.walk(home):
+    for parent, folders, files in os.walk(home):
         for name in (*folders, *files):
-            path = Path(place, name)
-            if path.is_symlink() and not path.resolve().is_relative_to(home):
-                raise UserError(f"{path}: leads out of the session folder; put the file itself there")
+            inside(home, str(Path(parent, name).relative_to(home)))
 
 
 def inside(folder: Path, name: str) -> Path:
