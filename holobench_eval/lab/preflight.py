@@ -23,8 +23,8 @@ from .exposure import Averaged, Dark
 from .photograph import MOST_SATURATED
 from .test_pattern import PatternFit, find_pattern
 
+# photograph of a phase `(C, H, W)` [rad] under a convention: light `(C, Hs, Ws)`
 Show = Callable[[Tensor, Convention], Tensor]
-"""Photograph of a phase ``(C, H, W)`` [rad] under a convention: light ``(C, Hs, Ws)``."""
 
 EXPOSURES = tuple(8 ** (step / 4 - 1) for step in range(5))  # an eighth to one
 STRAIGHTEST, FURTHEST_OFFSET = 0.999, 0.02

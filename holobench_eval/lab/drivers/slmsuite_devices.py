@@ -78,8 +78,8 @@ class SlmsuiteSlm:
         self._worker.stop(SHOWING, self._slm.close)
 
     def _write(self, levels: Levels) -> Any:
-        shown = self._slm.set_phase(levels, phase_correct=False, settle=False)
-        return np.asarray(shown.get() if hasattr(shown, "get") else shown)  # get: from a graphics card's memory
+        written = self._slm.set_phase(levels, phase_correct=False, settle=False)
+        return np.asarray(written.get() if hasattr(written, "get") else written)  # get: from a graphics card's memory
 
 
 class SlmsuiteCamera:

@@ -22,8 +22,7 @@ LISTED = 5  # faults of one kind that are named
 THUMBNAIL = 96  # pixels of the longer side of the small pictures that tell which hologram a photograph shows
 CLEARLY = 0.1  # by how much another pattern's picture is more like a photograph than its own, in correlation
 
-Numbered = Sequence[tuple[Pattern, Facts]]
-"""The photographs of a round, each with the pattern that it should show."""
+Numbered = Sequence[tuple[Pattern, Facts]]  # the photographs of a round, each with the pattern that it should show
 
 
 @dataclass(frozen=True)
