@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
@@ -15,6 +15,7 @@ from ..devices import Counts, DeviceError
 from .worker import line
 
 Device = TypeVar("Device", covariant=True)
+T = TypeVar("T")
 Kind = Literal["slm", "camera"]
 
 
@@ -44,6 +45,14 @@ def import_package(driver: str, module: str, package: str, extra: str) -> Any:
     except ImportError as error:
         hint = f"pip install 'holobench_eval[{extra}]'"
         raise UserError(f"driver '{driver}' needs {package}: {hint} ({line(error)})") from error
+
+
+def only(what: str, asked: str, fitting: Sequence[T], listed: Sequence[str]) -> T:
+    """The one device that fits; UserError that lists all there are for none or several."""
+    if len(fitting) == 1:
+        return fitting[0]
+    number = f"{len(fitting)} {what}s" if fitting else f"no {what}"
+    raise UserError(f"{number} '{asked}'; found: {', '.join(listed) or 'none; is it on, and not in use?'}")
 
 
 def check_levels(name: str, shape: tuple[int, int], levels: Levels) -> None:

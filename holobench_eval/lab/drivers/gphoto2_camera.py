@@ -15,7 +15,7 @@ from typing import Any
 from ...core.errors import UserError
 from ..devices import Counts, DeviceError
 from ..raw import RawFrame, is_jpeg, read_raw
-from .driver import Driver, import_package
+from .driver import Driver, import_package, only
 from .shutter import exact, nearest, speeds
 from .worker import Worker, closed_on_failure
 
@@ -85,10 +85,8 @@ class Gphoto2Camera:
             for model, port in answering
             if settings.model.lower() in ("", model.lower()) and settings.port in ("", port)
         ]
-        if len(fitting) != 1:
-            listed = ", ".join(f"{model} at {port}" for model, port in answering) or "none; is it on, and not in use?"
-            raise UserError(f"{len(fitting) or 'no'} cameras '{settings.model or 'any'}'; found: {listed}")
-        model, port = fitting[0]
+        listed = [f"{model} at {port}" for model, port in answering]
+        model, port = only("camera", settings.model or "any", fitting, listed)
         camera = gp.Camera()
         abilities, ports = gp.CameraAbilitiesList(), gp.PortInfoList()
         abilities.load()

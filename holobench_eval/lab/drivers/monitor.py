@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...core.errors import UserError
 from ...imaging.convention import Levels
 from ..devices import DeviceError
-from .driver import Driver, check_levels
+from .driver import Driver, check_levels, only
 from .screen_check import gamma_is_straight, grab
 from .window import Window, screens
 from .worker import Worker, closed_on_failure
@@ -115,11 +115,8 @@ def matching(screens: Sequence[Any], settings: MonitorSettings) -> Any:
     """The one screen with the name and the resolution that are asked for; UserError that lists all for none or more."""
     wanted = (settings.name.strip().lower(), *settings.resolution)
     fitting = [screen for screen in screens if (_name(screen).lower(), screen.width, screen.height) == wanted]
-    if len(fitting) == 1:
-        return fitting[0]
     asked = f"{settings.name} {settings.resolution[0]}x{settings.resolution[1]}"
-    number = "no monitor" if not fitting else f"{len(fitting)} monitors"
-    raise UserError(f"{number} '{asked}'; found: {', '.join(described(screens)) or 'none'}")
+    return only("monitor", asked, fitting, described(screens))
 
 
 def described(screens: Sequence[Any]) -> list[str]:
