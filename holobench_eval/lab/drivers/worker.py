@@ -69,8 +69,7 @@ class Worker:
             try:
                 task = self._tasks.get(timeout=TICK if self._idle else None)
             except queue.Empty:
-                if self._idle and not self._quietly(self._idle):
-                    self._idle = None
+                self._rest()
                 continue
             if task is None:
                 return
@@ -80,13 +79,12 @@ class Worker:
             except BaseException as error:
                 future.set_exception(error)
 
-    @staticmethod
-    def _quietly(function: Callable[[], None]) -> bool:
+    def _rest(self) -> None:
         try:
-            function()
+            if self._idle:
+                self._idle()
         except Exception:  # shows itself at the next call, whose answer somebody waits for
-            return False
-        return True
+            self._idle = None
 
 
 @contextlib.contextmanager

@@ -141,7 +141,7 @@ class FolderPhotographer:
 
     def accept(self, captures: Mapping[str, str]) -> None:
         """Keep what was read, so that a later change is noticed; captures: sha256 by name."""
-        self.manifest = self.manifest.read_already(dict(captures))
+        self.manifest = replace(self.manifest, photographed={**(self.manifest.photographed or {}), **captures})
         write_manifest(self.folder, self.manifest)
 
     @property

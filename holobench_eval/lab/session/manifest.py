@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -80,10 +80,6 @@ class Manifest:
     def of_round(self, number: int) -> list[Pattern]:
         """The patterns of a round in the order of showing."""
         return [pattern for pattern in self.patterns if pattern.round == number]
-
-    def read_already(self, captures: dict[str, str]) -> Manifest:
-        """The manifest after photographs were read; captures: their sha256 by name."""
-        return replace(self, photographed={**(self.photographed or {}), **captures})
 
 
 def file_of(round_: int, number: int) -> str:

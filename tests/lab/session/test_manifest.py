@@ -38,7 +38,7 @@ def change(path, keys, value):
 
 
 @pytest.mark.parametrize(
-    ("keys", "value", "said"),
+    ("keys", "value", "line"),
     [
         (("patterns", 0, "file"), "/etc/passwd", "should be 'patterns/round-1/0001.png'"),
         (("patterns", 0, "file"), "patterns/../../secret.png", "should be"),
@@ -64,10 +64,10 @@ def change(path, keys, value):
         (("display",), "x" * 10**6, "at most 200"),
     ],
 )
-def test_a_hostile_manifest_is_refused_in_one_line(tmp_path, keys, value, said):
+def test_a_hostile_manifest_is_refused_in_one_line(tmp_path, keys, value, line):
     write_manifest(tmp_path, MANIFEST)
     change(tmp_path / "manifest.json", keys, value)
-    with pytest.raises(UserError, match=said) as caught:
+    with pytest.raises(UserError, match=line) as caught:
         read_manifest(tmp_path)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400 + len(str(tmp_path))
