@@ -83,4 +83,6 @@ def decode_levels(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16] | No
     levels: NDArray[Any] | None = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if levels is None or levels.dtype not in (np.uint8, np.uint16):
         return None
-    return levels if levels.ndim == 2 else levels[..., [2, 1, 0, 3][: levels.shape[2]]]  # OpenCV: blue first
+    if levels.ndim == 3:  # OpenCV: blue first; the usual three channels are not copied
+        levels = levels[..., ::-1] if levels.shape[2] == 3 else levels[..., [2, 1, 0, 3]]
+    return levels
