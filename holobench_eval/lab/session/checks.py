@@ -29,11 +29,10 @@ Numbered = Sequence[tuple[Pattern, Facts]]  # the photographs of a round, each w
 class Series:
     """The photographs of a round that can be used.
 
-    white: counts from which a sample is saturated; saturated: fraction of such samples by capture name; notes: what a
-    reader of the scores should know, a line each.
+    saturated: fraction of saturated samples, by capture name; notes: what a reader of the scores should know, line by
+    line.
     """
 
-    white: float
     saturated: Mapping[str, float]
     notes: tuple[str, ...]
 
@@ -72,7 +71,7 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
         notes.append("photographs have 8 bits or fewer: what is dark is rounded, which can change a ranking")
     if not all(frame.linear for _, frame in photographs):
         notes.append("photographs are JPEG, decoded as sRGB: not linear in light, so that scores are indicative only")
-    return Series(white, shares, tuple(notes)), _shortened(faults)
+    return Series(shares, tuple(notes)), _shortened(faults)
 
 
 def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:
