@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from importlib.resources import files
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -15,36 +16,98 @@ from torch import Tensor
 from ..core.errors import UserError, suggest
 from ..optics import srgb_decode
 
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Weights of linear R, G, B in relative luminance (ITU-R BT.709-6, section 3.2)."""
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear R, G, B in relative luminance (ITU-R BT.709-6, section 3.2)
 
 
 class Dataset(Protocol):
-    """A frozen dataclass of parameters; ``training`` marks images that methods may train on and nothing may score."""
+    """A source of targets: a frozen dataclass of its parameters.
+
+    A dataset of your own is one file with such a class, named in a config as ``path/to/file.py:Class`` or registered
+    as an entry point in the group ``holobench_eval.datasets``.
+
+    Attributes
+    ----------
+    training : bool
+        Methods may train on these images, and nothing may score them.
+    """
 
     training: ClassVar[bool]
 
     def items(self) -> list[str]:
-        """The names of the images, unique, in a fixed order. UserError for a source that cannot be used."""
+        """List the images.
+
+        Returns
+        -------
+        list of str
+            Unique names in a fixed order.
+
+        Raises
+        ------
+        UserError
+            The source cannot be used.
+        """
         ...
 
     def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
-        """An image as ``(channels, *shape)`` linear light in [0, 1], float32."""
+        """Load an image as a target.
+
+        Parameters
+        ----------
+        item : str
+            One of `items`.
+        shape : tuple of int
+            Rows and columns; the image is cropped to this aspect and never stretched.
+        channels : {3, 1}
+            Red, green and blue, or luminance.
+
+        Returns
+        -------
+        Tensor
+            ``(channels, *shape)`` linear light in [0, 1], float32.
+        """
         ...
 
     def digest(self, item: str) -> str:
-        """SHA-256 (hexadecimal) of what the image is made from; it changes when the image does."""
+        """Tell one version of an image from another.
+
+        Parameters
+        ----------
+        item : str
+            One of `items`.
+
+        Returns
+        -------
+        str
+            SHA-256 (hexadecimal) of what the image is made from; it changes when the image does.
+        """
         ...
 
 
 def fit(image: Tensor, shape: tuple[int, int], resampling: Image.Resampling = Image.Resampling.BILINEAR) -> Tensor:
-    """The largest centred part of an image that has the aspect of ``shape``, resized to it; never a stretch.
-
-    image: ``(C, H, W)`` linear light in [0, 1]; shape: ``(h, w)`` px. Returns ``(C, h, w)`` float32 in [0, 1].
+    """Resize the largest centred part of an image that has the aspect of ``shape``; never a stretch.
 
     The crop is not rounded to pixels, so that both axes are scaled by the same factor exactly. The filter is a
     triangle as wide as two output pixels (two input pixels where the image is too small and has to be enlarged):
-    its weights are positive, so nothing rings and the result needs no clipping. ``resampling``: another of Pillow's.
+    its weights are positive, so nothing rings and the result needs no clipping.
+
+    Parameters
+    ----------
+    image : Tensor
+        ``(C, H, W)`` linear light in [0, 1].
+    shape : tuple of int
+        Rows and columns ``(h, w)`` of the result.
+    resampling : Image.Resampling
+        Another of Pillow's filters.
+
+    Returns
+    -------
+    Tensor
+        ``(C, h, w)`` float32 in [0, 1].
+
+    Examples
+    --------
+    >>> fit(torch.rand(3, 100, 300), (64, 64)).shape
+    torch.Size([3, 64, 64])
     """
     rows, columns = shape
     height, width = image.shape[-2:]
@@ -60,7 +123,18 @@ def fit(image: Tensor, shape: tuple[int, int], resampling: Image.Resampling = Im
 
 
 def from_srgb(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> Tensor:
-    """``(H, W)`` or ``(H, W, 3)`` sRGB levels of 8 or 16 bits as ``(3, H, W)`` linear light; gray is replicated."""
+    """Decode sRGB levels.
+
+    Parameters
+    ----------
+    pixels : ndarray
+        ``(H, W)`` or ``(H, W, 3)`` of 8 or 16 bits.
+
+    Returns
+    -------
+    Tensor
+        ``(3, H, W)`` linear light, float32; gray is replicated.
+    """
     levels = np.iinfo(pixels.dtype).max + 1
     table = srgb_decode(torch.arange(levels, dtype=torch.float64) / (levels - 1)).float().numpy()
     return planes(table[pixels])
@@ -73,7 +147,15 @@ def planes(image: NDArray[np.float32]) -> Tensor:
 
 
 def with_channels(image: Tensor, channels: int) -> Tensor:
-    """``(3, h, w)`` linear light as it is for three channels, as ``(1, h, w)`` luminance for one; UserError else."""
+    """Give an image the channels that a target should have.
+
+    Parameters
+    ----------
+    image : Tensor
+        ``(3, h, w)`` linear light.
+    channels : {3, 1}
+        Three leave it as it is; one makes ``(1, h, w)`` luminance. UserError for others.
+    """
     if channels == 3:
         return image
     if channels != 1:
@@ -82,7 +164,17 @@ def with_channels(image: Tensor, channels: int) -> Tensor:
 
 
 def known(kind: str, item: str, allowed: Sequence[str]) -> str:
-    """The item itself when it is one of ``allowed``; else a UserError that suggests one. ``kind`` as 'photograph'."""
+    """Return a name if it is allowed.
+
+    Parameters
+    ----------
+    kind : str
+        What it is the name of, for the error: ``"photograph"``.
+    item : str
+        The name.
+    allowed : sequence of str
+        The names that there are; the UserError for another one suggests the nearest.
+    """
     if item not in allowed:
         raise UserError(f"unknown {kind} '{item}'; {suggest(item, allowed)}")
     return item
@@ -92,12 +184,39 @@ def chosen(kind: str, names: Sequence[str], allowed: Sequence[str]) -> list[str]
     """The names as a list, each known and given once; UserError for an empty list, an unknown or repeated name."""
     if not names:
         raise UserError(f"the list of {kind}s is empty; allowed: {', '.join(allowed)}")
-    for index, name in enumerate(names):
-        if known(kind, name, allowed) in names[:index]:
-            raise UserError(f"{kind} '{name}' is given twice in names")
+    for name in names:
+        known(kind, name, allowed)
+    refuse_repeats(kind, names, "names")
     return list(names)
 
 
+def refuse_repeats(kind: str, values: Sequence[object], field: str) -> None:
+    """UserError for a value that ``field`` lists twice."""
+    for index, value in enumerate(values):
+        if value in values[:index]:
+            raise UserError(f"{kind} '{value}' is given twice in {field}")
+
+
 def named_digest(*names: object) -> str:
-    """SHA-256 of names, for an image that is drawn from its names alone; one of them is a version of the drawing."""
+    """Digest an image that is drawn from names alone.
+
+    Parameters
+    ----------
+    *names
+        What the image depends on; one of them is a version of the drawing.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
     return hashlib.sha256("\x1f".join(str(name) for name in names).encode()).hexdigest()
+
+
+def shipped(name: str) -> bytes | None:
+    """The contents of a data file inside scikit-image; None where the installed version has it not.
+
+    ``skimage.data`` looks in a cache first and downloads what it does not find.
+    """
+    source = files("skimage").joinpath("data", name)
+    return source.read_bytes() if source.is_file() else None

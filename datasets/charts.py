@@ -14,14 +14,11 @@ from ..core.errors import UserError
 from ..optics import srgb_decode
 from .base import chosen, known, named_digest, with_channels
 
-VERSION = 1
-"""Part of every digest: raise it when a chart is drawn differently."""
+VERSION = 1  # part of every digest: raise it when a chart is drawn differently
 
-SMALLEST = 32
-"""Shortest side [px] that a chart can be drawn on; all details are legible from 160 px on."""
+SMALLEST = 32  # shortest side [px] that a chart can be drawn on; all details are legible from 160 px on
 
-SAMPLES = 6
-"""Samples a pixel and axis where the covered area of a pixel has no simple closed form."""
+SAMPLES = 6  # samples a pixel and axis where the covered area of a pixel has no simple closed form
 
 
 @dataclass(frozen=True)
@@ -149,9 +146,9 @@ def circle_grid(rows: int, columns: int) -> Tensor:
 
     def discs(y: Tensor, x: Tensor) -> Tensor:
         off_y, off_x = (torch.remainder(t / step + 0.5, 1.0) - 0.5 for t in (y, x))
-        whole = (y.abs() / step + 0.5).floor() * step + step / 2 <= rows / 2
-        whole = whole & ((x.abs() / step + 0.5).floor() * step + step / 2 <= columns / 2)
-        return (torch.hypot(off_y, off_x) < 0.3) & whole
+        uncut = (y.abs() / step + 0.5).floor() * step + step / 2 <= rows / 2
+        uncut = uncut & ((x.abs() / step + 0.5).floor() * step + step / 2 <= columns / 2)
+        return (torch.hypot(off_y, off_x) < 0.3) & uncut
 
     return _sampled(discs, rows, columns)
 

@@ -16,21 +16,17 @@ from ..core.seeds import generator
 from ..optics import srgb_decode
 from .base import known, named_digest, planes, with_channels
 
-VERSION = 1
-"""Part of every digest: raise it when the images are drawn differently."""
+VERSION = 1  # part of every digest: raise it when the images are drawn differently
 
+# radius [px] where the power law begins. The power spectrum then falls as f^-2.4; with 1 px as f^-2, with too much
+# fine detail beside photographs of this size (f^-2.8, the median over those of `photographs`).
 SMALLEST_RADIUS = 2.0
-"""Radius [px] where the power law begins. The power spectrum then falls as f^-2.4; with 1 px as f^-2, with too much
-fine detail beside photographs of this size (f^-2.8, the median over those of ``photographs``)."""
 
-LARGEST_RADIUS = 0.3
-"""Radius where the power law ends, as a fraction of the short side."""
+LARGEST_RADIUS = 0.3  # radius where the power law ends, as a fraction of the short side
 
-LAYERS = 9.0
-"""Summed area of all discs over the area they fall on: a pixel is left bare with probability exp(-9)."""
+LAYERS = 9.0  # summed area of all discs over the area they fall on: a pixel is left bare with probability exp(-9)
 
-SAMPLES = 2
-"""Samples a pixel and axis, so that edges are smooth."""
+SAMPLES = 2  # samples a pixel and axis, so that edges are smooth
 
 
 @dataclass(frozen=True)

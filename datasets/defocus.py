@@ -27,15 +27,15 @@ def defocus(image: Image, layers: NDArray[np.integer], radii: Sequence[float]) -
     bare it; so a sharp thing in front takes no light from the blurred background, nor the background from it.
     """
     reach = max(radii) + 1
-    shown = np.zeros((*image.shape[:2], image.shape[2] + 1), np.float32)
+    picture = np.zeros((*image.shape[:2], image.shape[2] + 1), np.float32)
     for layer in np.unique(layers):
         own = layers == layer
         away, (rows, columns) = distance_transform_edt(~own, return_indices=True)
         covered = own | ((layers > layer) & (away <= reach))
         sheet = np.dstack([image[rows, columns], np.ones(own.shape, np.float32)]) * covered[..., None]
         soft = blurred(sheet, radii[layer])
-        shown = shown * (1 - soft[..., -1:]) + soft
-    return np.asarray(shown[..., :-1] / shown[..., -1:], np.float32)
+        picture = picture * (1 - soft[..., -1:]) + soft
+    return np.asarray(picture[..., :-1] / picture[..., -1:], np.float32)
 
 
 def blurred(image: Image, radius: float) -> Image:

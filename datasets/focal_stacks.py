@@ -8,11 +8,9 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-import cv2
 import numpy as np
 import torch
 from annotated_types import Interval, MinLen
@@ -21,32 +19,28 @@ from PIL import Image
 from torch import Tensor
 
 from ..core.errors import UserError, suggest
+from ..core.io import decode_levels
 from . import still_life
-from .base import fit, from_srgb, known, named_digest, with_channels
+from .base import fit, from_srgb, known, named_digest, refuse_repeats, shipped, with_channels
 from .defocus import defocus
 from .images import decode, opened, read
 
-VERSION = 1
-"""Part of every digest: raise it when stacks are rendered differently."""
+VERSION = 1  # part of every digest: raise it when stacks are rendered differently
 
+# diameter of the circle of confusion for 1 mm of defocus, as a share of the picture's height. The iris of the
+# displays passes 0.8 of the panel's band, a cone of 0.8 x 517 nm / 6.4 um = 0.0646 rad from edge to edge, so that 1
+# mm out of focus a point is a disc of 0.0646 mm, and the scored window of the full panel is 0.8125 x 1080 x 6.4 um =
+# 5.616 mm high. On a smaller panel both lengths shrink with its rows. It is that of green light for all colours.
 BLUR = 0.0115
-"""Diameter of the circle of confusion for 1 mm of defocus, as a share of the picture's height.
 
-The iris of the displays passes 0.8 of the panel's band, a cone of 0.8 x 517 nm / 6.4 um = 0.0646 rad from edge to edge,
-so that 1 mm out of focus a point is a disc of 0.0646 mm, and the scored window of the full panel is
-0.8125 x 1080 x 6.4 um = 5.616 mm high. On a smaller panel both lengths shrink with its rows. It is that of green light
-for all colours."""
+LAYERS = 25  # depths that are blurred apart, evenly from far to near: a step is a sixth of a millimetre by default
 
-LAYERS = 25
-"""Depths that are blurred apart, evenly from far to near: a step is a sixth of a millimetre by default."""
+FINE = 2  # samples a pixel and axis while a stack is rendered, so that edges are smooth
 
-FINE = 2
-"""Samples a pixel and axis while a stack is rendered, so that edges are smooth."""
-
-SMALL = (48, 64)
-"""Shape of the picture by which an item is checked to have something in focus."""
+SMALL = (48, 64)  # shape of the picture by which an item is checked to have something in focus
 
 GENERATED = "shapes"
+MOTORCYCLE = "motorcycle_left.png", "motorcycle_disp.npz"
 
 Plane = Annotated[float, Interval(ge=-50, le=50)]
 
@@ -75,10 +69,8 @@ class FocalStacks:
 
     def __post_init__(self) -> None:
         """UserError for a repeated scene or plane, and for a depth without extent."""
-        for kind, given in (("scene", [_title(name) for name in self.scenes]), ("plane", list(self.planes))):
-            for index, one in enumerate(given):
-                if one in given[:index]:
-                    raise UserError(f"{kind} '{one}' is given twice in {kind}s")
+        refuse_repeats("scene", [_title(name) for name in self.scenes], "scenes")
+        refuse_repeats("plane", self.planes, "planes")
         if self.near <= self.far:
             raise UserError(f"near is to be larger than far, got {self.near:g} and {self.far:g} mm")
 
@@ -149,8 +141,8 @@ def _render(
     return torch.nn.functional.avg_pool2d(torch.from_numpy(fine).permute(2, 0, 1), FINE)
 
 
+# A picture `(h, w, 3)` in linear light and its nearness `(h, w)` from 0, far, to 1, near, for a shape
 Source = Callable[[tuple[int, int]], tuple[NDArray[np.floating], NDArray[np.floating]]]
-"""A picture ``(h, w, 3)`` in linear light and its nearness ``(h, w)`` from 0, far, to 1, near, for a shape."""
 
 
 def _title(scene: str) -> str:
@@ -207,15 +199,14 @@ def _read(scene: str, _digest: str) -> tuple[Tensor, Tensor]:
 def _files(scene: str) -> tuple[bytes, bytes]:
     """Contents of the picture and of the depth. UserError says what is missing and how to get it."""
     if scene == "motorcycle":
-        folder = files("skimage").joinpath("data")
-        parts = [folder.joinpath(name) for name in ("motorcycle_left.png", "motorcycle_disp.npz")]
-        lacking = [part.name for part in parts if not part.is_file()]
-        if lacking:
+        picture, disparity = (shipped(name) for name in MOTORCYCLE)
+        if picture is None or disparity is None:
+            lacking = [name for name, part in zip(MOTORCYCLE, (picture, disparity), strict=True) if part is None]
             raise UserError(
                 f"scene 'motorcycle': {' and '.join(lacking)} not in the installed scikit-image; "
                 "install scikit-image 0.26.0, whose wheel has both, or leave the scene out"
             )
-        return parts[0].read_bytes(), parts[1].read_bytes()
+        return picture, disparity
     if not Path(scene).is_dir():
         near = suggest(scene, [GENERATED, f"{GENERATED}-2", "motorcycle"])
         raise UserError(f"unknown scene '{scene}'; {near}, or a folder with image.png and depth.png")
@@ -229,8 +220,8 @@ def _files(scene: str) -> tuple[bytes, bytes]:
 def _depth_levels(content: bytes, name: str) -> NDArray[np.float64]:
     if opened(content, name).format != "PNG":
         raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")
-    levels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if levels is None or levels.ndim != 2 or levels.dtype not in (np.uint8, np.uint16):
+    levels = decode_levels(content)
+    if levels is None or levels.ndim != 2:
         raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")
     return levels.astype(np.float64)
 
@@ -239,9 +230,9 @@ def _without_holes(disparity: NDArray[np.float64]) -> NDArray[np.float64]:
     """Holes of a disparity map get the smaller of the values at both their ends in the row: what only one camera sees
     belongs to the background."""
     filled = []
-    for one in (disparity, disparity[:, ::-1]):
-        columns = np.where(np.isfinite(one), np.arange(one.shape[1]), 0)
+    for view in (disparity, disparity[:, ::-1]):
+        columns = np.where(np.isfinite(view), np.arange(view.shape[1]), 0)
         last = np.maximum.accumulate(columns, axis=1)
-        filled.append(np.take_along_axis(one, last, axis=1))
+        filled.append(np.take_along_axis(view, last, axis=1))
     both = np.fmin(filled[0], filled[1][:, ::-1])
     return np.where(np.isfinite(both), both, np.nanmin(disparity))

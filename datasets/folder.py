@@ -16,8 +16,7 @@ from ..core.errors import UserError, suggest
 from .base import fit, with_channels
 from .images import SUFFIXES, SixteenBit, decode, read
 
-LARGEST_MANIFEST = 10_000_000
-"""Bytes; a hundred thousand lines."""
+LARGEST_MANIFEST = 10_000_000  # bytes; a hundred thousand lines
 
 _MANIFEST_LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](.+)")
 
@@ -169,19 +168,19 @@ def _manifest(path: Path, version: Version) -> dict[str, str]:
     for number, line in enumerate(lines, start=1):
         if not line.strip():
             continue
-        found = _MANIFEST_LINE.fullmatch(line.rstrip("\r"))
-        if found is None:
+        parts = _MANIFEST_LINE.fullmatch(line.rstrip("\r"))
+        if parts is None:
             raise UserError(
                 f"{path}:{number}: not a line of sha256sum; expected 64 hexadecimal digits, two spaces, a path"
             )
-        name = str(PurePosixPath(found[2]))
+        name = str(PurePosixPath(parts[2]))
         if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
             raise UserError(f"{path}:{number}: '{name[:80]}' leaves the folder; expected a path inside it")
         if not name.isprintable() or "\\" in name:
             raise UserError(f"{path}:{number}: the file name {name[:80]!a} cannot be used; expected plain characters")
         if name in sums:
             raise UserError(f"{path}:{number}: '{name[:80]}' is listed twice")
-        sums[name] = found[1].lower()
+        sums[name] = parts[1].lower()
     if not sums:
         raise UserError(f"{path}: the manifest is empty; write one with: sha256sum *.png > SHA256SUMS")
     return sums

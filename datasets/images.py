@@ -11,29 +11,27 @@ import warnings
 from pathlib import Path
 from typing import Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 from torch import Tensor
 
 from ..core.errors import UserError
+from ..core.io import decode_levels
 from .base import from_srgb, planes
 
+# what 16-bit levels mean: nothing certain, sRGB levels, or linear light
 SixteenBit = Literal["refuse", "srgb", "linear"]
-"""What 16-bit levels mean: nothing certain, sRGB levels, or linear light."""
 
+# formats that are opened at all; Pillow would hand others to outside programs
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
-"""Formats that are opened at all; Pillow would hand others to outside programs."""
 
+# file names (lower case) that are taken for images
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".gif"})
-"""File names (lower case) that are taken for images."""
 
-LARGEST_PIXELS = 64_000_000
-"""More than any panel shows; a small file can claim far more and fill the memory."""
+LARGEST_PIXELS = 64_000_000  # more than any panel shows; a small file can claim far more and fill the memory
 
-LARGEST_BYTES = 512_000_000
-"""Enough for the largest image in 16 bits without compression."""
+LARGEST_BYTES = 512_000_000  # enough for the largest image in 16 bits without compression
 
 RIGHT = "expected an 8-bit RGB image in sRGB"
 
@@ -54,8 +52,7 @@ _MODES = {
 _BITS_PER_SAMPLE = 258  # TIFF 6.0, section 8
 _ORIENTATION = 274  # Exif 2.32, section 4.6.4
 
-PNG_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"
-"""The last chunk of every PNG (PNG specification, section 11.2.4)."""
+PNG_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"  # the last chunk of every PNG (PNG specification, section 11.2.4)
 
 
 def read(path: Path) -> bytes:
@@ -83,14 +80,14 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     image = opened(content, name)
     if image.format == "PNG" and PNG_END not in content:  # Pillow is content with all pixels
         raise UserError(f"{name}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
-    found = _fault(image, gray)
+    fault = _fault(image, gray)
     bits = _bits(image, content)
-    if found is None and bits == 16 and sixteen_bit == "refuse":
-        found = "a 16-bit image (sixteen_bit: srgb or linear would say what its levels mean)"
-    if found is None and bits not in (8, 16):
-        found = f"a {bits}-bit image"
-    if found is not None:
-        raise UserError(f"{name}: {found}; {RIGHT}")
+    if fault is None and bits == 16 and sixteen_bit == "refuse":
+        fault = "a 16-bit image (sixteen_bit: srgb or linear would say what its levels mean)"
+    if fault is None and bits not in (8, 16):
+        fault = f"a {bits}-bit image"
+    if fault is not None:
+        raise UserError(f"{name}: {fault}; {RIGHT}")
     _refuse_other_colours(image, name)
     turned, stored_upright = _load(image, name)
     if bits == 8:
@@ -171,10 +168,10 @@ def _load(image: Image.Image, name: str) -> tuple[Image.Image, bool]:
 
 def _deep(content: bytes, name: str) -> NDArray[np.uint16]:
     """``(H, W)`` or ``(H, W, 3)`` 16-bit levels, by OpenCV, which keeps them in RGB where Pillow does not."""
-    pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if pixels is None or pixels.dtype != np.uint16:
+    levels = decode_levels(content)
+    if levels is None or levels.dtype != np.uint16:
         raise UserError(f"{name}: a 16-bit image that OpenCV cannot read; {RIGHT}, or a 16-bit PNG")
-    return (pixels if pixels.ndim == 2 else pixels[..., ::-1]).astype(np.uint16)
+    return levels.astype(np.uint16)
 
 
 def _line(error: Exception) -> str:

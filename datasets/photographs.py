@@ -6,7 +6,6 @@ import hashlib
 import io
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -15,8 +14,9 @@ from PIL import Image
 from torch import Tensor
 
 from ..core.errors import UserError
-from .base import chosen, fit, from_srgb, known, with_channels
+from .base import chosen, fit, from_srgb, known, shipped, with_channels
 
+# name and file, in the order in which `count` takes them: six in colour, then the gray ones
 FILES = {
     "astronaut": "astronaut.png",
     "coffee": "coffee.png",
@@ -30,7 +30,6 @@ FILES = {
     "gravel": "gravel.png",
     "text": "text.png",
 }
-"""Name and file, in the order in which ``count`` takes them: six in colour, then the gray ones."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +68,10 @@ class Photographs:
 
 
 def _content(name: str) -> bytes:
-    # Not by skimage.data.<name>(), which looks in a cache first and downloads what it does not find.
-    source = files("skimage").joinpath("data", FILES[name])
-    if not source.is_file():
+    content = shipped(FILES[name])
+    if content is None:
         raise UserError(f"photograph '{name}' is not in the installed scikit-image; install scikit-image>=0.25")
-    return source.read_bytes()
+    return content
 
 
 @cache

@@ -13,22 +13,17 @@ from numpy.typing import NDArray
 from ..core.seeds import generator
 from ..optics import srgb_decode
 
-VERSION = 1
-"""Part of every digest: raise it when the scene is drawn differently."""
+VERSION = 1  # part of every digest: raise it when the scene is drawn differently
 
 Array = NDArray[np.float64]
 
+# height of the floor and distance of the wall, with the eye at the origin, y upwards and z away from it
 FLOOR, WALL = -1.0, 9.0
-"""Height of the floor and distance of the wall, with the eye at the origin, y upwards and z away from it."""
-NEAREST = 2.25
-"""The distance that is mapped to the near end of the depth; a strip of floor before it counts as there."""
-BANDS = ((2.4, 2.6), (3.7, 4.0), (7.2, 7.8))
-"""Distances in which objects stand: near, in the middle, far."""
-TILT, HEIGHT = 0.12, 0.75
-"""How far the middle of the picture lies below the horizon, and its height, at distance 1."""
+NEAREST = 2.25  # the distance that is mapped to the near end of the depth; a strip of floor before it counts as there
+BANDS = ((2.4, 2.6), (3.7, 4.0), (7.2, 7.8))  # distances in which objects stand: near, in the middle, far
+TILT, HEIGHT = 0.12, 0.75  # how far the middle of the picture lies below the horizon, and its height, at distance 1
 LIGHT = np.array([-0.45, 0.75, -0.48]) / np.linalg.norm([-0.45, 0.75, -0.48])
-AMBIENT = 0.25
-"""Share of the light that comes from everywhere."""
+AMBIENT = 0.25  # share of the light that comes from everywhere
 
 
 class Surface(Protocol):
@@ -68,22 +63,22 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Plane:
-    """An endless plane at ``place`` of an axis; its normal points to the eye."""
+    """An endless plane at ``position`` of an axis; its normal points to the eye."""
 
     axis: int
-    place: float
+    position: float
     pattern: Pattern
 
     def distance(self, start: Array, ray: Array) -> Array:
         """See ``Surface``."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            way = (self.place - start[self.axis]) / ray[self.axis]
+            way = (self.position - start[self.axis]) / ray[self.axis]
         return np.where(way > 1e-6, way, np.inf)
 
     def appearance(self, points: Array) -> tuple[Array, Array]:
         """See ``Surface``."""
         normal = np.zeros_like(points)
-        normal[self.axis] = -np.sign(self.place)
+        normal[self.axis] = -np.sign(self.position)
         u, v = (points[axis] for axis in range(3) if axis != self.axis)
         return normal, self.pattern.at(u, v)
 
@@ -178,13 +173,13 @@ def _surfaces(name: str) -> list[Surface]:
         Plane(2, WALL, Pattern("bricks", colours(0.6), 0.9)),
         Plane(1, FLOOR, Pattern("checks", colours(0.3), 0.4)),
     ]
-    places = zip((0, 2, 1, 0, 2, 1), ("dots", "stripes", "checks", "stripes", "dots", "checks"), strict=True)
+    stands = zip((0, 2, 1, 0, 2, 1), ("dots", "stripes", "checks", "stripes", "dots", "checks"), strict=True)
     side = 1 if number(0, 1) < 0.5 else -1
-    for place, (band, kind) in enumerate(places):
+    for index, (band, kind) in enumerate(stands):
         z = number(*BANDS[band])
         upright = kind == "checks"
         radius = number(0.08, 0.11) * z * (0.6 if upright else 1.0)
-        x = side * (0.118 * (place - 2.5) + number(-0.02, 0.02)) * z
+        x = side * (0.118 * (index - 2.5) + number(-0.02, 0.02)) * z
         top = number(-0.06, 0.0) * z if upright else FLOOR + radius
         pattern = Pattern(kind, colours(0.9), number(0.025, 0.05) * z)
         surfaces.append(Round(np.array([x, top, z]), radius, upright, pattern))

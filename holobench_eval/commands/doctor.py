@@ -53,8 +53,8 @@ print("\\n" + json.dumps(found))
 
 DRIVERS = """
 import dataclasses, json
-from holobench_eval.lab.drivers.catalogue import found
-print("\\n" + json.dumps([dataclasses.asdict(one) for one in found()]), flush=True)
+from holobench_eval.lab.drivers.catalogue import survey
+print("\\n" + json.dumps([dataclasses.asdict(entry) for entry in survey()]), flush=True)
 import os
 os._exit(0)  # without waiting for what a driver left running
 """

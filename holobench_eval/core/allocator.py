@@ -5,12 +5,9 @@ from __future__ import annotations
 import ctypes
 from functools import cache
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
-"""Names of glibc's parameters, mallopt(3)."""
-LARGEST_KEPT = 32 * 2**20
-"""Bytes of the largest array that glibc keeps at all: larger ones come from the system each time."""
-KEPT = 2**30
-"""Bytes."""
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # mallopt(3) of glibc
+LARGEST_KEPT = 32 * 2**20  # bytes of the largest array that glibc keeps; larger ones come from the system each time
+KEPT = 2**30  # bytes
 
 
 @cache

@@ -54,10 +54,10 @@ def moved(value: Any, device: torch.device) -> Any:
     if isinstance(value, Tensor):
         return value.to(device)
     if isinstance(value, Mapping):
-        there = {key: moved(one, device) for key, one in value.items()}
-        return value if all(there[key] is one for key, one in value.items()) else there
+        mapping = {key: moved(item, device) for key, item in value.items()}
+        return value if all(mapping[key] is item for key, item in value.items()) else mapping
     if isinstance(value, list | tuple):
-        listed = [moved(one, device) for one in value]
+        listed = [moved(item, device) for item in value]
         return value if all(a is b for a, b in zip(listed, value, strict=True)) else type(value)(listed)
     return value
 

@@ -7,15 +7,16 @@ import re
 import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from torch import Tensor
 
 from .hashing import digest
 
-TEMPORARY = ".writing-"
-"""How the name of a file begins that is not whole yet."""
+TEMPORARY = ".writing-"  # how the name of a file begins that is not whole yet
 
 
 def now() -> str:
@@ -24,7 +25,28 @@ def now() -> str:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name in the same folder, then rename it: readers see all of it or nothing."""
+    """Write a file under a temporary name in the same folder, then rename it: readers see all of it or nothing.
+
+    Parameters
+    ----------
+    path : Path
+        The file. Its folder is created where there is none, and a file of this name is replaced.
+    content : bytes
+        What the file holds afterwards.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; nothing is left behind, and an older file of this name stays as it was.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> path = Path(mkdtemp(), "new folder", "note.txt")
+    >>> write_atomically(path, b"all or nothing")
+    >>> path.read_bytes()
+    b'all or nothing'
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=TEMPORARY, dir=path.parent)
     temporary = Path(name)
@@ -57,3 +79,16 @@ def write_png(path: Path, levels: Tensor, bits: int) -> None:
     if not encoded:
         raise OSError(f"{path}: a picture of the shape {tuple(levels.shape)} cannot be written as PNG")
     write_atomically(path, buffer.tobytes())
+
+
+def decode_levels(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16] | None:
+    """The levels of an encoded picture as they are stored, ``(H, W)`` or ``(H, W, C)`` with red first.
+
+    None for what OpenCV cannot read, and for samples of neither 8 nor 16 bits. Pillow would give RGB of 16 bits as 8.
+    """
+    levels: NDArray[Any] | None = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if levels is None or levels.dtype not in (np.uint8, np.uint16):
+        return None
+    if levels.ndim == 3:  # OpenCV: blue first; the usual three channels are not copied
+        levels = levels[..., ::-1] if levels.shape[2] == 3 else levels[..., [2, 1, 0, 3]]
+    return levels

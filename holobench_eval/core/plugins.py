@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import json
 import sys
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from functools import cache, lru_cache
-from importlib.machinery import SourceFileLoader
+from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import CodeType
-from typing import Any, Literal, get_args, get_type_hints
+from types import CodeType, ModuleType
+from typing import Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from .errors import UserError, suggest
 from .hashing import canonical
+from .schema import checked
 
 Kind = Literal["methods", "datasets"]
 
@@ -34,10 +34,31 @@ def names(kind: Kind) -> list[str]:
 
 
 def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
-    """The class registered as ``name``, or the class in a file when ``name`` is ``path/to/file.py:Class``.
+    """Find the class of a method or a dataset.
 
-    A relative path is taken from ``folder`` (the folder of the config that names it) first, then from the
-    working directory.
+    Parameters
+    ----------
+    kind : {"methods", "datasets"}
+        What it is.
+    name : str
+        The name of an entry point, or ``path/to/file.py:Class``.
+    folder : Path, optional
+        Where a relative path starts (the folder of the config that names it); the working directory is tried after it.
+
+    Returns
+    -------
+    type
+        A dataclass.
+
+    Raises
+    ------
+    UserError
+        An unknown name, a file that fails to import, or a class that is no method or dataset.
+
+    Examples
+    --------
+    >>> find("datasets", "charts").__name__
+    'Charts'
     """
     if _is_file(name):
         return _from_file(kind, name, folder)
@@ -45,7 +66,7 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
     if name not in entries:
         raise UserError(f"unknown {kind[:-1]} '{name}'; {suggest(name, entries)}, or path/to/file.py:Class")
     try:
-        return _checked(kind, name, entries[name].load())
+        return _plugin_class(kind, name, entries[name].load())
     except (ImportError, AttributeError) as error:
         raise UserError(f"{kind[:-1]} '{name}' cannot be imported: {error}") from error
 
@@ -65,52 +86,50 @@ class _FromSource(SourceFileLoader):
         return self.source_to_code(self.get_data(self.path), self.path)
 
 
+def import_file(path: Path) -> ModuleType:
+    """Import a Python file from its source, anew each time: nothing that one cell computes may reach the next.
+
+    Parameters
+    ----------
+    path : Path
+        The file. Its module has a name of its own for every path.
+
+    Raises
+    ------
+    Exception
+        Whatever the file raises while it runs; OSError where it cannot be read.
+    """
+    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
+    loader = _FromSource(f"holobench_user_{path.stem}_{unique}", str(path))
+    module = importlib.util.module_from_spec(ModuleSpec(loader.name, loader, origin=str(path)))
+    module.__file__ = str(path)
+    sys.modules[loader.name] = module  # dataclasses look their module up
+    loader.exec_module(module)
+    return module
+
+
 def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     file, _, attribute = name.rpartition(":")
     candidates = [Path(file)] if folder is None else [folder / file, Path(file)]
     path = next((path for path in candidates if path.is_file()), None)
     if path is None:
         raise UserError(f"{kind[:-1]} '{name}': no such file: {candidates[0]}")
-    # the name differs from path to path, and the module is registered since dataclasses look their module up
-    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
-    unique = f"holobench_user_{path.stem}_{unique}"
-    spec = importlib.util.spec_from_file_location(unique, path, loader=_FromSource(unique, str(path)))
-    if spec is None or spec.loader is None:
-        raise UserError(f"{kind[:-1]} '{name}': {path} is no Python file")
-    module = importlib.util.module_from_spec(spec)  # anew each time: no cell may depend on those computed before it
-    sys.modules[spec.name] = module
     try:
-        spec.loader.exec_module(module)
+        module = import_file(path)
     except (Exception, SystemExit) as error:
         raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {type(error).__name__}: {error}") from error
-    found = getattr(module, attribute, None)
-    if found is None:
+    cls = getattr(module, attribute, None)
+    if cls is None:
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and is_dataclass(value)]
         raise UserError(f"{kind[:-1]} '{name}': {path} has no class '{attribute}'; {suggest(attribute, classes)}")
-    return _checked(kind, name, found)
+    return _plugin_class(kind, name, cls)
 
 
-def _checked(kind: Kind, name: str, found: Any) -> type[Any]:
-    needed = "solve" if kind == "methods" else "items"
-    if not (isinstance(found, type) and is_dataclass(found) and hasattr(found, needed)):
-        raise UserError(f"{kind[:-1]} '{name}' is not a dataclass with a method '{needed}'; see CONTRIBUTING.md")
-    return found
-
-
-def _check_nested(who: str, cls: type[Any], params: dict[str, Any], place: str) -> None:
-    """Refuse keys of nested parameters that are no fields of the dataclass they are for; pydantic would drop them."""
-    mappings = {key: value for key, value in params.items() if isinstance(value, dict)}
-    hints = get_type_hints(cls) if mappings else {}  # a tenth of a millisecond, for every cell
-    for key, value in mappings.items():
-        nested = [part for part in (hints.get(key), *get_args(hints.get(key))) if isinstance(part, type)]
-        inner = next((part for part in nested if is_dataclass(part)), None)
-        if inner is None:
-            continue
-        allowed = [item.name for item in fields(inner)]
-        for name in value:
-            if name not in allowed:
-                raise UserError(f"{who} has no parameter '{place}{key}.{name}'; {suggest(name, allowed)}")
-        _check_nested(who, inner, value, f"{place}{key}.")
+def _plugin_class(kind: Kind, name: str, cls: Any) -> type[Any]:
+    function = "solve" if kind == "methods" else "items"
+    if not (isinstance(cls, type) and is_dataclass(cls) and hasattr(cls, function)):
+        raise UserError(f"{kind[:-1]} '{name}' is not a dataclass with a method '{function}'; see CONTRIBUTING.md")
+    return cls
 
 
 @cache
@@ -120,26 +139,40 @@ def _kept_adapter(kind: Kind, name: str) -> TypeAdapter[Any]:
 
 
 def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = None) -> Any:
-    """An instance with validated parameters; a wrong key, type or range is one line naming the parameter."""
+    """Build a method or a dataset.
+
+    Parameters
+    ----------
+    kind, name, folder
+        As in `find`.
+    params : dict
+        Its parameters, as a config gives them.
+
+    Returns
+    -------
+    object
+        An instance, with keys, types and ranges of its parameters checked.
+
+    Raises
+    ------
+    UserError
+        A wrong key, type or range, in one line that names the parameter (`schema.FieldError`), or whatever the class
+        itself refuses.
+
+    Examples
+    --------
+    >>> build("methods", "gerchberg_saxton", {"iterations": 5}).iterations
+    5
+    """
     cls = find(kind, name, folder)
-    known = set(cls.__dataclass_fields__)
-    for key in params:
-        if key not in known:
-            raise UserError(f"{kind[:-1]} '{name}' has no parameter '{key}'; {suggest(key, known)}")
-    _check_nested(f"{kind[:-1]} '{name}'", cls, params, "")
+    owner = f"{kind[:-1]} '{name}'"
     try:
-        adapter: TypeAdapter[Any] = TypeAdapter(cls) if _is_file(name) else _kept_adapter(kind, name)
-        return adapter.validate_json(json.dumps(params), strict=True)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        message = first["msg"][:1].lower() + first["msg"][1:]
-        raise UserError(f"{kind[:-1]} '{name}': parameter '{where}': {message}, got {first['input']!r}") from error
+        return checked(cls, params, owner, TypeAdapter(cls) if _is_file(name) else _kept_adapter(kind, name))
     except UserError:
         raise
     except Exception as error:  # whatever a stranger's class does when it is built
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise UserError(f"{kind[:-1]} '{name}' cannot be built: {reason}") from error
+        raise UserError(f"{owner} cannot be built: {reason}") from error
 
 
 def params_of(plugin: Any) -> dict[str, Any]:

@@ -14,5 +14,24 @@ def seed(*names: object) -> int:
 
 
 def generator(*names: object) -> torch.Generator:
-    """A CPU generator seeded by names. Draw on the CPU and move: every device then gets the same numbers."""
+    """A random generator on the CPU that depends on names only.
+
+    Draw on the CPU and move what was drawn: every device then gets the same numbers.
+
+    Parameters
+    ----------
+    *names
+        What the numbers should depend on; their texts are hashed, and their order counts.
+
+    Returns
+    -------
+    torch.Generator
+        A new generator, seeded with `seed` of the names.
+
+    Examples
+    --------
+    >>> first, second = (torch.rand(1, generator=generator("read noise", 3)) for _ in range(2))
+    >>> bool(first == second)
+    True
+    """
     return torch.Generator().manual_seed(seed(*names))

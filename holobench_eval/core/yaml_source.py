@@ -21,8 +21,7 @@ DEEPEST = 20
 
 _CORE = "tag:yaml.org,2002:"
 
-Keys = tuple[str | int, ...]
-"""Where a value is: ``("methods", 2, "params")``."""
+Keys = tuple[str | int, ...]  # where a value is: `("methods", 2, "params")`
 
 
 class Position(NamedTuple):
@@ -56,7 +55,28 @@ class Document:
 
 
 def load(path: Path) -> Document:
-    """Read a YAML mapping; every fault is a one-line UserError with its position."""
+    """Read a YAML file that holds a mapping.
+
+    Parameters
+    ----------
+    path : Path
+        The file, of at most `LARGEST_BYTES` in UTF-8.
+
+    Returns
+    -------
+    Document
+        Its values, and where each of them stands.
+
+    Raises
+    ------
+    UserError
+        The first fault in one line, with its line and column where it has any.
+
+    Examples
+    --------
+    >>> parse("note.yaml", "name: leto").data
+    {'name': 'leto'}
+    """
     return parse(str(path), _read(path))
 
 
@@ -79,17 +99,17 @@ def parse(name: str, text: str) -> Document:
     try:
         root = _Loader(text).get_single_node()
     except yaml.MarkedYAMLError as error:
-        raise UserError(f"{name}:{_place(error)}: {_sentence(error)}") from error
+        raise UserError(f"{name}:{_line_and_column(error)}: {_sentence(error)}") from error
     except yaml.YAMLError as error:
         raise UserError(f"{name}: not YAML: {' '.join(str(error).split())}") from error
     if not isinstance(root, yaml.MappingNode):
-        found = "is empty" if root is None else "is not a mapping"
-        raise UserError(f"{name}:1:1: the file {found}; expected 'key: value' lines")
+        fault = "is empty" if root is None else "is not a mapping"
+        raise UserError(f"{name}:1:1: the file {fault}; expected 'key: value' lines")
     data = reader.value(root, ())
     return Document(name, text, data, reader.keys, reader.values)
 
 
-def _place(error: yaml.MarkedYAMLError) -> str:
+def _line_and_column(error: yaml.MarkedYAMLError) -> str:
     mark = error.problem_mark or error.context_mark
     return "1:1" if mark is None else f"{mark.line + 1}:{mark.column + 1}"
 

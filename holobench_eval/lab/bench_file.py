@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from annotated_types import Interval, MinLen
 
 from ..core.errors import UserError
-from ..core.schema import check_keys, typed
+from ..core.schema import typed
 from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL, Panel
 from ..imaging.convention import Convention
@@ -47,7 +47,6 @@ def load_bench_file(path: Path) -> BenchFile:
     if not path.is_file():
         raise UserError(f"bench '{path}': no such file")
     document = load(path)
-    check_keys(document, BenchFile, document.data)
     bench = typed(document, BenchFile)
     if min(bench.panel.shape) < SMALLEST_PANEL:
         raise document.error(("panel", "shape"), f"a panel has at least {SMALLEST_PANEL} pixels a side")

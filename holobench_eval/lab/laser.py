@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
-import importlib.util
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Annotated, Protocol
 
 from annotated_types import Interval
 
 from ..core.errors import UserError
+from ..core.plugins import import_file
 from .devices import DeviceError
 
 
@@ -57,10 +56,10 @@ def laser(settings: LaserSettings | None, channels: int, folder: Path, ask: Call
     if bool(settings.command) == bool(settings.callable):
         raise UserError("laser: give either 'command' or 'callable'")
     if settings.callable:
-        return FunctionLaser(settings.callable, _function(settings.callable, folder))
+        return SwitchedLaser(settings.callable, _function(settings.callable, folder))
     if not any("{channel}" in part for part in settings.command):
         raise UserError("laser.command: one argument must hold {channel}, which stands for 0, 1, 2 or off")
-    return CommandLaser(settings.command, settings.timeout, folder)
+    return SwitchedLaser(settings.command[0], partial(_run, settings.command, settings.timeout, folder))
 
 
 @dataclass
@@ -81,43 +80,8 @@ class SteadyLaser:
 
 
 @dataclass(frozen=True)
-class CommandLaser:
-    """Runs a program, without a shell, for every change of the channel."""
-
-    command: tuple[str, ...]
-    timeout: float
-    folder: Path
-
-    def select(self, channel: int | None) -> None:
-        """Run the command. DeviceError when it fails, is not there, or takes longer than its time."""
-        word = "off" if channel is None else str(channel)
-        arguments = [part.replace("{channel}", word) for part in self.command]
-        try:
-            done = subprocess.run(
-                arguments,
-                cwd=self.folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=self.timeout,
-            )
-        except subprocess.TimeoutExpired:
-            raise DeviceError(f"laser: '{arguments[0]}' takes longer than {self.timeout:g} s") from None
-        except (OSError, ValueError) as error:
-            raise DeviceError(f"laser: '{arguments[0]}' does not run: {error}") from error
-        if done.returncode:
-            said = (done.stderr.strip() or done.stdout.strip() or "without a word").splitlines()[-1]
-            raise DeviceError(f"laser: '{arguments[0]}' ended with {done.returncode} for channel {word}: {said[:200]}")
-
-    def close(self) -> None:
-        """Switch off."""
-        self.select(None)
-
-
-@dataclass(frozen=True)
-class FunctionLaser:
-    """Calls a user's Python function for every change of the channel."""
+class SwitchedLaser:
+    """Calls a function for every change of the channel: a user's, or one that runs a user's program."""
 
     name: str
     function: Callable[[int | None], object]
@@ -126,6 +90,8 @@ class FunctionLaser:
         """Call it. DeviceError with whatever it raises."""
         try:
             self.function(channel)
+        except DeviceError:
+            raise
         except Exception as error:
             raise DeviceError(f"laser: {self.name}({channel}): {type(error).__name__}: {error}") from error
 
@@ -134,26 +100,38 @@ class FunctionLaser:
         self.select(None)
 
 
+def _run(command: Sequence[str], timeout: float, folder: Path, channel: int | None) -> None:
+    """Run a program, without a shell. DeviceError when it fails, is not there, or takes longer than its time."""
+    word = "off" if channel is None else str(channel)
+    program, *arguments = (part.replace("{channel}", word) for part in command)
+    try:
+        done = subprocess.run(
+            [program, *arguments],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=timeout,
+        )
+    except subprocess.TimeoutExpired:
+        raise DeviceError(f"laser: '{program}' takes longer than {timeout:g} s") from None
+    except (OSError, ValueError) as error:
+        raise DeviceError(f"laser: '{program}' does not run: {error}") from error
+    if done.returncode:
+        answer = (done.stderr.strip() or done.stdout.strip() or "without a word").splitlines()[-1]
+        raise DeviceError(f"laser: '{program}' ended with {done.returncode} for channel {word}: {answer[:200]}")
+
+
 def _function(name: str, folder: Path) -> Callable[[int | None], object]:
-    place, _, attribute = name.rpartition(":")
-    if not place:
+    source, _, attribute = name.rpartition(":")
+    if not source:
         raise UserError(f"laser.callable '{name}' should be path/to/file.py:function or module:function")
     try:
-        module = _file(folder / place) if place.endswith(".py") else importlib.import_module(place)
+        module = import_file(folder / source) if source.endswith(".py") else importlib.import_module(source)
     except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
         raise UserError(f"laser.callable '{name}' cannot be imported: {type(error).__name__}: {error}") from error
-    found = getattr(module, attribute, None)
-    if not callable(found):
-        raise UserError(f"laser.callable '{name}': there is no function '{attribute}' in {place}")
-    function: Callable[[int | None], object] = found
+    function: Callable[[int | None], object] | None = getattr(module, attribute, None)
+    if not callable(function):
+        raise UserError(f"laser.callable '{name}': there is no function '{attribute}' in {source}")
     return function
-
-
-def _file(path: Path) -> ModuleType:
-    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
-    spec = importlib.util.spec_from_file_location(f"holobench_user_{path.stem}_{unique}", path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{path} is no Python file")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

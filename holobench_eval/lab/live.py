@@ -12,14 +12,15 @@ from ..methods.wirtinger import Wirtinger
 from .bench_file import BenchFile
 from .devices import Camera, DeviceError, Slm
 from .drivers.catalogue import checked_params, open_camera, open_slm
+from .drivers.worker import closed_on_failure
 from .laser import laser
 from .photograph import Request
 from .real import RealBench
 from .rig import Rig
-from .test_pattern import letter
+from .test_pattern import draw_pattern
 
-START = Wirtinger(iterations=30, initial_phase="random")
-"""Of the letter: a smooth phase would leave a ghost of it on the wrong side of the panel."""
+# of the test pattern's hologram: a smooth phase would leave a ghost on the wrong side of the panel
+SOLVER = Wirtinger(iterations=30, initial_phase="random")
 
 
 def open_live(bench: BenchFile, folder: Path, seed: int) -> RealBench:
@@ -34,9 +35,9 @@ def open_live(bench: BenchFile, folder: Path, seed: int) -> RealBench:
     atexit.register(rig.close)
     print(f"panel: {slm.name}; camera: {camera.name}")
     real = RealBench(spec, rig, bench.panel.blaze, bench.residual_bound, seed)
-    target = letter(spec.region.shape).float().expand(len(spec.wavelengths), -1, -1)
-    handle = real.for_method(START, "letter", target, "letter", 0)
-    phase = START.solve(target[None], handle)[0]
+    target = draw_pattern(spec.region.shape).float().expand(len(spec.wavelengths), -1, -1)
+    handle = real.for_method(SOLVER, "letter", target, "letter", 0)  # names that its seed depends on
+    phase = SOLVER.solve(target[None], handle)[0]
     rig.prepare(Request(real.shown(phase), real.relative_exposure(target), "letter", ()), print)
     return real
 
@@ -46,14 +47,11 @@ def _devices(bench: BenchFile) -> tuple[Slm, Camera]:
     checked_params("camera", *camera)  # before a panel is opened for nothing
     try:
         slm = open_slm(*panel)
-        try:
+        with closed_on_failure(slm.close):
             if slm.shape != bench.panel.shape:
                 shape = list(bench.panel.shape)
                 raise UserError(f"panel.shape is {shape}, but {slm.name} has {list(slm.shape)} pixels")
             return slm, open_camera(*camera)
-        except BaseException:
-            slm.close()
-            raise
     except DeviceError as error:
         raise UserError(f"bench '{bench.name}': {error}") from error
 

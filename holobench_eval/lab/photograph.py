@@ -8,10 +8,8 @@ from typing import Protocol
 
 from torch import Tensor
 
-MOST_SATURATED = 0.001
-"""Largest fraction of saturated samples with which a capture is used (protocol v1, step 1)."""
-BLUE_BELOW, RED_ABOVE = 490e-9, 580e-9
-"""Metres."""
+MOST_SATURATED = 0.001  # fraction of saturated samples with which a capture is still used (protocol v1, step 1)
+BLUE_BELOW, RED_ABOVE = 490e-9, 580e-9  # metres
 
 
 @dataclass(frozen=True)
@@ -19,8 +17,8 @@ class Photograph:
     """One colour-sequential photograph.
 
     light: ``(C, Hs, Ws)`` float32, proportional to the light on the sensor, dark frame subtracted in float, divided
-    by the exposure: counts per second, or counts where nobody told the exposure; saturated: fraction of samples that
-    no exposure of a bracket measured; exposure: seconds per channel (1 where nobody told it).
+    by the exposure: counts per second, or counts where the exposure is not known; saturated: fraction of samples that
+    no exposure of a bracket measured; exposure: seconds per channel (1 where it is not known).
     """
 
     light: Tensor
@@ -52,7 +50,7 @@ class Photographer(Protocol):
     """Shows holograms on a real panel and photographs them: live, or by an exchange of files."""
 
     def announce(self, requests: Sequence[Request]) -> None:
-        """Tell what is asked for next, none of which depends on a photograph of another.
+        """Say what is asked for next, none of which depends on a photograph of another.
 
         An exchange of files sends them out together; a live one has nothing to do.
         """

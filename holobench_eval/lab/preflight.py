@@ -5,7 +5,7 @@ camera sees it blurred over twice the distance: a hologram that starts with rand
 with a smooth phase may still show a ghost of itself, and so the letter is shown with random phase. A wrong level of the
 full turn sends light into other orders and dims the picture. A mirrored panel and a mirrored camera, by contrast,
 look alike in every photograph, since light travels the same way in a mirror; the registration absorbs both, and the
-gate only tells what it saw. A constant ``origin`` changes nothing but the interference with unmodulated light.
+check only reports what it saw. A constant ``origin`` changes nothing but the interference with unmodulated light.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ..imaging.convention import Convention
 from ..imaging.warp import Array, Frame
 from .exposure import Averaged, Dark
 from .photograph import MOST_SATURATED
-from .test_pattern import Found, find_letter
+from .test_pattern import PatternFit, find_pattern
 
+# photograph of a phase `(C, H, W)` [rad] under a convention: light `(C, Hs, Ws)`
 Show = Callable[[Tensor, Convention], Tensor]
-"""Photograph of a phase ``(C, H, W)`` [rad] under a convention: light ``(C, Hs, Ws)``."""
 
 EXPOSURES = tuple(8 ** (step / 4 - 1) for step in range(5))  # an eighth to one
 STRAIGHTEST, FURTHEST_OFFSET = 0.999, 0.02
@@ -36,14 +36,14 @@ DIM, DIMMER = 0.75, 0.95  # of the light at the best level: refused, remarked on
 
 
 @dataclass(frozen=True)
-class Gate:
+class Check:
     """Whether a bench may be measured on, and why, in one line."""
 
     passed: bool
     line: str
 
 
-def linearity(take: Callable[[float], Averaged], seconds: float, dark: Dark) -> Gate:
+def linearity(take: Callable[[float], Averaged], seconds: float, dark: Dark) -> Check:
     """Five exposures of a steady picture over a factor of eight: is light times time what the camera counts?
 
     take: photographs for so many seconds; seconds: the longest exposure, which saturates nothing. The same bright
@@ -55,17 +55,17 @@ def linearity(take: Callable[[float], Averaged], seconds: float, dark: Dark) -> 
     taken = [take(share * seconds) for share in EXPOSURES]
     lost = max(float(each.saturated.mean()) for each in taken)
     if lost > MOST_SATURATED or not bright.any():
-        return Gate(False, f"linearity: {lost:.2%} of the samples are saturated; shorten capture.exposure")
+        return Check(False, f"linearity: {lost:.2%} of the samples are saturated; shorten capture.exposure")
     times = np.array([each.seconds for each in taken])
     if times[-1] < 4 * times[0]:
         given = f"{times[0]:.2g} to {times[-1]:.2g} s"
-        return Gate(False, f"linearity: the camera gave exposures of {given} only; it needs a factor of eight to tell")
+        return Check(False, f"linearity: the camera gave exposures of {given} only; it needs a factor of eight to tell")
     light = np.array([float(np.mean((each.counts - dark.at(each.seconds))[bright])) for each in taken])
     straight, offset = _affine(times, light)
     figures = f"r^2 {straight:.5f}, offset {offset:+.1%} of the longest exposure"
     if straight > STRAIGHTEST and abs(offset) <= FURTHEST_OFFSET:
-        return Gate(True, f"linearity: {figures}")
-    return Gate(
+        return Check(True, f"linearity: {figures}")
+    return Check(
         False,
         f"linearity: {figures} (wanted: r^2 > {STRAIGHTEST}, at most {FURTHEST_OFFSET:.0%}); "
         "is there gamma, automatic gain or an unsteady laser?",
@@ -82,52 +82,53 @@ def _affine(times: Array, light: Array) -> tuple[float, float]:
     return 1 - rest / spread, float(start / (start + slope * times[-1]))
 
 
-def phase_sign(show: Show, phase: Tensor, convention: Convention) -> Gate:
+def phase_sign(show: Show, phase: Tensor, convention: Convention) -> Check:
     """Does the letter of a hologram ``phase`` ``(C, H, W)`` appear, and with the sign as it is set?
 
-    phase: for `letter.letter` over the scored region, nominal optics, random starting phase.
+    phase: for `test_pattern.draw_pattern` over the scored region, nominal optics, random starting phase.
     """
     reversed_ = replace(convention, sign=-convention.sign)
     pictures = [_frames(show(phase, each)) for each in (convention, reversed_)]
-    as_set, other = ([find_letter(frame) for frame in picture] for picture in pictures)
+    as_set, other = ([find_pattern(frame) for frame in picture] for picture in pictures)
     here, there = _worst(as_set), _worst(other)
     figures = f"(correlation {here:.2f}; with the sign reversed {there:.2f})"
     if here >= READABLE and _brighter(as_set, pictures[0], pictures[1]):
-        return Gate(True, f"phase convention: {_orientation(as_set, convention)} {figures}")
+        return Check(True, f"phase convention: {_orientation(as_set, convention)} {figures}")
     if there >= READABLE and _brighter(other, pictures[1], pictures[0]):
-        return Gate(
+        return Check(
             False,
             f"phase convention: out of focus as with the sign reversed; set phase.sign: {reversed_.sign} {figures}",
         )
-    return Gate(
+    return Check(
         False,
         f"phase convention: no letter F with either sign {figures}; look at the camera's focus, panel.distance, "
         "panel.pitch, phase.two_pi_level and the iris",
     )
 
 
-def full_turn(show: Show, phase: Tensor, convention: Convention) -> Gate:
+def full_turn(show: Show, phase: Tensor, convention: Convention) -> Check:
     """Is ``two_pi_level`` the level at which the letter of `phase_sign` gets most light?
 
     Each level is shown with two constant phases half a turn apart, whose mean has no interference with unmodulated
-    light. A panel with a crooked look-up table has its best level elsewhere, so that a small difference is only told.
+    light. A panel with a crooked look-up table has its best level elsewhere, so that a small difference is reported
+    and not refused.
     """
-    found: list[Found] = []
+    fits: list[PatternFit] = []
     light = []
     for ratio in (1.0, *(each for each in FULL_TURNS if each != 1)):
         level = min(max(convention.two_pi_level * ratio, 2.0), 4096.0)
         tried = replace(convention, two_pi_level=level)
         picture = (show(phase, tried) + show(phase + math.pi, tried)) / 2
-        found = found or [find_letter(frame) for frame in _frames(picture)]
-        light.append((level, _light(found, _frames(picture))))
+        fits = fits or [find_pattern(frame) for frame in _frames(picture)]
+        light.append((level, _light(fits, _frames(picture))))
     levels, strengths = np.array([each[0] for each in light]), np.array([each[1] for each in light])
     strengths = (strengths / np.maximum(strengths.max(0), 1e-12)).mean(1)
     best, strongest = _peak(levels, strengths)
     share = float(strengths[0] / strongest)
     line = f"phase.two_pi_level: {convention.two_pi_level:g} gives {min(share, 1):.0%} of the light"
     if share >= DIMMER:
-        return Gate(True, f"{line} of the best level")
-    return Gate(share >= DIM, f"{line} of {best:.0f}; {'set it to that' if share < DIM else 'consider that'}")
+        return Check(True, f"{line} of the best level")
+    return Check(share >= DIM, f"{line} of {best:.0f}; {'set it to that' if share < DIM else 'consider that'}")
 
 
 def _peak(levels: Array, strengths: Array) -> tuple[float, float]:
@@ -144,9 +145,9 @@ def _peak(levels: Array, strengths: Array) -> tuple[float, float]:
     return float(x[top] - b / (2 * a)), float(c - b * b / (4 * a))
 
 
-def _orientation(found: Sequence[Found], convention: Convention) -> str:
-    first = found[0]
-    if any((each.mirrored, each.quarter) != (first.mirrored, first.quarter) for each in found):
+def _orientation(fits: Sequence[PatternFit], convention: Convention) -> str:
+    first = fits[0]
+    if any((fit.mirrored, fit.quarter) != (first.mirrored, first.quarter) for fit in fits):
         return "the channels are turned or mirrored differently, though sharp"
     turned = f"turned by {90 * first.quarter} degrees anticlockwise" if first.quarter else ""
     if not first.mirrored:
@@ -164,18 +165,18 @@ def _orientation(found: Sequence[Found], convention: Convention) -> str:
     )
 
 
-def _brighter(found: Sequence[Found], picture: Sequence[Frame], other: Sequence[Frame]) -> bool:
+def _brighter(fits: Sequence[PatternFit], picture: Sequence[Frame], other: Sequence[Frame]) -> bool:
     """Is the letter clearly brighter in its picture than, at the same place, in the other?"""
-    pairs = zip(_light(found, picture), _light(found, other), strict=True)
+    pairs = zip(_light(fits, picture), _light(fits, other), strict=True)
     return all(light > CLEARLY * max(ghost, 0) for light, ghost in pairs)
 
 
-def _light(found: Sequence[Found], picture: Sequence[Frame]) -> list[float]:
-    return [each.light(frame) for each, frame in zip(found, picture, strict=True)]
+def _light(fits: Sequence[PatternFit], picture: Sequence[Frame]) -> list[float]:
+    return [fit.light(frame) for fit, frame in zip(fits, picture, strict=True)]
 
 
-def _worst(found: Sequence[Found]) -> float:
-    return min(each.correlation for each in found)
+def _worst(fits: Sequence[PatternFit]) -> float:
+    return min(fit.correlation for fit in fits)
 
 
 def _frames(light: Tensor) -> list[Frame]:

@@ -20,12 +20,10 @@ class RawFrame:
     """What a sensor with a Bayer mosaic counted.
 
     counts: ``(Hs, Ws, 3)`` uint16 red, green, blue at half the sensor's rows and columns, black level not subtracted,
-    as the sensor lies (a camera's notion of upright is not followed); black: level of no light, for each colour;
-    white: counts from which a sample is saturated.
+    as the sensor lies (a camera's notion of upright is not followed); white: counts from which a sample is saturated.
     """
 
     counts: NDArray[np.uint16]
-    black: tuple[float, float, float]
     white: float
 
 
@@ -69,22 +67,18 @@ def _frame(raw: Any, where: str) -> RawFrame:
     colours = [] if pattern is None or pattern.shape != (2, 2) else [letters[site] for site in pattern.flat]
     if sorted(colours) != ["B", "G", "G", "R"] or mosaic.ndim != 2:
         raise UserError(f"{where}: no 2x2 Bayer mosaic of red, green and blue; the camera's full RAW is needed")
-    # the pattern is told for the whole image, but the sites of the visible one are what is read
+    # the pattern is that of the whole image, but the sites of the visible one are what is read
     sites = raw.raw_colors_visible[:2, :2]
     rows, columns = (side // 2 * 2 for side in mosaic.shape)
     if not rows or not columns:
         raise UserError(f"{where}: an image of {mosaic.shape[0]} by {mosaic.shape[1]} photosites")
 
-    levels = [float(level) for level in raw.black_level_per_channel]
     whites = [float(level) for level in raw.camera_white_level_per_channel or () if level > 0]
     white = min(whites, default=float(raw.white_level))
     planes: dict[str, list[NDArray[np.uint16]]] = {"R": [], "G": [], "B": []}
-    black: dict[str, list[float]] = {"R": [], "G": [], "B": []}
     for (row, column), site in np.ndenumerate(sites):
         planes[letters[site]].append(mosaic[row:rows:2, column:columns:2])
-        black[letters[site]].append(levels[site])
     first, second = (plane.astype(np.float64) for plane in planes["G"])
     green = np.where(np.maximum(first, second) >= white, np.maximum(first, second), np.rint((first + second) / 2))
     counts = np.stack([planes["R"][0], green.astype(np.uint16), planes["B"][0]], axis=-1)
-    red_level, green_level, blue_level = (float(np.mean(black[colour])) for colour in "RGB")
-    return RawFrame(counts, (red_level, green_level, blue_level), white)
+    return RawFrame(counts, white)

@@ -1,4 +1,4 @@
-"""A live bench as a photographer: panel, camera, lasers and the procedure, one photograph after the other."""
+"""A live bench as a photographer: panel, camera, lasers and capture settings, one photograph after the other."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .devices import Camera, DeviceError, Slm
 from .exposure import Dark, auto_exposure, averaged, combined, dark_frames, dark_level
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
-from .preflight import Gate, full_turn, linearity, phase_sign
+from .preflight import Check, full_turn, linearity, phase_sign
 from .settings import CaptureSettings
 from .settle import PATIENCE, Toggle, settle_time
 
@@ -30,13 +30,14 @@ TRIES = 2  # of every photograph, since drivers drop a frame now and then
 class Prepared:
     """What `Rig.prepare` measured.
 
-    exposures [s], which a request's are relative to, and counts without light: per channel; settle [s]; gates: passed.
+    exposures [s], which a request's are relative to, and counts without light: per channel; settle [s]; checks: of
+    `preflight`, all passed.
     """
 
     exposures: tuple[float, ...]
     darks: tuple[Dark, ...]
     settle: float
-    gates: tuple[Gate, ...]
+    checks: tuple[Check, ...]
 
 
 class Rig:
@@ -52,17 +53,17 @@ class Rig:
         slm: Slm,
         camera: Camera,
         convention: Convention,
-        procedure: CaptureSettings,
+        settings: CaptureSettings,
         wavelengths: Sequence[float],
         laser: Laser,
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.slm, self.camera, self.convention, self.procedure = slm, camera, convention, procedure
+        self.slm, self.camera, self.convention, self.settings = slm, camera, convention, settings
         self.laser, self.wait = laser, wait
         self.planes = tuple(plane_of(wavelength) for wavelength in wavelengths)
         self.prepared: Prepared | None = None
         self._failures = 0
-        procedure.exposures(len(self.planes))  # a wrong number is told before a device moves
+        settings.exposures(len(self.planes))  # refuses a wrong number before a device moves
 
     def announce(self, requests: Sequence[Request]) -> None:
         """Nothing: every phase is shown when its photograph is asked for."""
@@ -75,9 +76,9 @@ class Rig:
         where that happens to two photographs in a row.
         """
         ready = self._ready()
-        self._check(request.phase)
+        self._check_phase(request.phase)
         try:
-            taken = _patiently(lambda: self._take(request, self.convention, ready, self.procedure))
+            taken = _patiently(lambda: self._take(request, self.convention, ready, self.settings))
         except DeviceError as error:
             self._failures += 1
             if self._failures >= 2:
@@ -86,16 +87,16 @@ class Rig:
         self._failures = 0
         return taken
 
-    def prepare(self, letter: Request, say: Callable[[str], None]) -> Prepared:
+    def prepare(self, pattern: Request, say: Callable[[str], None]) -> Prepared:
         """Exposure, settling time, dark frames, linearity, phase convention, in this order, one line each.
 
-        letter: the hologram that `gates.phase_sign` wants. Its relative exposure fixes what exposures are relative to:
-        those that are right for it, divided by that. Raises UserError, in one line, for a device that fails and for a
-        gate that is not passed.
+        pattern: the hologram that `preflight.phase_sign` wants. Its relative exposure fixes what exposures are relative
+        to: those that are right for it, divided by that. Raises UserError, in one line, for a device that fails and for
+        a check that is not passed.
         """
-        self._check(letter.phase)
+        self._check_phase(pattern.phase)
         try:
-            return self._prepare(letter, say)
+            return self._prepare(pattern, say)
         except DeviceError as error:
             raise UserError(f"the bench is not ready: {error}") from error
 
@@ -108,34 +109,34 @@ class Rig:
         finally:
             self.camera.close()
 
-    def _prepare(self, letter: Request, say: Callable[[str], None]) -> Prepared:
-        exposures = tuple(self._exposure(letter, channel) for channel in range(len(self.planes)))
+    def _prepare(self, pattern: Request, say: Callable[[str], None]) -> Prepared:
+        exposures = tuple(self._exposure(pattern, channel) for channel in range(len(self.planes)))
         say(f"exposure: {', '.join(f'{seconds:.3g} s' for seconds in exposures)}")
-        settle = self._settle(letter.phase, exposures[0] * letter.relative_exposure)
-        say(f"settling: {settle * 1e3:.0f} ms{'' if self.procedure.settle == 'auto' else ' (as set)'}")
+        settle = self._settle(pattern.phase, exposures[0] * pattern.relative_exposure)
+        say(f"settling: {settle * 1e3:.0f} ms{'' if self.settings.settle == 'auto' else ' (as set)'}")
         darks = self._darks(exposures)
         level = ", ".join(f"{float(np.mean(dark.at(each))):.1f}" for dark, each in zip(darks, exposures, strict=True))
-        say(f"dark: {level} counts{'' if self.procedure.dark else ' (as set)'}")
+        say(f"dark: {level} counts{'' if self.settings.dark else ' (as set)'}")
         ready = Prepared(exposures, darks, settle, ())
-        gates = []
-        for gate in self._gates(letter, ready):
-            if not gate.passed:
-                raise UserError(gate.line)
-            say(gate.line)
-            gates.append(gate)
-        self.prepared = replace(ready, gates=tuple(gates))
+        checks = []
+        for check in self._checks(pattern, ready):
+            if not check.passed:
+                raise UserError(check.line)
+            say(check.line)
+            checks.append(check)
+        self.prepared = replace(ready, checks=tuple(checks))
         return self.prepared
 
-    def _exposure(self, letter: Request, channel: int) -> float:
-        given = self.procedure.exposures(len(self.planes))
+    def _exposure(self, pattern: Request, channel: int) -> float:
+        given = self.settings.exposures(len(self.planes))
         if given is not None:
             return given[channel]
-        self._show(letter.phase, channel, self.convention, PATIENCE)
-        return auto_exposure(self.camera, self.planes[channel]) / letter.relative_exposure
+        self._show(pattern.phase, channel, self.convention, PATIENCE)
+        return auto_exposure(self.camera, self.planes[channel]) / pattern.relative_exposure
 
     def _settle(self, phase: Tensor, seconds: float) -> float:
-        if self.procedure.settle != "auto":
-            return self.procedure.settle
+        if self.settings.settle != "auto":
+            return self.settings.settle
         self.laser.select(0)
         bright, dark = (self.convention.levels(each) for each in (phase[0], torch.zeros_like(phase[0])))
         toggle = Toggle(
@@ -146,37 +147,35 @@ class Rig:
         return settle_time(toggle)
 
     def _darks(self, exposures: Sequence[float]) -> tuple[Dark, ...]:
-        if self.procedure.dark_level is not None:
-            return (dark_level(self.procedure.dark_level),) * len(exposures)
+        if self.settings.dark_level is not None:
+            return (dark_level(self.settings.dark_level),) * len(exposures)
         self.laser.select(None)
-        least, darks = min(self.procedure.hdr), []
+        least, darks = min(self.settings.hdr), []
         for seconds, plane in zip(exposures, self.planes, strict=True):
             span = (seconds * least * DARK_SPAN[0], seconds * DARK_SPAN[1])
-            darks.append(dark_frames(self.camera, self.procedure.dark, span, plane))
+            darks.append(dark_frames(self.camera, self.settings.dark, span, plane))
         return tuple(darks)
 
-    def _gates(self, letter: Request, ready: Prepared) -> Iterator[Gate]:
+    def _checks(self, pattern: Request, ready: Prepared) -> Iterator[Check]:
         for channel, (seconds, dark, plane) in enumerate(zip(ready.exposures, ready.darks, self.planes, strict=True)):
-            self._show(letter.phase, channel, self.convention, ready.settle)
-            take = partial(averaged, self.camera, count=self.procedure.average, plane=plane)
-            gate = linearity(take, seconds * letter.relative_exposure, dark)
-            yield replace(gate, line=f"channel {channel}: {gate.line}") if len(self.planes) > 1 else gate
-        single = replace(self.procedure, average=1, hdr=(1.0,))  # many photographs, of which none is scored
+            self._show(pattern.phase, channel, self.convention, ready.settle)
+            take = partial(averaged, self.camera, count=self.settings.average, plane=plane)
+            check = linearity(take, seconds * pattern.relative_exposure, dark)
+            yield replace(check, line=f"channel {channel}: {check.line}") if len(self.planes) > 1 else check
+        single = replace(self.settings, average=1, hdr=(1.0,))  # many photographs, of which none is scored
 
         def show(phase: Tensor, convention: Convention) -> Tensor:
-            return self._take(replace(letter, phase=phase), convention, ready, single).light
+            return self._take(replace(pattern, phase=phase), convention, ready, single).light
 
-        yield phase_sign(show, letter.phase, self.convention)
-        yield full_turn(show, letter.phase, self.convention)
+        yield phase_sign(show, pattern.phase, self.convention)
+        yield full_turn(show, pattern.phase, self.convention)
 
-    def _take(
-        self, request: Request, convention: Convention, ready: Prepared, procedure: CaptureSettings
-    ) -> Photograph:
+    def _take(self, request: Request, convention: Convention, ready: Prepared, settings: CaptureSettings) -> Photograph:
         frames, lost, seconds = [], [], []
         for channel, (exposure, dark) in enumerate(zip(ready.exposures, ready.darks, strict=True)):
             self._show(request.phase, channel, convention, ready.settle)
             wanted, plane = exposure * request.relative_exposure, self.planes[channel]
-            bracket = [averaged(self.camera, wanted * each, procedure.average, plane) for each in procedure.hdr]
+            bracket = [averaged(self.camera, wanted * each, settings.average, plane) for each in settings.hdr]
             light, saturated = combined(bracket, dark)
             frames.append(light)
             lost.append(saturated)
@@ -192,7 +191,7 @@ class Rig:
         self.slm.show(convention.levels(phase[channel]))
         self.wait(settle)
 
-    def _check(self, phase: Tensor) -> None:
+    def _check_phase(self, phase: Tensor) -> None:
         wanted = (len(self.planes), *self.slm.shape)
         if tuple(phase.shape) != wanted:
             raise CellError(f"phase is {tuple(phase.shape)}, but {self.slm.name} with its wavelengths shows {wanted}")

@@ -17,7 +17,7 @@ Relative = Annotated[float, Interval(gt=0, le=1)]
 class CaptureSettings:
     """Exposure, averaging, dark frames, bracket and settling of every photograph.
 
-    exposure: seconds, one for each colour channel or one for all, or ``auto``: as long as the test letter allows;
+    exposure: seconds, one for each colour channel or one for all, or ``auto``: as long as the test pattern allows;
     average: frames whose mean is taken; dark: frames with the laser off whose mean is subtracted; dark_level: counts
     without light, only where dark is 0; hdr: exposures of a bracket, relative to ``exposure``; settle: seconds from
     showing a hologram to exposing, or ``auto``: measured.
@@ -35,7 +35,7 @@ class CaptureSettings:
             raise UserError(
                 "capture: either dark frames (dark: 8) or, with dark: 0, the counts without light (dark_level: 64)"
             )
-        # by hand, since of a union only the first type's fault would be told
+        # by hand, since of a union only the first type's fault would be reported
         for seconds in self.exposure if isinstance(self.exposure, tuple) else (self.exposure,):
             if seconds != "auto" and not 0 < seconds <= LONGEST:
                 raise UserError(

@@ -20,7 +20,7 @@ TURN, FINE_TURN = 10.0, 2.5  # degrees between the orientations that are tried
 BORDER = 0.5  # the letter's light beyond this is the letter, below a tenth of it the ground
 
 
-def letter(shape: tuple[int, int]) -> Tensor:
+def draw_pattern(shape: tuple[int, int]) -> Tensor:
     """An F of light ``(h, w)`` float32, 0 or 1, upright in the middle: the simplest letter without any symmetry."""
     height, width = shape
     side = min(shape)
@@ -28,7 +28,7 @@ def letter(shape: tuple[int, int]) -> Tensor:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class PatternFit:
     """The orientation in which the letter fits a photograph best.
 
     correlation: of the amplitude of the light with the letter's, 1 at best; mirrored: left and right; turn:
@@ -52,23 +52,23 @@ class Found:
         return float(photograph[strokes].mean() - photograph[ground].mean())
 
 
-def find_letter(photograph: Frame) -> Found:
-    """Look for `letter` in linear light ``(Hs, Ws)``, dark level subtracted, of any size, place and orientation.
+def find_pattern(photograph: Frame) -> PatternFit:
+    """Look for the letter, of any size, place and orientation, in linear light ``(Hs, Ws)`` without dark level.
 
     The search compares the square root of the blurred light, so that single grains of speckle do not count. It always
     finds a best place; the correlation says what it is worth.
     """
     small = _small(photograph)
     turns = np.arange(-180.0, 180.0, TURN)
-    tried = [
-        (*_placed(small, scale, turn, mirrored), scale, turn, mirrored)
+    coarse = [
+        (*_best_shift(small, scale, turn, mirrored), scale, turn, mirrored)
         for mirrored in (False, True)
         for scale in SCALES
         for turn in turns
     ]
-    _, _, scale, turn, mirrored = max(tried, key=lambda each: each[0])
+    _, _, scale, turn, mirrored = max(coarse, key=lambda each: each[0])
     fine = [
-        (*_placed(small, scale * stretch, turn + more, mirrored), scale * stretch, turn + more)
+        (*_best_shift(small, scale * stretch, turn + more, mirrored), scale * stretch, turn + more)
         for stretch in (0.94, 1.0, 1.06)
         for more in np.arange(-TURN, TURN + 1, FINE_TURN)
     ]
@@ -76,7 +76,7 @@ def find_letter(photograph: Frame) -> Found:
     ratio = max(photograph.shape) / max(small.shape)
     centre = ((y + 0.5) * ratio - 0.5, (x + 0.5) * ratio - 0.5)
     where = _drawn(photograph.shape, centre, scale * min(small.shape) * ratio, turn, mirrored)
-    return Found(correlation, mirrored, float((turn + 180) % 360 - 180), where)
+    return PatternFit(correlation, mirrored, float((turn + 180) % 360 - 180), where)
 
 
 def _small(photograph: Frame) -> Array:
@@ -98,7 +98,7 @@ def _normal(picture: Array) -> Array:
     return np.asarray(even / max(float(np.linalg.norm(even)), 1e-12))
 
 
-def _placed(small: Array, scale: float, turn: float, mirrored: bool) -> tuple[float, tuple[int, int]]:
+def _best_shift(small: Array, scale: float, turn: float, mirrored: bool) -> tuple[float, tuple[int, int]]:
     """The highest correlation over all places, and the letter's centre (row, column) there."""
     spectrum = _spectrum(small.shape, round(scale * min(small.shape), 3), turn, mirrored)
     scores = np.fft.irfft2(np.fft.rfft2(small) * spectrum, s=small.shape)

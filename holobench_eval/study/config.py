@@ -13,7 +13,7 @@ from typing import Any
 from ..core import plugins
 from ..core.errors import UserError, suggest
 from ..core.plugins import params_of
-from ..core.schema import check_keys, placed, typed
+from ..core.schema import placed, typed
 from ..core.yaml_source import Document, Keys, load
 from ..display.simulated.changes import KINDS, altered, checked
 from ..display.simulated.profile import load_profile
@@ -50,7 +50,6 @@ def load_study(path: Path | str) -> Study:
     ('double_phase', 'gerchberg_saxton', 'wirtinger', 'oracle')
     """
     document = load(Path(path))
-    check_keys(document, Study, document.data)
     study = replace(typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text)
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))

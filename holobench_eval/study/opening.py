@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from functools import lru_cache
-from pathlib import Path
 
 import torch
 
@@ -15,7 +13,7 @@ from ..display.simulated.changes import KINDS, altered
 from ..lab.bench_file import load_bench_file
 from ..lab.live import open_live
 from ..lab.real import RealBench
-from ..lab.session import FolderPhotographer
+from ..lab.session import session_photographer
 from .displays import Condition, RealSource
 
 OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
@@ -82,22 +80,14 @@ def _opened(place: Condition, seed: int, device: torch.device) -> CalibratedBenc
 
 
 def _open_real(place: Condition, source: RealSource, seed: int) -> RealBench:
-    """The bench of a condition; its devices are opened once in a process. UserError for a file that has changed."""
-    if source.bench is not None:
-        bench = load_bench_file(source.bench)
-        found, panel, bound = bench.digest, bench.panel, bench.residual_bound
-    else:
-        profile = load_profile(place.source, folder=place.folder).scaled(place.spec.shape)
-        found, panel, bound = profile.digest, profile.panel, profile.residual_bound
-    if found != place.digest:
+    """The bench behind a session folder, or that of devices. UserError for a description that has changed."""
+    bench = None if source.bench is None else load_bench_file(source.bench)
+    described = bench or load_profile(place.source, folder=place.folder).scaled(place.spec.shape)
+    if described.digest != place.digest:
         raise UserError(f"'{place.source}' has changed since the study was planned; start the run again")
     if source.folder is not None:
-        return RealBench(place.spec, session_photographer(source.folder), panel.blaze, bound, seed)
+        photographer = session_photographer(source.folder)
+        return RealBench(place.spec, photographer, described.panel.blaze, described.residual_bound, seed)
+    assert bench is not None
     assert source.bench is not None
-    return open_live(load_bench_file(source.bench), source.bench.parent, seed)
-
-
-@lru_cache(maxsize=1)
-def session_photographer(folder: Path) -> FolderPhotographer:
-    """The photographer of a session folder, one for a process: what it notes is written at the end of a run."""
-    return FolderPhotographer(folder)
+    return open_live(bench, source.bench.parent, seed)

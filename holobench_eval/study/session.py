@@ -15,14 +15,14 @@ from ..core.yaml_source import load
 from ..imaging.convention import Convention
 from ..lab.bench_file import load_bench_file
 from ..lab.real import RealBench
-from ..lab.session import Manifest, Pattern, read_manifest, write_manifest
+from ..lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
 from ..lab.session.geometry import look
 from ..lab.session.manifest import refuse_links_out
 from .config import load_study
 from .definition import Study
 from .displays import condition, displays, real_condition
 from .executors import Serial
-from .opening import forget_sessions, open_display, session_photographer
+from .opening import forget_sessions, open_display
 from .plan import plan
 from .run import Outcome, Watch, run
 

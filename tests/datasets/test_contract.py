@@ -1,4 +1,4 @@
-"""What every registered dataset must do."""
+"""What every dataset must do: those with an entry point, and one that somebody keeps in a file of their own."""
 
 from typing import Any
 
@@ -13,19 +13,59 @@ from holobench_eval.core.errors import UserError
 SHAPES = [(48, 64), (64, 48), (40, 40)]
 
 
-@pytest.fixture(params=["photographs", "dead_leaves", "charts", "folder", "focal_stacks"])
+STRANGER = """
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from holobench_eval.core.seeds import generator
+from holobench_eval.datasets.base import known, with_channels
+
+
+@dataclass(frozen=True)
+class Noise:
+    count: Annotated[int, Interval(ge=1)] = 2
+    training: ClassVar[bool] = False
+
+    def items(self):
+        return [f"noise-{index}" for index in range(self.count)]
+
+    def load(self, item, shape, channels=3):
+        draw = generator("noise", known("noise", item, self.items()))
+        return with_channels(torch.rand(3, *shape, generator=draw), channels)
+
+    def digest(self, item):
+        return sha256(known("noise", item, self.items()).encode()).hexdigest()
+"""
+
+
+@pytest.fixture(params=[*plugins.names("datasets"), "noise.py:Noise"])
 def dataset(request, tmp_path) -> Any:
     params: dict[str, Any] = {}
+    (tmp_path / "noise.py").write_text(STRANGER)
     if request.param == "folder":
         draw = np.random.default_rng(0)
         for name in ("b.png", "a.png"):
             Image.fromarray(draw.integers(0, 256, (30, 50, 3), dtype=np.uint8)).save(tmp_path / name)
         params = {"path": str(tmp_path)}
-    return plugins.build("datasets", request.param, params)
+    return plugins.build("datasets", request.param, params, tmp_path)
 
 
 def test_every_dataset_is_registered():
     assert {"photographs", "dead_leaves", "charts", "folder", "focal_stacks"} <= set(plugins.names("datasets"))
+
+
+def test_parameters_of_a_dataset_in_a_file_are_checked_as_those_of_any_other(tmp_path):
+    (tmp_path / "noise.py").write_text(STRANGER)
+    assert plugins.build("datasets", "noise.py:Noise", {"count": 3}, tmp_path).items()[-1] == "noise-2"
+    for params, line in (
+        ({"cuont": 3}, "no parameter 'cuont'; did you mean 'count'"),
+        ({"count": 0}, "'count': input"),
+    ):
+        with pytest.raises(UserError, match=line):
+            plugins.build("datasets", "noise.py:Noise", params, tmp_path)
 
 
 def test_items_are_unique_and_in_a_fixed_order(dataset):

@@ -7,10 +7,10 @@ import pytest
 
 from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.lab.drivers.catalogue import checked_params
-from holobench_eval.lab.laser import laser
+from holobench_eval.lab.laser import SwitchedLaser, laser
 from holobench_eval.lab.settings import CaptureSettings
 
-PAGE = Path(__file__).parents[3] / "docs" / "real-bench.md"
+PAGE = Path(__file__).parents[2] / "docs" / "real-bench.md"
 
 
 def test_the_documented_bench_file_is_read_and_its_settings_are_those_that_exist(tmp_path):
@@ -22,8 +22,8 @@ def test_the_documented_bench_file_is_read_and_its_settings_are_those_that_exist
         params = dict(section)
         checked_params(kind, params.pop("driver"), params)
     assert bench.capture == CaptureSettings()  # the page shows the defaults
-    switch = laser(bench.laser, 3, tmp_path, pytest.fail)
-    assert "{channel}" in switch.command
+    assert isinstance(laser(bench.laser, 3, tmp_path, pytest.fail), SwitchedLaser)
+    assert "{channel}" in bench.laser.command
 
 
 def test_the_drawing_is_there_and_light():

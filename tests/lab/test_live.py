@@ -50,7 +50,7 @@ def table(monkeypatch, tmp_path):
     (tmp_path / "bench.yaml").write_text(BENCH)
     (tmp_path / "study.yaml").write_text(STUDY)
     (tmp_path / "switch.py").write_text("def switch(channel):\n    pass\n")
-    monkeypatch.setattr("holobench_eval.lab.laser.FunctionLaser.select", lambda _, channel: scene.select(channel))
+    monkeypatch.setattr("holobench_eval.lab.laser.SwitchedLaser.select", lambda _, channel: scene.select(channel))
     forget_sessions()
     yield tmp_path, scene, camera
     forget_sessions()

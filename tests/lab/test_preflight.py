@@ -1,4 +1,4 @@
-"""The gates on a simulated bench: what each mistake does to the picture, and what is told of it."""
+"""The preflight checks on a simulated bench: what each mistake does to the picture, and what is reported of it."""
 
 from functools import partial
 
@@ -10,8 +10,8 @@ import torch
 from holobench_eval.imaging.convention import Convention
 from holobench_eval.lab.exposure import averaged, dark_level
 from holobench_eval.lab.preflight import full_turn, linearity, phase_sign
-from holobench_eval.lab.test_pattern import find_letter, letter
-from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, Still, bench, letter_phase
+from holobench_eval.lab.test_pattern import draw_pattern, find_pattern
+from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, Still, bench, pattern_phase
 
 
 def photographer(**truth):
@@ -28,7 +28,7 @@ def photographer(**truth):
 
 
 def green(initial_phase="random"):
-    return letter_phase(initial_phase=initial_phase)[GREEN : GREEN + 1]
+    return pattern_phase(initial_phase=initial_phase)[GREEN : GREEN + 1]
 
 
 def check_linearity(exposure=0.02, picture=None, **camera):
@@ -38,9 +38,9 @@ def check_linearity(exposure=0.02, picture=None, **camera):
 
 
 def test_a_linear_camera_passes():
-    gate = check_linearity()
-    assert gate.passed
-    assert gate.line.startswith("linearity: r^2 1.0000")
+    check = check_linearity()
+    assert check.passed
+    assert check.line.startswith("linearity: r^2 1.0000")
 
 
 @pytest.mark.parametrize(
@@ -57,26 +57,26 @@ def test_a_linear_camera_passes():
     ],
 )
 def test_a_camera_that_is_not_linear_is_refused_in_one_line(settings, line):
-    gate = check_linearity(**settings)
-    assert not gate.passed
-    assert line in gate.line
-    assert "\n" not in gate.line
+    check = check_linearity(**settings)
+    assert not check.passed
+    assert line in check.line
+    assert "\n" not in check.line
 
 
 def test_the_right_convention_gives_an_upright_letter():
-    gate = phase_sign(photographer(), green(), Convention())
-    assert gate.passed
-    assert gate.line.startswith("phase convention: upright")
+    check = phase_sign(photographer(), green(), Convention())
+    assert check.passed
+    assert check.line.startswith("phase convention: upright")
 
 
 def test_a_reversed_sign_is_seen_and_named():
-    gate = phase_sign(photographer(sign=-1), green(), Convention())
-    assert not gate.passed
-    assert "set phase.sign: -1" in gate.line
+    check = phase_sign(photographer(sign=-1), green(), Convention())
+    assert not check.passed
+    assert "set phase.sign: -1" in check.line
     assert phase_sign(photographer(sign=-1), green(), Convention(sign=-1)).passed
-    gate = phase_sign(photographer(), green(), Convention(sign=-1))
-    assert not gate.passed
-    assert "set phase.sign: 1 " in gate.line
+    check = phase_sign(photographer(), green(), Convention(sign=-1))
+    assert not check.passed
+    assert "set phase.sign: 1 " in check.line
 
 
 def test_a_mirrored_panel_and_a_mirrored_camera_look_the_same_and_are_only_told():
@@ -85,9 +85,9 @@ def test_a_mirrored_panel_and_a_mirrored_camera_look_the_same_and_are_only_told(
     )
     assert camera.passed
     assert panel.passed
-    for gate in (camera, panel):
-        assert "mirrored left-right" in gate.line
-        assert "set phase.flip_horizontal: true" in gate.line
+    for check in (camera, panel):
+        assert "mirrored left-right" in check.line
+        assert "set phase.flip_horizontal: true" in check.line
     flipped = phase_sign(photographer(flipped=True), green(), Convention(flip_horizontal=True))
     assert flipped.line.startswith("phase convention: upright")
 
@@ -109,9 +109,9 @@ def test_turned_and_mirrored_cameras_pass_and_are_told(turns, mirrored, words):
         seen = plain(phase, convention)
         return torch.rot90(seen.flip(-1) if mirrored else seen, turns, (1, 2))
 
-    gate = phase_sign(show, green(), Convention())
-    assert gate.passed
-    assert words in gate.line
+    check = phase_sign(show, green(), Convention())
+    assert check.passed
+    assert words in check.line
 
 
 def test_a_picture_without_the_letter_is_refused():
@@ -120,15 +120,15 @@ def test_a_picture_without_the_letter_is_refused():
     def show(phase, convention):
         return torch.from_numpy(draw.exponential(size=(1, 150, 180)))
 
-    gate = phase_sign(show, green(), Convention())
-    assert not gate.passed
-    assert "no letter F with either sign" in gate.line
+    check = phase_sign(show, green(), Convention())
+    assert not check.passed
+    assert "no letter F with either sign" in check.line
 
 
 def test_the_letter_is_shown_with_random_phase_since_a_smooth_one_leaves_a_ghost_on_the_wrong_side():
     wrong = photographer(sign=-1)
     rough, smooth = (
-        find_letter(wrong(green(start), Convention())[0].numpy()).correlation for start in ("random", "constant")
+        find_pattern(wrong(green(start), Convention())[0].numpy()).correlation for start in ("random", "constant")
     )
     assert rough < 0.6 < smooth
 
@@ -144,41 +144,41 @@ def test_every_channel_has_its_say(channels_differ):
 
 
 def test_the_right_level_of_a_full_turn_passes():
-    gate = full_turn(photographer(two_pi_level=200.0), green(), Convention(two_pi_level=200.0))
-    assert gate.passed
-    assert "200 gives" in gate.line
+    check = full_turn(photographer(two_pi_level=200.0), green(), Convention(two_pi_level=200.0))
+    assert check.passed
+    assert "200 gives" in check.line
 
 
 def test_a_level_that_costs_much_light_is_refused_and_the_best_is_named():
-    gate = full_turn(photographer(two_pi_level=175.0), green(), Convention())
-    assert not gate.passed
-    named = float(gate.line.split("light of ")[1].split(";")[0])
+    check = full_turn(photographer(two_pi_level=175.0), green(), Convention())
+    assert not check.passed
+    named = float(check.line.split("light of ")[1].split(";")[0])
     assert abs(named - 175) < 0.08 * 175
     assert full_turn(photographer(two_pi_level=175.0), green(), Convention(two_pi_level=named)).passed
 
 
 def test_a_level_that_costs_little_light_is_only_remarked_on():
-    gate = full_turn(photographer(two_pi_level=205.0), green(), Convention())
-    assert gate.passed
-    assert "consider that" in gate.line
+    check = full_turn(photographer(two_pi_level=205.0), green(), Convention())
+    assert check.passed
+    assert "consider that" in check.line
 
 
 @pytest.mark.parametrize("size", [0.35, 0.6, 0.95])
 @pytest.mark.parametrize("turn", [0, 7, 95, -140])
 def test_the_letter_is_found_at_any_size_place_and_angle_under_speckle(size, turn):
-    picture = letter((200, 240)).numpy()
+    picture = draw_pattern((200, 240)).numpy()
     pose = cv2.getRotationMatrix2D((119.5, 99.5), turn, size)
     pose[:, 2] += (150 - 119.5 + 9, 120 - 99.5 - 5)
     seen = cv2.warpAffine(picture, pose, (300, 240))
     speckle = np.random.default_rng(5).exponential(size=seen.shape)
-    found = find_letter(((seen + 0.02) * speckle).astype(np.float32))
-    assert found.correlation > 0.8
-    assert not found.mirrored
-    assert abs((found.turn - turn + 180) % 360 - 180) < 4
-    assert np.corrcoef(found.where.ravel(), seen.ravel())[0, 1] > 0.8
+    fit = find_pattern(((seen + 0.02) * speckle).astype(np.float32))
+    assert fit.correlation > 0.8
+    assert not fit.mirrored
+    assert abs((fit.turn - turn + 180) % 360 - 180) < 4
+    assert np.corrcoef(fit.where.ravel(), seen.ravel())[0, 1] > 0.8
 
 
 def test_light_of_the_letter_is_that_of_its_strokes_above_the_ground():
-    picture = 3 * letter((120, 120)).numpy() + 1
-    found = find_letter(picture)
-    assert found.light(picture) == pytest.approx(3, rel=0.08)
+    picture = 3 * draw_pattern((120, 120)).numpy() + 1
+    fit = find_pattern(picture)
+    assert fit.light(picture) == pytest.approx(3, rel=0.08)

@@ -8,7 +8,7 @@ from holobench_eval.lab.laser import SteadyLaser
 from holobench_eval.lab.photograph import Request, plane_of
 from holobench_eval.lab.rig import Rig
 from holobench_eval.lab.settings import CaptureSettings
-from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, bench, letter_phase
+from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
 
 FAST = CaptureSettings(average=1, dark=2)
 
@@ -17,7 +17,7 @@ def rig(procedure=FAST, convention=None, truth=None, channels=(GREEN,), **camera
     scene = Scene(bench(), **(truth or {}))
     wavelengths = [bench().spec.wavelengths[channel] for channel in channels]
     laser = Lasers(scene, channels)
-    made = Rig(
+    bench_rig = Rig(
         SimulatedSlm(scene),
         SimulatedCamera(scene, **{"noise": 2.0, **camera}),
         convention or Convention(),
@@ -26,8 +26,8 @@ def rig(procedure=FAST, convention=None, truth=None, channels=(GREEN,), **camera
         laser,
         wait=scene.clock.wait,
     )
-    made.scene = scene
-    return made
+    bench_rig.scene = scene
+    return bench_rig
 
 
 class Lasers:
@@ -44,19 +44,19 @@ class Lasers:
 
 
 def asked(phase=None, relative=1.0):
-    return Request(letter_phase()[GREEN : GREEN + 1] if phase is None else phase, relative, "hologram", ())
+    return Request(pattern_phase()[GREEN : GREEN + 1] if phase is None else phase, relative, "hologram", ())
 
 
 def everything():
-    return asked(letter_phase())
+    return asked(pattern_phase())
 
 
 def quiet(line):
     pass
 
 
-def truth(made, phase, channel=GREEN):
-    return made.scene.settled(Convention().levels(phase))
+def truth(bench_rig, phase, channel=GREEN):
+    return bench_rig.scene.settled(Convention().levels(phase))
 
 
 def test_preparing_says_one_line_for_each_step_in_order():
@@ -66,11 +66,11 @@ def test_preparing_says_one_line_for_each_step_in_order():
     assert [line.split(":")[0] for line in lines] == [*steps, "phase.two_pi_level"]
     assert all("\n" not in line for line in lines)
     assert len(ready.exposures) == len(ready.darks) == 3
-    assert all(gate.passed for gate in ready.gates)
+    assert all(check.passed for check in ready.checks)
 
 
 def test_photographs_are_light_per_second_of_the_channels_own_laser():
-    made = rig(
+    bench_rig = rig(
         CaptureSettings(average=4, dark=4),
         truth={"latency": 0.03, "lag": 0.01},
         channels=(0, 1, 2),
@@ -78,54 +78,54 @@ def test_photographs_are_light_per_second_of_the_channels_own_laser():
         dark_rate=40.0,
         hot=15.0,
     )
-    made.prepare(everything(), quiet)
-    assert made.prepared.settle > 0.06
-    phase = letter_phase().roll(17, -1)
+    bench_rig.prepare(everything(), quiet)
+    assert bench_rig.prepared.settle > 0.06
+    phase = pattern_phase().roll(17, -1)
     for relative in (1.0, 0.4):
-        taken = made.photograph(asked(phase, relative))
+        taken = bench_rig.photograph(asked(phase, relative))
         assert taken.light.dtype == torch.float32
         assert taken.saturated < 0.001
         for channel, seen in enumerate(taken.light.double().numpy()):
-            made.scene.channel = channel
-            expected = truth(made, phase[channel]) * made.camera.gain
+            bench_rig.scene.channel = channel
+            expected = truth(bench_rig, phase[channel]) * bench_rig.camera.gain
             assert np.corrcoef(seen.ravel(), expected.ravel())[0, 1] > 0.999
             assert abs(seen.mean() / expected.mean() - 1) < 0.02
-            assert taken.exposure[channel] == pytest.approx(relative * made.prepared.exposures[channel])
+            assert taken.exposure[channel] == pytest.approx(relative * bench_rig.prepared.exposures[channel])
 
 
 def test_a_bracket_measures_a_picture_that_saturates_one_exposure():
-    made = rig(CaptureSettings(exposure=0.02, average=1, dark=2, settle=0.0, hdr=(1.0, 0.1)), noise=1.0)
-    made.prepare(asked(), quiet)
-    taken = made.photograph(asked(relative=8.0))
-    expected = truth(made, asked().phase[0]) * made.camera.gain
-    assert expected.max() * 0.16 > 2 * made.camera.white
+    bench_rig = rig(CaptureSettings(exposure=0.02, average=1, dark=2, settle=0.0, hdr=(1.0, 0.1)), noise=1.0)
+    bench_rig.prepare(asked(), quiet)
+    taken = bench_rig.photograph(asked(relative=8.0))
+    expected = truth(bench_rig, asked().phase[0]) * bench_rig.camera.gain
+    assert expected.max() * 0.16 > 2 * bench_rig.camera.white
     assert taken.saturated == 0
     assert np.abs(taken.light[0].numpy() - expected).max() < 0.02 * expected.max()
 
 
 def test_an_exposure_that_saturates_the_letter_ends_the_preparation():
-    made = rig(CaptureSettings(exposure=0.2, average=1, dark=2, settle=0.0))
+    bench_rig = rig(CaptureSettings(exposure=0.2, average=1, dark=2, settle=0.0))
     with pytest.raises(UserError, match=r"saturated; shorten capture\.exposure"):
-        made.prepare(asked(), quiet)
+        bench_rig.prepare(asked(), quiet)
 
 
 def test_a_wrong_sign_or_a_bent_camera_ends_the_preparation_in_one_line():
     for settings, line in (({"truth": {"sign": -1}}, "set phase.sign: -1"), ({"gamma": 0.5}, "is there gamma")):
-        made = rig(**settings)
+        bench_rig = rig(**settings)
         with pytest.raises(UserError, match=line) as error:
-            made.prepare(asked(), quiet)
+            bench_rig.prepare(asked(), quiet)
         assert "\n" not in str(error.value)
         with pytest.raises(UserError, match="before it has been prepared"):
-            made.photograph(asked())
+            bench_rig.photograph(asked())
 
 
 def test_what_is_set_is_not_measured():
-    made = rig(CaptureSettings(exposure=0.01, average=1, dark=0, dark_level=64.0, settle=0.25))
+    bench_rig = rig(CaptureSettings(exposure=0.01, average=1, dark=0, dark_level=64.0, settle=0.25))
     lines = []
-    ready = made.prepare(asked(), lines.append)
+    ready = bench_rig.prepare(asked(), lines.append)
     assert ready.exposures == (0.01,)
     assert ready.settle == 0.25
-    assert None not in made.scene.selected
+    assert None not in bench_rig.scene.selected
     assert lines[1:3] == ["settling: 250 ms (as set)", "dark: 64.0 counts (as set)"]
 
 
@@ -138,62 +138,62 @@ def test_exposures_are_relative_to_those_of_the_letter_divided_by_its_own():
 
 @pytest.mark.parametrize("shape", [(1, 64, 64), (3, 128, 128), (128, 128)])
 def test_a_phase_of_another_shape_is_refused_in_one_line(shape):
-    made = rig()
-    made.prepare(asked(), quiet)
+    bench_rig = rig()
+    bench_rig.prepare(asked(), quiet)
     with pytest.raises(CellError, match=r"simulated panel with its wavelengths shows \(1, 128, 128\)"):
-        made.photograph(asked(torch.zeros(shape)))
+        bench_rig.photograph(asked(torch.zeros(shape)))
     with pytest.raises(CellError, match="no finite real numbers"):
-        made.photograph(asked(torch.full((1, 128, 128), torch.nan)))
+        bench_rig.photograph(asked(torch.full((1, 128, 128), torch.nan)))
 
 
 def test_a_dropped_frame_is_taken_again():
-    made = rig()
-    made.prepare(asked(), quiet)
-    made.camera.failures = 1
-    before = made.slm.shown
-    assert made.photograph(asked()).light.isfinite().all()
-    assert made.slm.shown == before + 2  # the hologram too, since nobody knows what the panel shows
+    bench_rig = rig()
+    bench_rig.prepare(asked(), quiet)
+    bench_rig.camera.failures = 1
+    before = bench_rig.slm.shown
+    assert bench_rig.photograph(asked()).light.isfinite().all()
+    assert bench_rig.slm.shown == before + 2  # the hologram too, since nobody knows what the panel shows
 
 
 def test_a_device_that_fails_costs_a_cell_and_one_that_is_gone_ends_the_run():
-    made = rig()
-    made.prepare(asked(), quiet)
-    made.slm.failures = 2
+    bench_rig = rig()
+    bench_rig.prepare(asked(), quiet)
+    bench_rig.slm.failures = 2
     with pytest.raises(CellError, match="no photograph: simulated panel: not connected"):
-        made.photograph(asked())
-    made.photograph(asked())
-    made.camera.failures = 1000
+        bench_rig.photograph(asked())
+    bench_rig.photograph(asked())
+    bench_rig.camera.failures = 1000
     with pytest.raises(CellError, match="no photograph"):
-        made.photograph(asked())
+        bench_rig.photograph(asked())
     with pytest.raises(LostDeviceError, match="does not answer any more: simulated camera: no frame") as error:
-        made.photograph(asked())
+        bench_rig.photograph(asked())
     assert "\n" not in str(error.value)
 
 
 def test_a_device_that_fails_while_preparing_is_one_line():
-    made = rig()
-    made.camera.failures = 1
+    bench_rig = rig()
+    bench_rig.camera.failures = 1
     with pytest.raises(UserError, match="the bench is not ready: simulated camera: no frame"):
-        made.prepare(asked(), quiet)
+        bench_rig.prepare(asked(), quiet)
 
 
 def test_without_a_switch_the_user_is_asked_to_block_the_beam_once_each_way():
-    made, heard = rig(), []
+    bench_rig, heard = rig(), []
 
     def ask(line):
         heard.append(line)
-        made.scene.select(None if line.startswith("block") else GREEN)
+        bench_rig.scene.select(None if line.startswith("block") else GREEN)
 
-    made.laser = SteadyLaser(ask)
-    made.scene.select(GREEN)
-    made.prepare(asked(), quiet)
+    bench_rig.laser = SteadyLaser(ask)
+    bench_rig.scene.select(GREEN)
+    bench_rig.prepare(asked(), quiet)
     assert heard == ["block the laser beam", "open the laser beam again"]
 
 
 def test_closing_turns_the_lasers_off():
-    made = rig()
-    made.close()
-    assert made.scene.selected == [None]
+    bench_rig = rig()
+    bench_rig.close()
+    assert bench_rig.scene.selected == [None]
 
 
 def test_a_colour_cameras_plane_follows_the_wavelength():

@@ -5,13 +5,13 @@ from holobench_eval.imaging.convention import Convention
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.exposure import averaged
 from holobench_eval.lab.settle import Toggle, settle_time
-from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, bench, letter_phase
+from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
 
 
 def toggle(scene, **camera):
     panel, device = SimulatedSlm(scene), SimulatedCamera(scene, **{"noise": 2.0, **camera})
     scene.channel = GREEN
-    letter = letter_phase()[GREEN]
+    letter = pattern_phase()[GREEN]
     levels = {bright: Convention().levels(letter * bright) for bright in (True, False)}
     return Toggle(
         show=lambda bright: panel.show(levels[bright]),

@@ -15,8 +15,7 @@ from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import Relay
 
-ROOM = 0.6
-"""Of full scale, for the brightest of the fiducial holograms."""
+ROOM = 0.6  # of full scale, for the brightest of the fiducial holograms
 
 
 def another_pose(seed: int) -> Relay:
@@ -34,8 +33,8 @@ class Lab:
     """A simulated bench behind files. gain: counts per electron."""
 
     def __init__(self, profile: str, panel: tuple[int, int], seed: int, dark: int = 900) -> None:
-        loaded = load_profile(profile).scaled(panel)
-        self.bench = SimulatedBench(replace(loaded, relay=another_pose(seed)))
+        description = load_profile(profile).scaled(panel)
+        self.bench = SimulatedBench(replace(description, relay=another_pose(seed)))
         self.draw = torch.Generator().manual_seed(seed)
         self.dark, self.gain = dark, None
 

@@ -16,7 +16,7 @@ from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages.relay import sample
 from holobench_eval.imaging.convention import Levels
 from holobench_eval.lab.devices import Counts, DeviceError
-from holobench_eval.lab.test_pattern import letter
+from holobench_eval.lab.test_pattern import draw_pattern
 from holobench_eval.methods.initial_phase import InitialPhase
 from holobench_eval.methods.wirtinger import Wirtinger
 
@@ -40,11 +40,11 @@ def bench(profile: str = "leto-mild") -> SimulatedBench:
 
 
 @lru_cache(maxsize=4)
-def letter_phase(profile: str = "leto-mild", initial_phase: InitialPhase = "random") -> Tensor:
-    """Hologram ``(3, H, W)`` of the letter from nominal optics."""
-    place = CalibratedBench(bench(profile), 0)
-    target = letter(place.spec.region.shape).expand(3, -1, -1)
-    handle = place.for_method(Wirtinger(), "wirtinger", target, "letter", 0)
+def pattern_phase(profile: str = "leto-mild", initial_phase: InitialPhase = "random") -> Tensor:
+    """Hologram ``(3, H, W)`` of the test pattern from nominal optics."""
+    display = CalibratedBench(bench(profile), 0)
+    target = draw_pattern(display.spec.region.shape).expand(3, -1, -1)
+    handle = display.for_method(Wirtinger(), "wirtinger", target, "letter", 0)
     return Wirtinger(iterations=30, initial_phase=initial_phase).solve(target[None], handle)[0]
 
 
@@ -99,8 +99,8 @@ class Scene:
         assert self.channel is not None
         key = (levels.tobytes(), self.channel)
         if key not in self.seen:
-            shown = levels[:, ::-1] if self.flipped else levels
-            phase = torch.from_numpy(self.sign * math.tau * shown.astype(np.float32) / self.two_pi_level)
+            picture = levels[:, ::-1] if self.flipped else levels
+            phase = torch.from_numpy(self.sign * math.tau * picture.astype(np.float32) / self.two_pi_level)
             light = self.bench.integrated(phase, self.channel)
             light = sample(light, self.bench.grid, self.bench.image_samples).double().numpy()
             self.seen[key] = light[:, ::-1] if self.mirrored else light

@@ -76,8 +76,8 @@ def two_monitors() -> Iterator[str]:
         )
         os.close(writer)
         try:
-            with os.fdopen(reader) as told:  # ends with the server, should it not start
-                number = told.readline().strip()
+            with os.fdopen(reader) as answer:  # ends with the server, should it not start
+                number = answer.readline().strip()
             if not number:
                 log = Path(folder) / "log"
                 pytest.skip(f"the X server does not start: {log.read_text()[-300:] if log.exists() else 'no log'}")

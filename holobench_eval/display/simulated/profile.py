@@ -11,7 +11,7 @@ from typing import Annotated
 from annotated_types import Interval, MinLen
 
 from ...core.errors import UserError, suggest
-from ...core.schema import check_keys, typed
+from ...core.schema import typed
 from ...core.yaml_source import load
 from ..api import DisplaySpec, Region
 from .stages import (
@@ -145,7 +145,6 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     else:
         raise UserError(f"unknown profile '{name}'; {suggest(name, names())}, or a path to a .yaml file")
     document = load(path)
-    check_keys(document, Profile, document.data)
     profile = typed(document, Profile)
     if profile.lut.table and len(profile.lut.table) != 2**profile.panel.bits:
         levels = 2**profile.panel.bits

@@ -15,8 +15,9 @@ from typing import Any
 from ...core.errors import UserError
 from ..devices import Counts, DeviceError
 from ..raw import RawFrame, is_jpeg, read_raw
+from .driver import Driver, import_package, only
 from .shutter import exact, nearest, speeds
-from .worker import Worker, line
+from .worker import Worker, closed_on_failure
 
 OPENING = 60.0  # seconds, with a first picture
 CAPTURING = 30.0  # beyond the exposure, which long-exposure noise reduction may double
@@ -55,12 +56,9 @@ class Gphoto2Camera:
         self._camera: Any = None
         self._gp = _gphoto2()
         self._worker = Worker(self.name)
-        try:
+        with closed_on_failure(self.close):
             self._worker.call("opening", OPENING, self._open)
             first, _ = self._picture(nearest(self._shutter, 0.01))
-        except BaseException:
-            self.close()
-            raise
         self.white = first.white
 
     @property
@@ -81,16 +79,14 @@ class Gphoto2Camera:
 
     def _open(self) -> None:
         gp, settings = self._gp, self._settings
-        found = _found(gp)
+        answering = _answering(gp)
         fitting = [
             (model, port)
-            for model, port in found
+            for model, port in answering
             if settings.model.lower() in ("", model.lower()) and settings.port in ("", port)
         ]
-        if len(fitting) != 1:
-            listed = ", ".join(f"{model} at {port}" for model, port in found) or "none; is it on, and not in use?"
-            raise UserError(f"{len(fitting) or 'no'} cameras '{settings.model or 'any'}'; found: {listed}")
-        model, port = fitting[0]
+        listed = [f"{model} at {port}" for model, port in answering]
+        model, port = only("camera", settings.model or "any", fitting, listed)
         camera = gp.Camera()
         abilities, ports = gp.CameraAbilitiesList(), gp.PortInfoList()
         abilities.load()
@@ -186,25 +182,22 @@ def list_cameras() -> list[str]:
     gp = _gphoto2()
     worker = Worker("libgphoto2")
     try:
-        found = worker.call("looking for cameras", CAPTURING, lambda: _found(gp))
+        answering = worker.call("looking for cameras", CAPTURING, lambda: _answering(gp))
     finally:
         worker.stop(0, lambda: None)
-    return [f"{model} at {port}" for model, port in found]
+    return [f"{model} at {port}" for model, port in answering]
 
 
-def _found(gp: Any) -> list[tuple[str, str]]:
-    answering = gp.Camera.autodetect()
-    return [(answering.get_name(index), answering.get_value(index)) for index in range(answering.count())]
+def _answering(gp: Any) -> list[tuple[str, str]]:
+    """Model and port of every camera that is there."""
+    cameras = gp.Camera.autodetect()
+    return [(cameras.get_name(index), cameras.get_value(index)) for index in range(cameras.count())]
 
 
 def _gphoto2() -> Any:
-    try:
-        import gphoto2
-    except ImportError as error:
-        hint = "pip install 'holobench_eval[gphoto2]'"
-        raise UserError(f"driver 'gphoto2' needs the package gphoto2: {hint} ({line(error)})") from error
-    try:
-        import rawpy  # noqa: F401
-    except ImportError as error:
-        raise UserError("driver 'gphoto2' needs rawpy to read RAW files: pip install 'holobench_eval[raw]'") from error
+    gphoto2 = import_package("gphoto2", "gphoto2", "the package gphoto2", "gphoto2")
+    import_package("gphoto2", "rawpy", "rawpy to read RAW files", "raw")
     return gphoto2
+
+
+DRIVERS = (Driver("camera", "gphoto2", Gphoto2Settings, Gphoto2Camera, "gphoto2", "gphoto2", list_cameras),)

@@ -11,8 +11,9 @@ import numpy as np
 from annotated_types import Interval, MinLen
 
 from ...core.errors import UserError, suggest
-from ..devices import Counts, DeviceError
-from .worker import Worker, line
+from ..devices import Counts
+from .driver import Driver, check_counts, import_package
+from .worker import Worker, closed_on_failure, line
 
 OPENING = 120.0  # seconds; a configuration loads every device of a microscope
 READING = 20.0  # beyond the exposure
@@ -47,11 +48,8 @@ class MicromanagerCamera:
         self.name = "Micro-Manager"
         self._core: Any = None
         self._worker = Worker(self.name)
-        try:
+        with closed_on_failure(self.close):
             self._worker.call("loading its configuration", OPENING, lambda: self._open(settings))
-        except BaseException:
-            self.close()
-            raise
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """A snap, and the exposure [s] that the camera reports of it."""
@@ -86,7 +84,7 @@ class MicromanagerCamera:
         if core.getNumberOfComponents() not in (1, 4) or self._bytes_of_a_sample() > 2:
             raise UserError(f"{self.name} gives no 8 or 16 bit counts; set another PixelType in properties")
         self.white = float(2 ** min(core.getImageBitDepth(), 8 * self._bytes_of_a_sample()) - 1)
-        self.exposures = settings.exposures or self._told_exposures()
+        self.exposures = settings.exposures or self._reported_exposures()
 
     def _bytes_of_a_sample(self) -> int:
         return int(self._core.getBytesPerPixel() // self._core.getNumberOfComponents())
@@ -104,7 +102,7 @@ class MicromanagerCamera:
                 hint = f"; allowed: {allowed}" if allowed else ""
                 raise UserError(f"camera '{label}': property '{name}' cannot be '{value}'{hint}") from error
 
-    def _told_exposures(self) -> tuple[float, float]:
+    def _reported_exposures(self) -> tuple[float, float]:
         core, label = self._core, self._label
         if core.hasProperty(label, "Exposure") and core.hasPropertyLimits(label, "Exposure"):
             lower, upper = (
@@ -121,10 +119,7 @@ class MicromanagerCamera:
         real = core.getExposure() / 1000
         core.snapImage()
         frame = np.asarray(core.getImage())
-        if frame.dtype not in (np.uint8, np.uint16) or frame.ndim not in (2, 3):
-            raise DeviceError(f"{self.name} gave a {frame.dtype} frame of {frame.shape}, not whole counts")
-        if frame.max() > self.white:
-            raise DeviceError(f"{self.name} gave {frame.max()} counts, but {self.white:.0f} are its white")
+        check_counts(self.name, frame, self.white)
         return frame[..., :3].copy() if frame.ndim == 3 else frame.copy(), real
 
     def _close(self) -> None:
@@ -134,22 +129,28 @@ class MicromanagerCamera:
 
 def list_installations() -> list[str]:
     """The folders of device adapters that are found without being told; UserError for none, or no package."""
-    return _installed(_core())
-
-
-def _installed(core: Any) -> list[str]:
-    folders = [str(folder) for folder in core.getDeviceAdapterSearchPaths()]
+    folders = [str(folder) for folder in _core().getDeviceAdapterSearchPaths()]
     if not folders:
         raise UserError("driver 'micromanager': no Micro-Manager found; run mmcore install, or set adapters")
     return folders
 
 
 def _core() -> Any:
-    try:
-        from pymmcore_plus import CMMCorePlus
-    except ImportError as error:
-        hint = "pip install 'holobench_eval[micromanager]'"
-        raise UserError(f"driver 'micromanager' needs pymmcore-plus: {hint} ({line(error)})") from error
-    core: Any = CMMCorePlus()
+    package = import_package("micromanager", "pymmcore_plus", "pymmcore-plus", "micromanager")
+    core = package.CMMCorePlus()
     core.enableStderrLog(False)
     return core
+
+
+DRIVERS = (
+    Driver(
+        "camera",
+        "micromanager",
+        MicromanagerSettings,
+        MicromanagerCamera,
+        "pymmcore-plus",
+        "micromanager",
+        lambda: list_installations() and [],
+        "Micro-Manager does not look for cameras: write a configuration with its hardware wizard and give it as config",
+    ),
+)

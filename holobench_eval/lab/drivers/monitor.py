@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ...core.errors import UserError
 from ...imaging.convention import Levels
 from ..devices import DeviceError
-from .levels import check_levels
+from .driver import Driver, check_levels, only
 from .screen_check import gamma_is_straight, grab
 from .window import Window, screens
-from .worker import Worker
+from .worker import Worker, closed_on_failure
 
 SECONDS = 20.0  # a graphics driver that takes longer hangs
 GRABS = 20  # a desktop may take some frames until a new picture is on its screen
@@ -53,11 +53,8 @@ class MonitorSlm:
         self.name = f"monitor {settings.name} {columns}x{rows}"
         self._window: Window | None = None
         self._worker = Worker(self.name, idle=self._pump)
-        try:
+        with closed_on_failure(self.close):
             self._worker.call("opening its window", SECONDS, self._open)
-        except BaseException:
-            self.close()
-            raise
 
     def show(self, levels: Levels) -> None:
         """Show ``(H, W)`` uint8 levels and read them back; returns after the second refresh of the screen.
@@ -114,20 +111,17 @@ class MonitorSlm:
             self._window = None
 
 
-def matching(found: Sequence[Any], settings: MonitorSettings) -> Any:
+def matching(screens: Sequence[Any], settings: MonitorSettings) -> Any:
     """The one screen with the name and the resolution that are asked for; UserError that lists all for none or more."""
     wanted = (settings.name.strip().lower(), *settings.resolution)
-    fitting = [screen for screen in found if (_name(screen).lower(), screen.width, screen.height) == wanted]
-    if len(fitting) == 1:
-        return fitting[0]
+    fitting = [screen for screen in screens if (_name(screen).lower(), screen.width, screen.height) == wanted]
     asked = f"{settings.name} {settings.resolution[0]}x{settings.resolution[1]}"
-    number = "no monitor" if not fitting else f"{len(fitting)} monitors"
-    raise UserError(f"{number} '{asked}'; found: {', '.join(described(found)) or 'none'}")
+    return only("monitor", asked, fitting, described(screens))
 
 
-def described(found: Sequence[Any]) -> list[str]:
+def described(screens: Sequence[Any]) -> list[str]:
     """``HDMI-1 1920x1080`` for every screen."""
-    return [f"{_name(screen)} {screen.width}x{screen.height}" for screen in found]
+    return [f"{_name(screen)} {screen.width}x{screen.height}" for screen in screens]
 
 
 def list_monitors() -> list[str]:
@@ -155,3 +149,6 @@ def _difference(picture: NDArray[np.uint8], levels: Levels) -> str:
         f"{np.count_nonzero(wrong)} of {wrong.size} pixels, the first at row {row}, column {column}: "
         f"red, green, blue {got} for {levels[row, column]}"
     )
+
+
+DRIVERS = (Driver("slm", "monitor", MonitorSettings, MonitorSlm, "pyglet", "monitor", list_monitors),)

@@ -17,7 +17,8 @@ from annotated_types import Interval, MinLen
 
 from ...core.errors import UserError
 from ..devices import Counts, DeviceError
-from .worker import Worker
+from .driver import Driver, check_counts
+from .worker import Worker, closed_on_failure
 
 OPENING = 30.0  # seconds
 READING = 20.0  # beyond the exposures
@@ -68,11 +69,8 @@ class OpencvCamera:
         self._settings = settings
         self._capture = capture
         self._worker = Worker(self.name)
-        try:
+        with closed_on_failure(self.close):
             self._worker.call("opening", OPENING, self._open)
-        except BaseException:
-            self.close()
-            raise
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """A frame after some that are thrown away, since the driver had begun them before, and its exposure [s]."""
@@ -81,8 +79,7 @@ class OpencvCamera:
         kind = np.uint16 if self._settings.format == "Y16" else np.uint8
         if frame.dtype != kind or frame.shape not in ((rows, columns), (rows, columns, 3)):
             raise DeviceError(f"{self.name} gave a {frame.dtype} frame of {frame.shape}, not {kind.__name__}")
-        if frame.max() > self.white:
-            raise DeviceError(f"{self.name} gave {frame.max()} counts, but {self.white:.0f} are its white; set bits")
+        check_counts(self.name, frame, self.white, "; set bits")
         return frame, real
 
     def close(self) -> None:
@@ -101,7 +98,7 @@ class OpencvCamera:
         self._name_format(cv2)
         # from the control that drives the others to those that it would drive
         manual = 1.0 if sys.platform.startswith("linux") else 0.25  # V4L2's and DirectShow's word for it
-        self._switch("auto exposure", cv2.CAP_PROP_AUTO_EXPOSURE, manual, needed=True)
+        self._switch("auto exposure", cv2.CAP_PROP_AUTO_EXPOSURE, manual, optional=False)
         self._switch("auto white balance", cv2.CAP_PROP_AUTO_WB, 0.0)
         self._switch("gain", cv2.CAP_PROP_GAIN, settings.gain)
         self._switch("gamma", cv2.CAP_PROP_GAMMA, settings.gamma)
@@ -124,9 +121,9 @@ class OpencvCamera:
         if sides != settings.resolution:
             raise UserError(f"{self.name} gives {sides[0]}x{sides[1]} pixels, not {settings.resolution}")
 
-    def _switch(self, what: str, control: int, value: float, *, needed: bool = False) -> None:
+    def _switch(self, what: str, control: int, value: float, *, optional: bool = True) -> None:
         capture = self._capture
-        if capture.get(control) in ABSENT and not needed:
+        if capture.get(control) in ABSENT and optional:
             return
         taken = capture.set(control, value)
         kept = capture.get(control)
@@ -169,3 +166,6 @@ def _unpacked(frame: Counts, rows: int, columns: int) -> Counts:
 def list_cameras() -> list[str]:
     """The video devices of this computer, as far as it has names for them (Linux)."""
     return sorted(str(link) for link in Path("/dev/v4l/by-id").glob("*"))
+
+
+DRIVERS = (Driver("camera", "opencv", OpencvSettings, OpencvCamera, "opencv-python-headless", "", list_cameras),)

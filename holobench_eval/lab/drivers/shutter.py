@@ -28,8 +28,8 @@ def seconds(text: str) -> float | None:
 
 def speeds(choices: Iterable[str]) -> dict[float, str]:
     """Time [s] to the camera's own word for it, shortest first, without what is no time."""
-    told = {time: choice for choice in choices if (time := seconds(choice)) is not None}
-    return dict(sorted(told.items()))
+    words = {time: choice for choice in choices if (time := seconds(choice)) is not None}
+    return dict(sorted(words.items()))
 
 
 def nearest(times: Iterable[float], wanted: float) -> float:

@@ -21,10 +21,10 @@ from annotated_types import MinLen
 from ...core.errors import UserError, suggest
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
-from .levels import check_levels
-from .worker import Worker, line
+from .driver import Driver, check_counts, check_levels, import_package
+from .worker import Worker, closed_on_failure, line
 
-Kind = Literal["slms", "cameras"]
+Hardware = Literal["slms", "cameras"]
 
 OPENING = 60.0  # seconds; some SDKs upload a look-up table first
 SHOWING = 20.0
@@ -78,8 +78,8 @@ class SlmsuiteSlm:
         self._worker.stop(SHOWING, self._slm.close)
 
     def _write(self, levels: Levels) -> Any:
-        shown = self._slm.set_phase(levels, phase_correct=False, settle=False)
-        return np.asarray(shown.get() if hasattr(shown, "get") else shown)  # get: from a graphics card's memory
+        written = self._slm.set_phase(levels, phase_correct=False, settle=False)
+        return np.asarray(written.get() if hasattr(written, "get") else written)  # get: from a graphics card's memory
 
 
 class SlmsuiteCamera:
@@ -105,12 +105,7 @@ class SlmsuiteCamera:
         """A frame that was begun after the call, and the exposure [s] that the camera reports of it."""
         limit = READING + 6 * seconds * self._camera.capture_attempts  # some frames are thrown away first
         frame, real = self._worker.call("taking a picture", limit, lambda: self._take(seconds))
-        if frame.dtype not in (np.uint8, np.uint16) or not frame.size:
-            raise DeviceError(f"{self.name} gave a {frame.dtype} frame of {frame.shape}, not whole counts")
-        if frame.max() > self.white:
-            raise DeviceError(
-                f"{self.name} gave {frame.max()} counts, but {self.white:.0f} are its white; set its bit depth"
-            )
+        check_counts(self.name, frame, self.white, "; set its bit depth")
         return frame, real
 
     def close(self) -> None:
@@ -123,39 +118,31 @@ class SlmsuiteCamera:
         return np.asarray(self._camera.get_image(averaging=False, hdr=False)), real
 
 
-def classes(kind: Kind) -> list[str]:
+def classes(kind: Hardware) -> list[str]:
     """The modules of slmsuite that drive panels or cameras, sorted. UserError where it is not installed."""
     package = _package(kind)
     names = {module.name for module in pkgutil.iter_modules(package.__path__)}
     return sorted(name for name in names if not name.startswith("_") and name not in ("camera", "slm", "template"))
 
 
-def _package(kind: Kind) -> Any:
-    try:
-        package = importlib.import_module(f"slmsuite.hardware.{kind}")
-        # as it comes, it writes to the standard output, where results go
-        importlib.import_module("slmsuite").configure_logging(logging.WARNING, sys.stderr)
-        return package
-    except ImportError as error:
-        raise UserError(
-            f"driver 'slmsuite' needs slmsuite: pip install 'holobench_eval[slmsuite]' ({error})"
-        ) from error
+def _package(kind: Hardware) -> Any:
+    package = import_package("slmsuite", f"slmsuite.hardware.{kind}", "slmsuite", "slmsuite")
+    # as it comes, it writes to the standard output, where results go
+    importlib.import_module("slmsuite").configure_logging(logging.WARNING, sys.stderr)
+    return package
 
 
-def _opened(kind: Kind, make: SlmsuiteSettings | Any) -> tuple[Worker, Any]:
+def _opened(kind: Hardware, make: SlmsuiteSettings | Any) -> tuple[Worker, Any]:
     """The device and the thread that it lives on."""
     if not isinstance(make, SlmsuiteSettings):
         return Worker(f"slmsuite {make.name}"), make
     maker = _find(kind, make.device)
     worker = Worker(f"slmsuite {make.device}")
-    try:
+    with closed_on_failure(lambda: worker.stop(0, lambda: None)):
         return worker, worker.call("opening", OPENING, lambda: _build(maker, make.device, make.arguments))
-    except BaseException:
-        worker.stop(0, lambda: None)
-        raise
 
 
-def _find(kind: Kind, device: str) -> Any:
+def _find(kind: Hardware, device: str) -> Any:
     module, _, name = device.partition(".")
     if device in ELSEWHERE:
         raise UserError(f"device '{device}': take {ELSEWHERE[device]}")
@@ -167,11 +154,13 @@ def _find(kind: Kind, device: str) -> Any:
         raise UserError(f"device '{device}' needs its maker's software: {line(error)}") from error
     base = importlib.import_module(f"slmsuite.hardware.{kind}.{kind[:-1]}")
     parent = base.SLM if kind == "slms" else base.Camera
-    made = {key: kept for key, kept in vars(loaded).items() if isinstance(kept, type) and issubclass(kept, parent)}
-    made.pop(parent.__name__, None)
-    if name not in made:
-        raise UserError(f"slmsuite.hardware.{kind}.{module} has no class '{name}'; {suggest(name, made)}")
-    return made[name]
+    device_classes = {
+        key: item for key, item in vars(loaded).items() if isinstance(item, type) and issubclass(item, parent)
+    }
+    device_classes.pop(parent.__name__, None)
+    if name not in device_classes:
+        raise UserError(f"slmsuite.hardware.{kind}.{module} has no class '{name}'; {suggest(name, device_classes)}")
+    return device_classes[name]
 
 
 def _build(maker: Any, device: str, arguments: Mapping[str, Any]) -> Any:
@@ -181,3 +170,27 @@ def _build(maker: Any, device: str, arguments: Mapping[str, Any]) -> Any:
         raise UserError(f"device '{device}' needs its maker's software: {line(error)}") from error
     except (TypeError, ValueError) as error:
         raise UserError(f"device '{device}' cannot be built with these arguments: {line(error)}") from error
+
+
+DRIVERS = (
+    Driver(
+        "slm",
+        "slmsuite",
+        SlmsuiteSettings,
+        SlmsuiteSlm,
+        "slmsuite",
+        "slmsuite",
+        lambda: classes("slms") and [],
+        "slmsuite does not look for panels: give the class of yours as device, such as holoeye.Holoeye",
+    ),
+    Driver(
+        "camera",
+        "slmsuite",
+        SlmsuiteSettings,
+        SlmsuiteCamera,
+        "slmsuite",
+        "slmsuite",
+        lambda: classes("cameras") and [],
+        "slmsuite does not look for cameras: give the class of yours as device, such as thorlabs.ThorCam",
+    ),
+)

@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from ...core.errors import UserError
 from ...imaging.convention import Levels
+from .driver import import_package
 
 
 def load_pyglet() -> Any:
     """The package pyglet with what a window needs. UserError where it or the system's OpenGL is missing."""
-    try:
-        import pyglet
-    except ImportError as error:
-        raise UserError("driver 'monitor' needs pyglet: pip install 'holobench_eval[monitor]'") from error
+    pyglet = import_package("monitor", "pyglet", "pyglet", "monitor")
     pyglet.options["shadow_window"] = False  # a second, hidden window, in whichever thread imports first
     pyglet.options["dpi_scaling"] = "real"  # a pixel of the window is a pixel of the panel
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
@@ -69,8 +69,7 @@ class Worker:
             try:
                 task = self._tasks.get(timeout=TICK if self._idle else None)
             except queue.Empty:
-                if self._idle and not self._quietly(self._idle):
-                    self._idle = None
+                self._rest()
                 continue
             if task is None:
                 return
@@ -80,13 +79,22 @@ class Worker:
             except BaseException as error:
                 future.set_exception(error)
 
-    @staticmethod
-    def _quietly(function: Callable[[], None]) -> bool:
+    def _rest(self) -> None:
         try:
-            function()
+            if self._idle:
+                self._idle()
         except Exception:  # shows itself at the next call, whose answer somebody waits for
-            return False
-        return True
+            self._idle = None
+
+
+@contextlib.contextmanager
+def closed_on_failure(close: Callable[[], object]) -> Iterator[None]:
+    """Give a device back whose opening fails half-way."""
+    try:
+        yield
+    except BaseException:
+        close()
+        raise
 
 
 def line(error: BaseException) -> str:

@@ -15,38 +15,34 @@ from .frames import Facts
 from .manifest import DARK, HOLOGRAM, Pattern
 
 DEPTHS = (8, 10, 12, 14, 16)
-DIM = 0.4
-"""Of the camera's range: a series whose brightest sample stays below is told to be exposed too short."""
 EIGHT_BITS = 255.0
-BRIGHTEST_DARK = 0.2
-"""Of the mean of the other photographs: a dark frame as bright as this was taken with the laser on."""
-SHOWN = 5
-"""Faults of one kind that are named."""
-THUMBNAIL = 96
-"""Pixels of the longer side of the small pictures that tell which hologram a photograph shows."""
-CLEARLY = 0.1
-"""By how much another pattern's picture has to be more like a photograph than its own, in correlation."""
+DIM = 0.4  # of the camera's range: a series whose brightest sample stays below is exposed too short
+BRIGHTEST_DARK = 0.2  # of the mean of the other photographs: a dark frame as bright as this had the laser on
+LISTED = 5  # faults of one kind that are named
+THUMBNAIL = 96  # pixels of the longer side of the small pictures that tell which hologram a photograph shows
+CLEARLY = 0.1  # by how much another pattern's picture is more like a photograph than its own, in correlation
+
+Numbered = Sequence[tuple[Pattern, Facts]]  # the photographs of a round, each with the pattern that it should show
 
 
 @dataclass(frozen=True)
 class Series:
     """The photographs of a round that can be used.
 
-    white: counts from which a sample is saturated; saturated: fraction of such samples by capture name; notes: what a
-    reader of the scores should know, a line each.
+    saturated: fraction of saturated samples, by capture name; notes: what a reader of the scores should know, line by
+    line.
     """
 
-    white: float
     saturated: Mapping[str, float]
     notes: tuple[str, ...]
 
 
-def check_present(folder: Path, patterns: Sequence[Pattern], found: Mapping[str, Path | None]) -> list[str]:
-    """Faults: photographs that are not there; found: the file of every capture, by its name."""
-    missing = [pattern.capture for pattern in patterns if found[pattern.capture] is None]
+def check_present(folder: Path, patterns: Sequence[Pattern], files: Mapping[str, Path | None]) -> list[str]:
+    """Faults: photographs that are not there; files: that of every capture, by its name."""
+    missing = [pattern.capture for pattern in patterns if files[pattern.capture] is None]
     if len(missing) == len(patterns):
         return [f"none of the {len(missing)} photographs is in {folder / Path(missing[0]).parent}"]
-    return _told(missing, "missing: {} (.png, .tif or the camera's RAW)")
+    return _line_of(missing, "missing: {} (.png, .tif or the camera's RAW)")
 
 
 def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tuple[Series, list[str]]:
@@ -54,18 +50,18 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
 
     facts: by the name of a pattern's capture, complete.
     """
-    shown = [(pattern, facts[pattern.capture]) for pattern in patterns]
-    faults = _kinds(shown) or _sizes(shown) or [*_repeated(shown), *_dark(shown)]
-    white, notes = _white([frame for _, frame in shown])
+    photographs = [(pattern, facts[pattern.capture]) for pattern in patterns]
+    faults = _unlike_most(photographs) or [*_repeated(photographs), *_dark(photographs)]
+    white, notes = _white([frame for _, frame in photographs])
     shares: dict[str, float] = {}
-    for pattern, frame in shown:
+    for pattern, frame in photographs:
         shares[pattern.capture] = share = frame.at_highest if frame.highest >= white else 0.0
         if share > MOST_SATURATED and pattern.role != DARK:
             faults.append(
                 f"saturated: {share:.2%} of {pattern.capture} is at {white:g} counts, more than {MOST_SATURATED:.1%}; "
                 "shorten the session's exposure and photograph all patterns again"
             )
-    highest = max(frame.highest for pattern, frame in shown if pattern.role != DARK)
+    highest = max(frame.highest for pattern, frame in photographs if pattern.role != DARK)
     if highest < DIM * white:
         notes.append(
             f"the brightest photograph uses {highest / white:.0%} of the camera's {white:g} counts: expose longer, "
@@ -73,9 +69,9 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
         )
     if white <= EIGHT_BITS:
         notes.append("photographs have 8 bits or fewer: what is dark is rounded, which can change a ranking")
-    if not all(frame.linear for _, frame in shown):
+    if not all(frame.linear for _, frame in photographs):
         notes.append("photographs are JPEG, decoded as sRGB: not linear in light, so that scores are indicative only")
-    return Series(white, shares, tuple(notes)), _shortened(faults)
+    return Series(shares, tuple(notes)), _shortened(faults)
 
 
 def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:
@@ -99,26 +95,23 @@ def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:
     return float(2**bits - 1), notes
 
 
-def _kinds(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
-    """Photographs saved in another way than most: their counts cannot be compared."""
-    kinds = [(frame.top, frame.linear) for _, frame in shown]
+def _unlike_most(photographs: Numbered) -> list[str]:
+    """Photographs that were saved in another way than most, whose counts cannot be compared; else of another size."""
+    kinds = [(frame.top, frame.linear) for _, frame in photographs]
     usual = max(set(kinds), key=kinds.count)
-    odd = [pattern.capture for (pattern, _), kind in zip(shown, kinds, strict=True) if kind != usual]
-    return _told(odd, "another kind of file: {}; save all photographs with the same depth and format")
+    odd = [pattern.capture for (pattern, _), kind in zip(photographs, kinds, strict=True) if kind != usual]
+    shapes = [frame.shape for _, frame in photographs]
+    size = max(set(shapes), key=shapes.count)
+    other = [f"{pattern.capture} has {frame.shape}" for pattern, frame in photographs if frame.shape != size]
+    return _line_of(odd, "another kind of file: {}; save all photographs with the same depth and format") or _line_of(
+        other, f"wrong size: {{}}, most have {size} pixels"
+    )
 
 
-def _sizes(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
-    """Photographs of another size than most."""
-    shapes = [frame.shape for _, frame in shown]
-    usual = max(set(shapes), key=shapes.count)
-    odd = [f"{pattern.capture} has {frame.shape}" for pattern, frame in shown if frame.shape != usual]
-    return _told(odd, f"wrong size: {{}}, most have {usual} pixels")
-
-
-def _repeated(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
+def _repeated(photographs: Numbered) -> list[str]:
     """Photographs with the same counts: noise alone makes two differ. Dark frames may have none at all."""
     faults, first = [], dict[str, Pattern]()
-    for pattern, frame in shown:
+    for pattern, frame in photographs:
         if pattern.role == DARK and not frame.highest:
             continue
         before = first.setdefault(frame.content, pattern)
@@ -131,21 +124,18 @@ def _repeated(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
     return faults
 
 
-def _dark(shown: Sequence[tuple[Pattern, Facts]]) -> list[str]:
+def _dark(photographs: Numbered) -> list[str]:
     """Dark frames that are not dark, and bright ones that are no brighter than those."""
-    dark = [frame.mean for pattern, frame in shown if pattern.role == DARK]
-    bright = [frame.mean for pattern, frame in shown if pattern.role != DARK]
+    dark = {pattern.capture: frame.mean for pattern, frame in photographs if pattern.role == DARK}
+    bright = [frame.mean for pattern, frame in photographs if pattern.role != DARK]
     if not dark or not bright:
         return []
-    light = float(np.median(bright)) - min(dark)
+    darkest = min(dark.values())
+    light = float(np.median(bright)) - darkest
     if light <= 0:
         return ["no light: the photographs of holograms are no brighter than the dark frames"]
-    odd = [
-        f"{pattern.capture}"
-        for pattern, frame in shown
-        if pattern.role == DARK and frame.mean - min(dark) > BRIGHTEST_DARK * light
-    ]
-    return _told(odd, "wrong order: {} should be dark; is the laser blocked, and the order that of order.csv?")
+    odd = [capture for capture, mean in dark.items() if mean - darkest > BRIGHTEST_DARK * light]
+    return _line_of(odd, "wrong order: {} should be dark; is the laser blocked, and the order that of order.csv?")
 
 
 def check_order(
@@ -161,14 +151,12 @@ def check_order(
     faults = []
     for colour in sorted({pattern.colour for pattern in known}):
         same = [pattern for pattern in known if pattern.colour == colour]
-        expected, found = (np.stack([rows[one.capture] for one in same]) for rows in (wanted, seen))
-        likeness = expected @ found.T
+        expected, photographed = (np.stack([rows[pattern.capture] for pattern in same]) for rows in (wanted, seen))
         grids = np.array([pattern.role != HOLOGRAM for pattern in same])
-        for index, pattern in enumerate(same):
-            alike = likeness[:, index]
-            own = alike[grids].max() if grids[index] else alike[index]
-            best = int(np.where(grids, -np.inf, alike).argmax()) if grids[index] else int(alike.argmax())
-            if alike[best] > own + CLEARLY:
+        for index, (pattern, similarity) in enumerate(zip(same, photographed @ expected.T, strict=True)):
+            own = similarity[grids].max() if grids[index] else similarity[index]
+            best = int(np.where(grids, -np.inf, similarity).argmax()) if grids[index] else int(similarity.argmax())
+            if similarity[best] > own + CLEARLY:
                 faults.append(f"wrong order: {pattern.capture} shows pattern {same[best].number:04d}")
     return _shortened(faults)
 
@@ -182,12 +170,10 @@ def thumbnail(picture: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.asarray(row / max(float(np.linalg.norm(row)), 1e-12))
 
 
-def _told(names: Sequence[str], line: str) -> list[str]:
-    """One line for many names."""
-    if not names:
-        return []
-    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    return [line.format(", ".join(names[:SHOWN]) + more)]
+def _line_of(names: Sequence[str], line: str) -> list[str]:
+    """One line for many names, none for none."""
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return [line.format(", ".join(names[:LISTED]) + more)] if names else []
 
 
 def _shortened(faults: Sequence[str]) -> list[str]:
@@ -195,9 +181,9 @@ def _shortened(faults: Sequence[str]) -> list[str]:
     kinds: dict[str, list[str]] = {}
     for fault in faults:
         kinds.setdefault(fault.partition(":")[0], []).append(fault)
-    told = []
-    for kind, lines in kinds.items():
-        told += lines[:SHOWN]
-        if len(lines) > SHOWN:
-            told.append(f"{kind}: {len(lines) - SHOWN} more")
-    return told
+    lines = []
+    for kind, of_kind in kinds.items():
+        lines += of_kind[:LISTED]
+        if len(of_kind) > LISTED:
+            lines.append(f"{kind}: {len(of_kind) - LISTED} more")
+    return lines

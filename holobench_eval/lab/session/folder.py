@@ -7,6 +7,7 @@ import hashlib
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...core.io import write_atomically, write_png
 from ...imaging.convention import Levels
 from ..photograph import Photograph, Request, plane_of
 from .checks import Series, check_present, check_series
-from .frames import Facts, Plane, facts, find, read_frame
+from .frames import Frame, Plane, facts, find, read_frame
 from .manifest import (
     CAPTURES,
     DARK,
@@ -52,7 +53,7 @@ class FolderPhotographer:
         self._series: dict[int, Series] = {}
         self._contents: dict[str, str] = {}
         self._dark: dict[tuple[int, int], tuple[Plane, Plane]] = {}
-        self._known = {(one.key, one.colour): one for one in self.manifest.patterns}
+        self._known = {(pattern.key, pattern.colour): pattern for pattern in self.manifest.patterns}
 
     def announce(self, requests: Sequence[Request]) -> None:
         """Note what has no pattern yet."""
@@ -68,7 +69,7 @@ class FolderPhotographer:
         self.announce([request])
         key = self._key(request)
         patterns = [self._known.get((key, colour)) for colour in range(len(request.phase))]
-        taken = [one for one in patterns if one is not None and one.round in self._series]
+        taken = [pattern for pattern in patterns if pattern is not None and pattern.round in self._series]
         if len(taken) < len(patterns):
             raise Pending("this hologram has not been photographed yet")
         planes = [self.light(pattern) for pattern in taken]
@@ -86,9 +87,9 @@ class FolderPhotographer:
         """Counts without light, and by how much they grow with the relative exposure, sample by sample."""
         if (round_, colour) not in self._dark:
             frames: dict[float, list[Plane]] = {}
-            for one in self.manifest.of_round(round_):
-                if one.role == DARK and one.colour == colour:
-                    frames.setdefault(one.exposure, []).append(self._frame(one))
+            for pattern in self.manifest.of_round(round_):
+                if pattern.role == DARK and pattern.colour == colour:
+                    frames.setdefault(pattern.exposure, []).append(self._frame(pattern))
             short, long = min(frames), max(frames)
             low, high = (np.asarray(np.mean(frames[exposure], axis=0), dtype=np.float32) for exposure in (short, long))
             rate = np.asarray((high - low) / np.float32(max(long - short, 1e-9)), dtype=np.float32)
@@ -97,29 +98,31 @@ class FolderPhotographer:
 
     def _frame(self, pattern: Pattern) -> Plane:
         path = find(self.folder, pattern.capture)
-        known = (self.manifest.photographed or {}).get(pattern.capture)
         if path is None:
             raise CellError(f"{pattern.capture}: the photograph is gone")
-        frame = read_frame(path, plane_of(self.manifest.wavelengths[pattern.colour]))
-        if known is not None and frame.sha256 != known:
+        frame = self._read(path, pattern)
+        if (self.manifest.photographed or {}).get(pattern.capture, frame.sha256) != frame.sha256:
             raise CellError(f"{path}: has changed since its round was read; a session is one series of photographs")
         return frame.counts
+
+    def _read(self, path: Path, pattern: Pattern) -> Frame:
+        return read_frame(path, plane_of(self.manifest.wavelengths[pattern.colour]))
 
     def check_round(self, number: int) -> tuple[list[str], Mapping[str, str]]:
         """Read every photograph of a round, after those before it. Faults, a line each, and the sha256 of the files by
         capture name."""
         patterns = self.manifest.of_round(number)
-        found = {pattern.capture: find(self.folder, pattern.capture) for pattern in patterns}
-        faults = check_present(self.folder, patterns, found)
+        files = {pattern.capture: find(self.folder, pattern.capture) for pattern in patterns}
+        faults = check_present(self.folder, patterns, files)
         if faults:
             return faults, {}
-        known: dict[str, Facts] = {}
-        for pattern in patterns:
-            path = found[pattern.capture]
-            assert path is not None
-            known[pattern.capture] = facts(read_frame(path, plane_of(self.manifest.wavelengths[pattern.colour])))
-        before = self.manifest.photographed or {}
-        changed = [name for name, one in known.items() if before.get(name, one.sha256) != one.sha256]
+        known = {
+            pattern.capture: facts(self._read(path, pattern))
+            for pattern in patterns
+            if (path := files[pattern.capture]) is not None
+        }
+        sums, before = {name: frame.sha256 for name, frame in known.items()}, self.manifest.photographed or {}
+        changed = [name for name, sum_ in sums.items() if before.get(name, sum_) != sum_]
         if changed:
             raise UserError(
                 f"{self.folder / changed[0]}: has changed since its round was read; put the file back, or export a new "
@@ -127,18 +130,18 @@ class FolderPhotographer:
             )
         series, faults = check_series(patterns, known)
         faults += [
-            f"duplicated: {name} is {self._contents[one.content]} of an earlier round"
-            for name, one in known.items()
-            if self._contents.get(one.content, name) != name
+            f"duplicated: {name} is {self._contents[frame.content]} of an earlier round"
+            for name, frame in known.items()
+            if self._contents.get(frame.content, name) != name
         ]
         if not faults:
             self._series[number] = series
-            self._contents |= {one.content: name for name, one in known.items() if one.highest}
-        return faults, {name: one.sha256 for name, one in known.items()}
+            self._contents |= {frame.content: name for name, frame in known.items() if frame.highest}
+        return faults, sums
 
     def accept(self, captures: Mapping[str, str]) -> None:
         """Keep what was read, so that a later change is noticed; captures: sha256 by name."""
-        self.manifest = self.manifest.read_already(dict(captures))
+        self.manifest = replace(self.manifest, photographed={**(self.manifest.photographed or {}), **captures})
         write_manifest(self.folder, self.manifest)
 
     @property
@@ -156,14 +159,14 @@ class FolderPhotographer:
         patterns: list[Pattern] = []
         for showing in showings:
             patterns += self._written(showing, number, len(patterns))
-        place = self.folder / Path(patterns[0].file).parent
-        _write_order(place / "order.csv", patterns, self.manifest.wavelengths)
-        write_atomically(place / "README.txt", _readme(number, len(patterns)).encode())
+        folder = self.folder / Path(patterns[0].file).parent
+        _write_order(folder / "order.csv", patterns, self.manifest.wavelengths)
+        write_atomically(folder / "README.txt", _readme(number, len(patterns)).encode())
         (inside(self.folder, patterns[0].capture).parent).mkdir(parents=True, exist_ok=True)
         # last, so that a round that the manifest has is whole
         self.manifest = replace(self.manifest, patterns=(*self.manifest.patterns, *patterns))
         write_manifest(self.folder, self.manifest)
-        self._known |= {(one.key, one.colour): one for one in patterns}
+        self._known |= {(pattern.key, pattern.colour): pattern for pattern in patterns}
         self.wanted.clear()
         return patterns
 
@@ -205,13 +208,18 @@ class FolderPhotographer:
 
         The fiducial grid's holograms by their number alone: made again on another machine they may differ in a level.
         """
+        names = [str(name) for name in request.names]
         if request.role == FIDUCIAL:
-            return digest([request.role, [str(name) for name in request.names]])
+            return digest([request.role, names])
         levels = self.manifest.phase.levels(request.phase)
-        shown = hashlib.sha256(levels.tobytes()).hexdigest()
-        return digest(
-            [shown, list(levels.shape), self._exposure(request), request.role, [str(name) for name in request.names]]
-        )
+        content = hashlib.sha256(levels.tobytes()).hexdigest()
+        return digest([content, list(levels.shape), self._exposure(request), request.role, names])
+
+
+@lru_cache(maxsize=1)
+def session_photographer(folder: Path) -> FolderPhotographer:
+    """The photographer of a session folder, one for a process: what it notes is written at the end of a run."""
+    return FolderPhotographer(folder)
 
 
 def _write_order(path: Path, patterns: Sequence[Pattern], wavelengths: Sequence[float]) -> None:
@@ -219,11 +227,11 @@ def _write_order(path: Path, patterns: Sequence[Pattern], wavelengths: Sequence[
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["number", "show", "save_photograph_as", "role", "wavelength_nm", "relative_exposure", "laser"])
-    for one in patterns:
-        wavelength = f"{wavelengths[one.colour] * 1e9:.1f}"
-        laser = "blocked" if one.role == DARK else "on"
-        row = [one.number, one.file, f"{one.capture}.png", one.role, wavelength, f"{one.exposure:g}", laser]
-        writer.writerow(row)
+    for pattern in patterns:
+        wavelength, exposure = f"{wavelengths[pattern.colour] * 1e9:.1f}", f"{pattern.exposure:g}"
+        laser = "blocked" if pattern.role == DARK else "on"
+        picture, photograph = pattern.file, f"{pattern.capture}.png"
+        writer.writerow([pattern.number, picture, photograph, pattern.role, wavelength, exposure, laser])
     write_atomically(path, text.getvalue().encode())
 
 

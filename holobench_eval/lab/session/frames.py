@@ -7,20 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from ...core.errors import UserError
+from ...core.io import decode_levels
 from ...optics.colour import srgb_decode
 from .manifest import SUFFIXES, inside
 
-PIXELS = 200_000_000
-"""Most pixels of a photograph; more would be the bomb of a hostile file."""
-LARGEST = 1 << 30
-"""Bytes of a file."""
+MOST_PIXELS = 200_000_000  # more would be the bomb of a hostile file
+LARGEST_FILE = 1 << 30  # bytes
 LOSSY = (".jpg", ".jpeg")
 PLAIN = (".png", ".tif", ".tiff")
 
@@ -78,10 +76,10 @@ def facts(frame: Frame) -> Facts:
 
 def find(folder: Path, capture: str) -> Path | None:
     """The file of a photograph, by its name without ending; None if there is none. UserError for several."""
-    found = [path for ending in SUFFIXES for path in _endings(folder / f"{capture}{ending}") if path.is_file()]
-    if len(found) > 1:
-        raise UserError(f"{folder / capture}: {', '.join(path.name for path in found)}: keep one of these")
-    return inside(folder, str(found[0].relative_to(folder))) if found else None
+    files = [path for ending in SUFFIXES for path in _endings(folder / f"{capture}{ending}") if path.is_file()]
+    if len(files) > 1:
+        raise UserError(f"{folder / capture}: {', '.join(path.name for path in files)}: keep one of these")
+    return inside(folder, str(files[0].relative_to(folder))) if files else None
 
 
 def _endings(path: Path) -> list[Path]:
@@ -92,26 +90,26 @@ def _endings(path: Path) -> list[Path]:
 
 def read_frame(path: Path, colour: int) -> Frame:
     """A photograph; of a colour camera's three channels the one of index ``colour``. UserError for a bad file."""
-    if path.stat().st_size > LARGEST:
-        raise UserError(f"{path}: larger than {LARGEST >> 20} MiB, no photograph")
+    if path.stat().st_size > LARGEST_FILE:
+        raise UserError(f"{path}: larger than {LARGEST_FILE >> 20} MiB, no photograph")
     content = path.read_bytes()
     sha256 = hashlib.sha256(content).hexdigest()
     if path.suffix.lower() not in (*PLAIN, *LOSSY):
         return _raw(path, colour, sha256)
     try:
         with Image.open(path) as header:
-            if header.width * header.height > PIXELS:
+            if header.width * header.height > MOST_PIXELS:
                 raise UserError(f"{path}: {header.width} x {header.height} pixels are too many for a photograph")
             if getattr(header, "n_frames", 1) > 1:
                 raise UserError(f"{path}: holds several pictures; save one frame a file")
     except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError) as error:
         raise UserError(f"{path}: not a picture that can be read ({' '.join(str(error).split())[:80]})") from None
-    levels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if levels is None or levels.dtype not in (np.uint8, np.uint16):
+    levels = decode_levels(content)
+    if levels is None:
         raise UserError(f"{path}: damaged, or not of 8 or 16 bits a sample")
     if levels.ndim == 3 and levels.shape[2] != 3:
         raise UserError(f"{path}: {levels.shape[2]} channels; save gray or RGB without transparency")
-    plane = levels[..., 2 - colour] if levels.ndim == 3 else levels  # OpenCV: blue first
+    plane = levels[..., colour] if levels.ndim == 3 else levels
     top = 255.0 if levels.dtype == np.uint8 else 65535.0
     if path.suffix.lower() in LOSSY:
         light = srgb_decode(torch.from_numpy(plane / np.float32(255))).numpy() * np.float32(255)

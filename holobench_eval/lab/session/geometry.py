@@ -7,14 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from skimage.registration import phase_cross_correlation
 
 from ...core.errors import CellError, UserError
-from ...core.io import write_atomically
+from ...core.io import decode_levels, write_png
 from ...imaging.grid import fiducial
 from ...imaging.grid_picture import grid_picture
 from ...optics.phase import blaze
@@ -25,10 +24,8 @@ if TYPE_CHECKING:
     from ..real import RealBench
     from . import FolderPhotographer
 
-FURTHEST_DRIFT = 2.0
-"""Region pixels: what the bounded refinement of a capture can still take up (protocol v1, point 3)."""
-FINENESS = 20
-"""Steps a pixel of the correlation that measures drift."""
+FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol v1, point 3)
+FINENESS = 20  # steps a pixel of the correlation that measures drift
 
 Say = Callable[[str], None]
 
@@ -42,10 +39,10 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
         registration = bench.registration
     except CellError as error:
         raise UserError(f"the camera cannot be registered, and nothing was scored: {error}") from None
-    found = f"registration: {max(registration.residual):.2f} px rms"
+    residual = f"registration: {max(registration.residual):.2f} px rms"
     second = bench.disagreement
-    said = "another algorithm finds none" if np.isnan(second) else f"another algorithm differs by {second:.2f} px"
-    say(f"{found}; {said} at the corners")
+    check = "another algorithm finds none" if np.isnan(second) else f"another algorithm differs by {second:.2f} px"
+    say(f"{residual}; {check} at the corners")
     _draw(bench, output / "figures" / "registration.png")
     moved, dimmed = drift(bench, photographer)
     say(f"drift: {moved:.2f} px and {dimmed:.1%} of the light, at most, between the repeats of one hologram")
@@ -58,7 +55,7 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
     if faults:
         raise UserError("nothing was scored. " + " | ".join(faults))
     return (
-        f"geometry: {found}, {said} at the corners",
+        f"geometry: {residual}, {check} at the corners",
         f"drift between the repeats of one hologram: {moved:.2f} px and {dimmed:.1%} of the light at most",
     )
 
@@ -66,12 +63,9 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
 def _draw(bench: RealBench, path: Path) -> None:
     """Every colour's photograph of the grid with what was found in it, side by side."""
     grid = fiducial(bench.spec.region.shape)
-    frames = bench.grid_photograph.cpu().numpy()
-    warps = zip(frames, range(len(frames)), strict=True)
-    pictures = [grid_picture(frame, grid, bench.registration, channel) for frame, channel in warps]
-    encoded, buffer = cv2.imencode(".png", cv2.cvtColor(np.hstack(pictures), cv2.COLOR_RGB2BGR))
-    if encoded:
-        write_atomically(path, buffer.tobytes())
+    frames = enumerate(bench.grid_photograph.cpu().numpy())
+    pictures = [grid_picture(frame, grid, bench.registration, channel) for channel, frame in frames]
+    write_png(path, torch.from_numpy(np.hstack(pictures)).permute(2, 0, 1), bits=8)
 
 
 def _rectified(bench: RealBench, photographer: FolderPhotographer, pattern: Pattern) -> NDArray[np.float32]:
@@ -89,7 +83,7 @@ def drift(bench: RealBench, photographer: FolderPhotographer) -> tuple[float, fl
         before = first.setdefault(pattern.colour, seen)
         if before is seen:
             continue
-        pair = (np.sqrt(np.maximum(one, 0)) for one in (before, seen))
+        pair = (np.sqrt(np.maximum(light, 0)) for light in (before, seen))
         shift, _, _ = phase_cross_correlation(  # type: ignore[no-untyped-call]
             *pair, upsample_factor=FINENESS, normalization=None
         )
@@ -120,4 +114,4 @@ def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != pattern.sha256:
         raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
-    return np.asarray(cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+    return np.asarray(decode_levels(content), dtype=np.uint8)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,12 +17,12 @@ from annotated_types import Interval, Len, MaxLen, MinLen
 
 from ...core.errors import UserError
 from ...core.io import write_atomically
+from ...core.schema import FieldError, checked
 from ...imaging.convention import Convention
 
 FILE, PATTERNS, CAPTURES = "manifest.json", "patterns", "captures"
 FORMAT = 1
-LARGEST = 64 * 2**20
-"""Bytes of a manifest; about 200,000 patterns."""
+LARGEST_MANIFEST = 64 * 2**20  # bytes, about 200,000 patterns
 SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 DARK, FIDUCIAL, HOLOGRAM, REPEAT = "dark", "fiducial", "hologram", "repeat"
 
@@ -81,10 +81,6 @@ class Manifest:
         """The patterns of a round in the order of showing."""
         return [pattern for pattern in self.patterns if pattern.round == number]
 
-    def read_already(self, captures: dict[str, str]) -> Manifest:
-        """The manifest after photographs were read; captures: their sha256 by name."""
-        return replace(self, photographed={**(self.photographed or {}), **captures})
-
 
 def file_of(round_: int, number: int) -> str:
     """Where the PNG of a pattern is, in the session's folder."""
@@ -107,14 +103,17 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / FILE
     if not path.is_file() or path.is_symlink():
         raise UserError(f"{path}: no such file; holoeval session export makes a session folder")
-    if path.stat().st_size > LARGEST:
-        raise UserError(f"{path}: larger than {LARGEST // 2**20} MB; not a manifest that holoeval wrote")
+    if path.stat().st_size > LARGEST_MANIFEST:
+        raise UserError(f"{path}: larger than {LARGEST_MANIFEST // 2**20} MB; not a manifest that holoeval wrote")
     content = _json(path)
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
-        raise UserError(f"{path}: format {str(found)[:20]!r} should be {FORMAT}; not a manifest of this version")
-    manifest = _typed(path, content)
-    _check(path, manifest.patterns)
+    version = content.get("format") if isinstance(content, dict) else None
+    if version != FORMAT:
+        raise UserError(f"{path}: format {str(version)[:20]!r} should be {FORMAT}; not a manifest of this version")
+    try:
+        manifest = checked(Manifest, content)
+    except FieldError as error:
+        raise UserError(f"{path}: {error}") from None
+    _check_names(path, manifest.patterns)
     return manifest
 
 
@@ -128,39 +127,28 @@ def _json(path: Path) -> Any:
         raise UserError(f"{path}: not JSON ({str(error)[:100]})") from None
 
 
-def _typed(path: Path, content: Any) -> Manifest:
-    from pydantic import TypeAdapter, ValidationError
-
-    try:
-        return TypeAdapter(Manifest).validate_json(json.dumps(content), strict=True)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))[:100]
-        raise UserError(f"{path}: {where}: {first['msg'].lower()}, got {json.dumps(first['input'])[:60]}") from None
-
-
-def _check(path: Path, patterns: Sequence[Pattern]) -> None:
+def _check_names(path: Path, patterns: Sequence[Pattern]) -> None:
     """Refuse numbers that are not 1, 2, 3, ... and names that do not follow from them."""
     last = (1, 0)
     for pattern in patterns:
         here = (pattern.round, pattern.number)
         if here not in ((last[0], last[1] + 1), (last[0] + 1, 1)):
             raise UserError(f"{path}: pattern {here[1]} of round {here[0]} stands after {last[1]} of round {last[0]}")
-        if pattern.file != file_of(*here):
-            raise UserError(f"{path}: file {pattern.file[:60]!r} should be {file_of(*here)!r}")
-        if pattern.capture != capture_of(*here):
-            raise UserError(f"{path}: capture {pattern.capture[:60]!r} should be {capture_of(*here)!r}")
+        for what, name, right in (
+            ("file", pattern.file, file_of(*here)),
+            ("capture", pattern.capture, capture_of(*here)),
+        ):
+            if name != right:
+                raise UserError(f"{path}: {what} {name[:60]!r} should be {right!r}")
         last = here
 
 
 def refuse_links_out(folder: Path) -> None:
     """UserError for any link in a session folder that leads out of it: nothing else is read, or written to."""
     home = folder.resolve()
-    for place, folders, files in os.walk(home):
+    for parent, folders, files in os.walk(home):
         for name in (*folders, *files):
-            path = Path(place, name)
-            if path.is_symlink() and not path.resolve().is_relative_to(home):
-                raise UserError(f"{path}: leads out of the session folder; put the file itself there")
+            inside(home, str(Path(parent, name).relative_to(home)))
 
 
 def inside(folder: Path, name: str) -> Path:

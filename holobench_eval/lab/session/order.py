@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from ..photograph import Request
 from .manifest import DARK, FIDUCIAL, HOLOGRAM, REPEAT
 
-BETWEEN_REPEATS = 24
-"""Holograms between two showings of the repeated pattern."""
+BETWEEN_REPEATS = 24  # holograms between two showings of the repeated pattern
 
 
 @dataclass(frozen=True)

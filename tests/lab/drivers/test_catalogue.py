@@ -4,6 +4,7 @@ import builtins
 import importlib.metadata
 import subprocess
 import sys
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -14,9 +15,9 @@ from holobench_eval.lab.drivers.catalogue import (
     CAMERA_DRIVERS,
     SLM_DRIVERS,
     checked_params,
-    found,
     open_camera,
     open_slm,
+    survey,
 )
 
 MONITOR = {"name": "HDMI-1", "resolution": [1920, 1080]}
@@ -25,8 +26,8 @@ MONITOR = {"name": "HDMI-1", "resolution": [1920, 1080]}
 def test_importing_the_drivers_imports_none_of_their_packages() -> None:
     packages = "{'pyglet', 'slmsuite', 'gphoto2', 'rawpy', 'pymmcore_plus'}"
     code = f"import sys, holobench_eval.lab.drivers.catalogue; print(sorted({packages} & set(sys.modules)))"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout == "[]\n"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout == "[]\n"
 
 
 @pytest.mark.parametrize(
@@ -113,28 +114,25 @@ def _hide(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
 
 def test_every_driver_is_listed_with_its_version_and_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    listed = found()
-    assert [(one.kind, one.driver) for one in listed] == [("slm", name) for name in SLM_DRIVERS] + [
+    listed = survey()
+    assert [(entry.kind, entry.driver) for entry in listed] == [("slm", name) for name in SLM_DRIVERS] + [
         ("camera", name) for name in CAMERA_DRIVERS
     ]
-    assert all(one.devices or one.why for one in listed)
-    assert all("\n" not in one.why for one in listed)
-    opencv = next(one for one in listed if one.driver == "opencv")
+    assert all(entry.devices or entry.why for entry in listed)
+    assert all("\n" not in entry.why for entry in listed)
+    opencv = next(entry for entry in listed if entry.driver == "opencv")
     assert opencv.version == importlib.metadata.version("opencv-python-headless")
 
 
 def test_looking_for_devices_survives_broken_packages(monkeypatch: pytest.MonkeyPatch) -> None:
-    def absent(_: str) -> str:
-        raise importlib.metadata.PackageNotFoundError
-
-    monkeypatch.setattr(drivers.importlib.metadata, "version", absent)
-    assert all(one.version is None and "pip install" in one.why for one in found())
-    monkeypatch.setattr(drivers.importlib.metadata, "version", lambda _: "1.0")
+    monkeypatch.setattr(drivers, "installed", lambda _: None)
+    assert all(entry.version is None and "pip install" in entry.why for entry in survey())
+    monkeypatch.setattr(drivers, "installed", lambda _: "1.0")
 
     def broken() -> list[str]:
         raise OSError("libusb\nis missing")
 
     for table in (SLM_DRIVERS, CAMERA_DRIVERS):
         for name, driver in list(table.items()):
-            monkeypatch.setitem(table, name, drivers.Driver(driver.settings, driver.opens, "a", "b", broken))  # type: ignore[arg-type]
-    assert {one.why for one in found()} == {"OSError: libusb is missing"}
+            monkeypatch.setitem(table, name, replace(driver, answering=broken))  # type: ignore[arg-type]
+    assert {entry.why for entry in survey()} == {"OSError: libusb is missing"}

@@ -78,9 +78,9 @@ def test_a_damaged_file_is_a_failure_of_the_device(card: Callable[[bytes], None]
 
 def test_another_camera_is_refused_with_those_that_answer(raw: bytes) -> None:
     assert list_cameras() == [f"{MODEL} at usb:001,001"]
-    with pytest.raises(UserError, match=f"no cameras 'Canon EOS Rebel T6i'; found: {MODEL} at usb:001,001"):
+    with pytest.raises(UserError, match=f"no camera 'Canon EOS Rebel T6i'; found: {MODEL} at usb:001,001"):
         Gphoto2Camera(Gphoto2Settings(model="Canon EOS Rebel T6i"))
-    with pytest.raises(UserError, match="no cameras 'any'; found"):
+    with pytest.raises(UserError, match="no camera 'any'; found"):
         Gphoto2Camera(Gphoto2Settings(port="usb:001,009"))
 
 

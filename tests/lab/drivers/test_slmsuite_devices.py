@@ -29,8 +29,8 @@ def slm() -> Iterator[Any]:
 def camera(slm: Any) -> Iterator[SlmsuiteCamera]:
     """Looks at the far field of the panel."""
     simulated = pytest.importorskip("slmsuite.hardware.cameras.simulated")
-    made = simulated.SimulatedCamera(slm._slm, bitdepth=12, exposure_bounds_s=(1e-4, 10), gain=0.05)
-    camera = SlmsuiteCamera(made)
+    device = simulated.SimulatedCamera(slm._slm, bitdepth=12, exposure_bounds_s=(1e-4, 10), gain=0.05)
+    camera = SlmsuiteCamera(device)
     yield camera
     camera.close()
 
@@ -95,8 +95,8 @@ def test_counts_grow_with_the_exposure_up_to_white(slm: Any, camera: SlmsuiteCam
 
 def test_frames_are_not_added_up_whatever_the_camera_is_set_to(slm: Any) -> None:
     simulated = pytest.importorskip("slmsuite.hardware.cameras.simulated")
-    made = simulated.SimulatedCamera(slm._slm, bitdepth=8, averaging=4, exposure_bounds_s=(1e-4, 10))
-    camera = SlmsuiteCamera(made)
+    device = simulated.SimulatedCamera(slm._slm, bitdepth=8, averaging=4, exposure_bounds_s=(1e-4, 10))
+    camera = SlmsuiteCamera(device)
     assert camera.white == 255
     assert camera.expose(1.0)[0].max() <= 255
 

@@ -59,13 +59,13 @@ def test_what_is_no_photograph_is_one_line(tmp_path):
     Image.new("L", (20_000, 20_000)).save(tmp_path / "huge.png")
     frames = [Image.new("L", (8, 8), value) for value in (1, 2)]
     frames[0].save(tmp_path / "many.tif", save_all=True, append_images=frames[1:])
-    for name, said in (
+    for name, line in (
         ("text", "not a picture"),
         ("alpha", "4 channels"),
         ("huge", "too many|exceeds limit"),
         ("many", "several"),
     ):
-        with pytest.raises(UserError, match=said) as caught:
+        with pytest.raises(UserError, match=line) as caught:
             read_frame(find(tmp_path, name), 0)
         assert "\n" not in str(caught.value)
 

@@ -1,0 +1,69 @@
+"""What all drivers share: their entry in the catalogue, the package they need, the checks of levels and counts."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+import numpy as np
+
+from ...core.errors import UserError
+from ...imaging.convention import Levels
+from ..devices import Counts, DeviceError
+from .worker import line
+
+Device = TypeVar("Device", covariant=True)
+T = TypeVar("T")
+Kind = Literal["slm", "camera"]
+
+
+@dataclass(frozen=True)
+class Driver(Generic[Device]):
+    """How devices of one kind are opened; every module that `catalogue` names lists its own as ``DRIVERS``.
+
+    name: as a bench file gives it; settings: dataclass of its parameters; opens: the device for an instance of it;
+    package: the distribution that it needs; extra: of this project, that installs it ("" for none); answering: lists
+    what answers, in words; unlisted: what to do where the package cannot look for devices by itself.
+    """
+
+    kind: Kind
+    name: str
+    settings: type[Any]
+    opens: Callable[[Any], Device]
+    package: str
+    extra: str
+    answering: Callable[[], list[str]]
+    unlisted: str = ""
+
+
+def import_package(driver: str, module: str, package: str, extra: str) -> Any:
+    """The module of an optional package; UserError with the command that installs it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        hint = f"pip install 'holobench_eval[{extra}]'"
+        raise UserError(f"driver '{driver}' needs {package}: {hint} ({line(error)})") from error
+
+
+def only(what: str, asked: str, fitting: Sequence[T], listed: Sequence[str]) -> T:
+    """The one device that fits; UserError that lists all there are for none or several."""
+    if len(fitting) == 1:
+        return fitting[0]
+    number = f"{len(fitting)} {what}s" if fitting else f"no {what}"
+    raise UserError(f"{number} '{asked}'; found: {', '.join(listed) or 'none; is it on, and not in use?'}")
+
+
+def check_levels(name: str, shape: tuple[int, int], levels: Levels) -> None:
+    """DeviceError unless ``levels`` are uint8 and as many as the panel ``name`` has pixels: nothing is converted."""
+    if levels.dtype != np.uint8 or levels.shape != shape:
+        raise DeviceError(f"{name} takes uint8 levels of {shape}, not {levels.dtype} of {levels.shape}")
+
+
+def check_counts(name: str, frame: Counts, white: float, hint: str = "") -> None:
+    """DeviceError unless a camera's frame has whole counts up to its white; hint: what to do where it goes beyond."""
+    if frame.dtype not in (np.uint8, np.uint16) or frame.ndim not in (2, 3) or not frame.size:
+        raise DeviceError(f"{name} gave a {frame.dtype} frame of {frame.shape}, not whole counts")
+    if frame.max() > white:
+        raise DeviceError(f"{name} gave {frame.max()} counts, but {white:.0f} are its white{hint}")
