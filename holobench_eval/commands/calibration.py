@@ -18,10 +18,11 @@ from scipy.optimize import least_squares
 from torch import Tensor
 
 from ..core import plugins
-from ..display import CalibratedBench, Profile, load_profile, open_bench
+from ..display import CalibratedBench, Profile, load_profile
 from ..display.simulated.pipeline import SimulatedBench
 from ..display.simulated.stages import ZeroOrder
 from ..metrics import match, score
+from ..study.displays import open_bench
 
 WANTED = {"double_phase": 15.24, "wirtinger": 17.6}
 """PSNR [dB] of hardware captures, paper Table 3."""

@@ -13,7 +13,7 @@ from ..core.device import CPU
 from ..core.errors import CellError, UserError
 
 if TYPE_CHECKING:
-    from ..display import CalibratedBench
+    from ..display import CalibratedBench, Profile
     from ..display.api import DisplaySpec
     from ..display.simulated.changes import Value
     from ..lab.real import RealBench
@@ -135,12 +135,31 @@ def forget_sessions() -> None:
         del _open[key]
 
 
+def open_bench(
+    profile: Profile,
+    panel: Panel | None = None,
+    seed: int = 0,
+    registered_as: CalibratedBench | None = None,
+    device: torch.device = CPU,
+) -> CalibratedBench:
+    """The simulated bench of a profile on a panel of (rows, columns) pixels; ``seed`` names its noise.
+
+    registered_as: see ``CalibratedBench``; device: see ``SimulatedBench``.
+    """
+    from ..display import CalibratedBench
+    from ..display.simulated.pipeline import SimulatedBench
+    from ..methods.fiducials import fiducial_phases
+
+    bench = SimulatedBench(profile.scaled(panel), device)
+    return CalibratedBench(bench, seed, fiducial_phases, registered_as)
+
+
 def _opened(shown: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
     if shown.real is not None:
         from ..lab.opening import open_real
 
         return open_real(shown, shown.real, seed)
-    from ..display import load_profile, open_bench
+    from ..display import load_profile
     from ..display.simulated.changes import KINDS, altered
 
     profile = load_profile(shown.source, folder=shown.folder)

@@ -19,7 +19,7 @@ from .plan import Cell
 from .scoring import Measure, captured, plain, solution
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredDisplay
+    from ..display.metered import MeteredDisplay
 
 
 def focus(job: Job) -> Measure:

@@ -32,8 +32,9 @@ from .store import Record, Store
 
 if TYPE_CHECKING:
     from ..display import CalibratedBench
-    from ..display.calibrated import MeteredDisplay, RectifiedCapture
+    from ..display.api import RectifiedCapture
     from ..display.learned import LearnedBench
+    from ..display.metered import MeteredDisplay
 
 Measure = Callable[[Cell, Condition], Record]
 Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]

@@ -2,8 +2,10 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import BudgetError, CellError
-from holobench_eval.display import load_profile, open_bench
-from holobench_eval.display.calibrated import MeteredDisplay, white_irradiance
+from holobench_eval.display import load_profile
+from holobench_eval.display.api import white_irradiance
+from holobench_eval.display.metered import MeteredDisplay
+from holobench_eval.study.displays import open_bench
 from holobench_eval.testing.propagation_conformance import gaussian_beam
 
 PANEL = (192, 192)

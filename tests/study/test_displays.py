@@ -7,6 +7,7 @@ import pytest
 
 from holobench_eval import display
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.study import displays
 from holobench_eval.study.displays import condition, workbench
 
 TEXT = Path(display.__file__).parent.joinpath("simulated", "profiles", "ideal.yaml").read_text()
@@ -41,7 +42,7 @@ def test_a_failed_calibration_is_found_out_once(tmp_path: Path, monkeypatch: pyt
         opened.append(1)
         return Uncalibrated()
 
-    monkeypatch.setattr(display, "open_bench", open_bench)
+    monkeypatch.setattr(displays, "open_bench", open_bench)
     for _ in range(2):
         with pytest.raises(CellError, match="no circles found"):
             workbench(shown, seed=0)

@@ -12,13 +12,12 @@ from ...core.device import CPU
 from ...core.seeds import generator
 from ...optics.convolution import by_columns, frequencies
 from ...optics.padding import padded_shape
-from ...optics.phase import blaze
+from ...optics.phase import blaze, refocus
 from ...optics.phasor import phasor, squared_modulus
 from ..api import Capture, DisplaySpec
 from .path import Dust, OpticalPath, panel_spectrum
 from .profile import Profile
 from .stages import Geometry, Relay
-from .stages.eye import eye_phase
 from .stages.propagation import sample_weights
 from .stages.quantise import straight_through_level
 from .stages.relay import box_filter, sample, sampling_grid
@@ -108,7 +107,7 @@ class SimulatedBench:
         last = None if plane is None else way.transfer(geometry, padded, pupil, (turning, 1.0))
         if any(profile.eye.focus):
             fy, fx = frequencies(padded, geometry.pitch)
-            phase = eye_phase(profile.eye.focus, fy, fx, geometry.wavelength, geometry.distance)
+            phase = refocus(profile.eye.focus, fy, fx, geometry.wavelength, geometry.distance)
             eye = torch.polar(torch.ones_like(phase), phase).to(transfer.dtype)
             transfer, last = (transfer * eye, None) if last is None else (transfer, last * eye)
         return ChannelMaps(

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from ...core.errors import UserError
 from ...datasets.charts import Charts
-from ...display import load_profile, open_bench
+from ...display import load_profile
 from ...display.calibrated import CalibratedBench
 from ...display.simulated.pipeline import SimulatedBench
 from ...display.simulated.stages import PixelAperture
@@ -23,6 +23,7 @@ from ...methods.wirtinger import Wirtinger
 from ...metrics import match, score
 from ...optics import srgb_encode
 from ...optics.convolution import iris
+from ...study.displays import open_bench
 
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.profile import names
 from holobench_eval.display.simulated.stages import (
@@ -18,6 +18,7 @@ from holobench_eval.display.simulated.stages import (
     ZeroOrder,
 )
 from holobench_eval.optics import quantise
+from holobench_eval.study.displays import open_bench
 
 PANEL = (96, 128)
 

@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass
 
 from ....core.errors import UserError
+from ....optics.phase import Matrix
 from ..profile import Profile
-from ..stages.lens import Matrix
 
 EYEPIECE = 0.05
 """Focal length [m] of the eyepiece through which the image is seen; assumed, usual in near-eye displays."""

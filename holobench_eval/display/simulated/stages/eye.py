@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from torch import Tensor
-
-from .lens import Matrix
+from ....optics.phase import Matrix
 
 
 @dataclass(frozen=True)
@@ -20,12 +17,3 @@ class Eye:
 
     focus: Matrix = (0.0, 0.0, 0.0)
     known: bool = False
-
-
-def eye_phase(focus: Matrix, fy: Tensor, fx: Tensor, wavelength: float, distance: float) -> Tensor:
-    """Phase [rad] that light of spatial frequency (fy, fx) [1/m] gains on the way to the plane of ``Eye.focus``.
-
-    Paraxial: -pi lambda z f^T focus f; wavelength and distance z in metres.
-    """
-    rows, columns, cross = focus
-    return -math.pi * wavelength * distance * (rows * fy * fy + columns * fx * fx + 2 * cross * fy * fx)

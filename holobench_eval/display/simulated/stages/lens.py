@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
+from ....optics.phase import Matrix
 from .geometry import Geometry
-
-Matrix = tuple[float, float, float]
-"""A symmetric 2 x 2 matrix: along rows (vertical), along columns (horizontal), and between the two."""
 
 
 @dataclass(frozen=True)
