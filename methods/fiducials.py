@@ -23,7 +23,7 @@ def fiducial_phases(display: Display, target: Tensor) -> dict[tuple[int, int], T
     is shown with several constant phases added, because unmodulated light interferes with the image and the mean over
     the steps cancels that; both then also average speckle.
     """
-    phases = {}
+    phases: dict[tuple[int, int], Tensor] = {}
     for hologram in range(HOLOGRAMS):
         handle = MeteredDisplay(display, "fiducial", target, (display.seed, "fiducial", hologram))
         phase = Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]

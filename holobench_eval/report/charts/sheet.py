@@ -131,7 +131,7 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
 def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     """Illumination, dirt, pupil with aberration, zero order, sensor response."""
     profile, maps = bench.profile, bench.channels[GREEN]
-    light = profile.illumination.field(maps.geometry)
+    light = profile.illumination.panel(maps.geometry)
     _picture(axes[0], light.abs(), "illumination amplitude, green", "relative amplitude")
     _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
     _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
