@@ -10,10 +10,8 @@ from ....core.errors import UserError
 from ....optics.phase import Matrix
 from ..profile import Profile
 
-EYEPIECE = 0.05
-"""Focal length [m] of the eyepiece through which the image is seen; assumed, usual in near-eye displays."""
-STRONGEST = 10.0
-"""Dioptres, of a prescription's sphere and cylinder."""
+EYEPIECE = 0.05  # focal length [m] of the eyepiece through which the image is seen; assumed, usual in near-eye displays
+STRONGEST = 10.0  # dioptres, of a prescription's sphere and cylinder
 WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?)(?:\s*/\s*([+-]?\d+(?:\.\d+)?)\s*x\s*(\d+(?:\.\d+)?))?")
 
 
@@ -66,3 +64,8 @@ def relative(profile: Profile, text: str) -> Matrix:
     if min(rows, columns) - abs(cross) <= -0.5 or max(rows, columns) + abs(cross) >= 0.5:
         raise UserError(f"prescription '{text}' moves the image by more than half of {profile.panel.distance:g} m")
     return rows, columns, cross
+
+
+def one_form(text: str) -> str:
+    """A prescription as ``Prescription`` writes it. UserError for one that cannot be read."""
+    return str(Prescription.read(text))
