@@ -20,7 +20,7 @@ MARK: Colour = (230, 159, 0)
 BORDER: Colour = (240, 228, 66)
 BRIGHTEST = 99.5  # percentile of the light that is brightest
 GREY = 180  # its level: white would swallow the colours
-SMALLEST = 720  # pixels of the picture's shorter side
+SMALLEST_PICTURE = 720  # pixels of the picture's shorter side
 FRACTION = 4  # bits of a drawn point's position below the pixel
 
 
@@ -32,7 +32,7 @@ def grid_picture(frame: Frame, grid: FiducialGrid, registration: Registration, c
     corners their names and the residual [region px, RMS] of the quarter of the circles next to them.
     """
     warp = registration.warps[channel]
-    larger = max(1, -(-SMALLEST // min(frame.shape)))
+    larger = max(1, -(-SMALLEST_PICTURE // min(frame.shape)))
     amplitude = np.sqrt(np.maximum(frame, 0))
     white = max(float(np.percentile(amplitude, BRIGHTEST)), 1e-12)
     grey = np.round(np.clip(amplitude / white, 0, 1) * GREY).astype(np.uint8)
