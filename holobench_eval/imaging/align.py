@@ -41,7 +41,15 @@ SCALES = (0.2, 8.0)  # capture pixels a target pixel
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Where a target lies in a capture, and their correlation there, in structures far coarser than speckle."""
+    """Where a target lies in a capture.
+
+    Parameters
+    ----------
+    warp
+        From pixels of the target to pixels of the capture.
+    correlation
+        Of the two there, in structures far coarser than speckle.
+    """
 
     warp: Warp
     correlation: float
@@ -59,11 +67,32 @@ class Alignment:
 
 
 def align(capture: NDArray[np.floating], target: NDArray[np.floating]) -> Alignment:
-    """Find a target ``(C, h, w)`` in its capture ``(C', Hs, Ws)``, from the two alone.
+    """Find a target in its capture, from the two alone.
 
-    Values in [0, 1], as displays are given them (or square roots of light). The target may be mirrored, turned by
-    quarters and by some degrees more, seen in perspective, scaled by 0.3 to 5, and fill a part of the capture; all of
-    it must be there. Raises `CellError` where the target has too little structure, and where it is not found.
+    Enhanced correlation coefficient from coarse to fine (Evangelidis & Psarakis, IEEE Trans. Pattern Anal. Mach.
+    Intell. 30, 1858, 2008), from where features or templates propose. The target may be mirrored, turned by quarters
+    and by some degrees more, seen in perspective, scaled by 0.3 to 5, and fill a part of the capture; all of it must be
+    there.
+
+    Parameters
+    ----------
+    capture
+        ``(C', Hs, Ws)`` in [0, 1], values as displays are given them, or square roots of light.
+    target
+        ``(C, h, w)``, as the capture.
+
+    Raises
+    ------
+    CellError
+        The target has too little structure, or it is not found.
+
+    Examples
+    --------
+    >>> from skimage.data import camera
+    >>> target = camera()[None, ::2, ::2] / 255
+    >>> alignment = align(np.pad(target, ((0, 0), (30, 20), (40, 60))), target)
+    >>> [round(float(edge)) for edge in alignment.warp.corners()[0]]
+    [40, 30]
     """
     frame, reference = gray(capture), gray(target)
     _refuse_plain(reference)

@@ -43,11 +43,27 @@ class FiducialGrid:
 
 
 def fiducial(shape: tuple[int, int]) -> FiducialGrid:
-    """The grid for a region of ``shape`` (height, width) pixels.
+    """The grid of circles for a region.
 
     Many small circles locate better than a few large ones, but a circle has to be several speckle grains wide, and
     the search for the lattice slows down with the cube of their number: 64 circles at 160x160 pixels, about 300 at
-    1080x1920. Raises `UserError` for a region too small for the marks.
+    1080x1920.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns of the region.
+
+    Raises
+    ------
+    UserError
+        A region too small for the marks.
+
+    Examples
+    --------
+    >>> grid = fiducial((160, 160))
+    >>> grid.columns, grid.rows, grid.centres.shape
+    (8, 8, (64, 2))
     """
     height, width = shape
     if min(shape) < SMALLEST_REGION:

@@ -23,10 +23,16 @@ STEP = 1e-3  # region pixels, at the corners: a smaller step ends the search
 
 @dataclass(frozen=True)
 class Refined:
-    """A capture ``(C, h, w)`` moved onto its target, and the move.
+    """A capture moved onto its target, and the move; all zero when no move within the bounds was found.
 
-    dx, dy: where the centre of the target was found in the capture, right and down [px]; theta: rotation about the
-    centre from x towards y [degrees]. All zero, and the capture unchanged, when no move within the bounds was found.
+    Parameters
+    ----------
+    image
+        ``(C, h, w)``, moved; unchanged without a move.
+    dx, dy
+        Where the centre of the target was found in the capture, right and down [px].
+    theta
+        Rotation about the centre from x towards y [degrees].
     """
 
     image: Tensor
@@ -36,12 +42,30 @@ class Refined:
 
 
 def refine(capture: Tensor, target: Tensor) -> Refined:
-    """Align a rectified capture ``(C, h, w)`` with its target ``(C, h, w)``, both in linear light.
+    """Align a rectified capture with its target by a bounded rigid move (protocol v1, point 3).
 
     One shift and rotation for all channels, at most 2 px and 0.1 degree, that maximises the correlation of the square
-    root of the light summed over the channels (the enhanced correlation coefficient of Evangelidis & Psarakis 2008
-    for a rigid move). No score takes part. Without convergence, outside the bounds or without a gain in
-    correlation, the capture comes back as it is. Raises `ValueError` for shapes that differ or are too small.
+    root of the light summed over the channels (the enhanced correlation coefficient of Evangelidis & Psarakis, IEEE
+    Trans. Pattern Anal. Mach. Intell. 30, 1858, 2008, for a rigid move). No score takes part. Without convergence,
+    outside the bounds or without a gain in correlation, the capture comes back as it is.
+
+    Parameters
+    ----------
+    capture, target
+        ``(C, h, w)`` linear light.
+
+    Raises
+    ------
+    ValueError
+        Shapes that differ or are too small.
+
+    Examples
+    --------
+    >>> smooth = torch.rand(1, 1, 8, 8, generator=torch.Generator().manual_seed(0))
+    >>> target = torch.nn.functional.interpolate(smooth, (64, 64), mode="bicubic")[0].clamp(0, 1)
+    >>> refined = refine(target.roll(1, dims=-1), target)
+    >>> abs(refined.dx - 1) < 0.05, abs(refined.dy) < 0.05
+    (True, True)
     """
     if capture.shape != target.shape or capture.ndim != 3 or min(capture.shape[1:]) <= 4 * BORDER:
         raise ValueError(f"capture {tuple(capture.shape)} and target {tuple(target.shape)} must both be (C, h, w)")

@@ -37,20 +37,40 @@ WORTHWHILE = 0.85  # of the residual: fringes of 10 % alone can look like a dist
 class Registration:
     """Region to sensor, one `Warp` a channel, and how well the grid's circles fit it.
 
-    residual: per channel, root mean square over the circles of the distance [region px] between where a circle is
-    measured and where the warp puts it. Speckle moves single circles, so that the warp, fitted to all, is several
-    times more exact than its residual.
+    Parameters
+    ----------
+    warps
+        One a channel.
+    residual
+        Per channel, root mean square over the circles of the distance between where a circle is measured and where the
+        warp puts it [region px]. Speckle moves single circles, so that the warp, fitted to all, is several times more
+        exact than its residual.
     """
 
     warps: tuple[Warp, ...]
     residual: tuple[float, ...]
 
     def rectify(self, linear: Tensor) -> Tensor:
-        """A capture ``(C, Hs, Ws)`` in linear light as region ``(C, h, w)``, same device, float32.
+        """A capture in the frame of the region.
 
         Cubic interpolation at the region's pixel centres, positions to 1/32 sensor pixel (`cv2.remap`), zero outside
         the sensor. There is no low-pass filter: like the panel model, the result samples the intensity, so a
-        sensor finer than the panel keeps its full speckle contrast. Raises `CellError` for another channel count.
+        sensor finer than the panel keeps its full speckle contrast.
+
+        Parameters
+        ----------
+        linear
+            ``(C, Hs, Ws)`` linear light.
+
+        Returns
+        -------
+        Tensor
+            ``(C, h, w)``, same device, float32.
+
+        Raises
+        ------
+        CellError
+            Another number of channels.
         """
         if linear.ndim != 3 or linear.shape[0] != len(self.warps):
             raise CellError(
@@ -85,10 +105,30 @@ class Registration:
 
 
 def register(image: Tensor, grid: FiducialGrid, bound: float = 0.3) -> Registration:
-    """Register a capture ``(C, Hs, Ws)`` of the grid's hologram, linear light, dark level subtracted.
+    """Register a camera from the capture of the grid's hologram (protocol v1, point 2).
 
-    Raises `CellError`, with the channel and the reason, when the grid is not found, lies partly outside the sensor,
-    is not the one that was shown, or fits worse than ``bound`` [region px, RMS].
+    Parameters
+    ----------
+    image
+        ``(C, Hs, Ws)`` linear light, dark level subtracted.
+    grid
+        The grid that was shown.
+    bound
+        Largest residual [region px, rms].
+
+    Raises
+    ------
+    CellError
+        The grid is not found, lies partly outside the sensor, is not the one that was shown, or fits worse than the
+        bound: with the channel and the reason.
+
+    Examples
+    --------
+    >>> from holobench_eval.imaging import fiducial
+    >>> grid = fiducial((160, 160))
+    >>> registration = register(torch.nn.functional.pad(grid.image, (20, 20, 20, 20))[None], grid)
+    >>> registration.rectify(torch.ones(1, 200, 200)).shape, max(registration.residual) < 0.05
+    (torch.Size([1, 160, 160]), True)
     """
     if image.ndim != 3 or not bool(torch.isfinite(image).all()):
         raise CellError(f"registration needs a finite capture (C, Hs, Ws), got shape {tuple(image.shape)}")

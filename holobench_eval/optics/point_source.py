@@ -17,11 +17,32 @@ TAPER = 0.1
 
 
 class PointSource(Convolution):
-    """The model of Chakravarthula et al. 2019: every pixel is a point source (paper Eq. 3), summed by FFT (Eq. 4).
+    """Every pixel is a point source, summed by FFT (Chakravarthula et al. 2020, Eq. 3 and 4).
 
-    shape: (H, W) pixels; pitch, wavelength, distance: metres. The convolution is linear, not circular. The kernel
-    exp(ik rho) / (i lambda rho) is cut where it oscillates faster than the pixels sample it, since beyond that
-    it would make ghosts; its phase is formed in float64 without the carrier exp(ikz).
+    The convolution is linear, not circular. The kernel exp(ik rho) / (i lambda rho) is cut where it oscillates faster
+    than the pixels sample it, since beyond that it would make ghosts; its phase is formed in float64 without the
+    carrier exp(ikz).
+
+    Parameters
+    ----------
+    shape
+        Rows and columns.
+    pitch, wavelength
+        Of the pixels and of the light [m].
+    distance
+        Negative to propagate back, not zero [m].
+    dtype, device
+        Those of the transfer function, and with it of the fields.
+
+    Raises
+    ------
+    ValueError
+        A geometry without a meaning, or no distance.
+
+    Examples
+    --------
+    >>> PointSource((32, 32), pitch=6.4e-6, wavelength=517e-9, distance=5e-3).forward(torch.ones(32, 32)).shape
+    torch.Size([32, 32])
     """
 
     def __init__(
@@ -41,9 +62,19 @@ class PointSource(Convolution):
 
 
 def impulse_response(y: Tensor, x: Tensor, wavelength: float, distance: float) -> Tensor:
-    """Paper Eq. 3 at lateral offsets y, x [m], carrier removed, in 1/m^2; complex128.
+    """The kernel of a point source, carrier removed (Chakravarthula et al. 2020, Eq. 3).
 
-    A negative distance gives the conjugate, the field that converges.
+    Parameters
+    ----------
+    y, x
+        Lateral offsets [m].
+    wavelength, distance
+        Lengths [m]; a negative distance gives the conjugate, the field that converges.
+
+    Returns
+    -------
+    Tensor
+        complex128 [1/m^2].
     """
     z = abs(distance)
     r_squared = (y**2 + x**2).double()

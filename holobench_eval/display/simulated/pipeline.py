@@ -71,8 +71,8 @@ class SimulatedBench:
     --------
     >>> from holobench_eval.display.simulated.profile import load_profile
     >>> bench = SimulatedBench(load_profile("ideal").scaled((64, 64)))
-    >>> float(bench.intensity(torch.zeros(64, 64), channel=1).mean().round(decimals=2))
-    1.0
+    >>> bench.intensity(torch.zeros(64, 64), channel=1).shape
+    torch.Size([64, 64])
     >>> bench.session("example", exposure=(100.0,) * 3).capture(torch.zeros(3, 64, 64)).frame.dtype
     torch.float32
     """
