@@ -112,13 +112,13 @@ class TrainingBench:
         self._captures += 1
         return self._display.rectified(self._camera(image, *names).capture(phase.detach()), image.target)
 
-    def announce(self, shown: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
+    def announce(self, photographs: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
         """Tell the display the arguments of the next calls of ``photograph``, whatever those captures show.
 
         A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
         """
         left = None if self._budget is None else max(0, self._budget - self._captures)
-        for phase, image, names in itertools.islice(shown, left):
+        for phase, image, names in itertools.islice(photographs, left):
             self._camera(image, *names).announce([phase.detach()])
 
     def _camera(self, image: TrainingImage, *names: object) -> Camera:

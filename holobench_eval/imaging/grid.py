@@ -78,7 +78,7 @@ def fiducial(shape: tuple[int, int]) -> FiducialGrid:
     marks = _letter_f(columns, rows).ravel()
     radii = np.where(marks, MARK_RADIUS, RADIUS) * spacing
     return FiducialGrid(
-        image=_draw(shape, centres, radii),
+        image=_discs(shape, centres, radii),
         centres=centres,
         marks=marks,
         columns=columns,
@@ -98,7 +98,7 @@ def _letter_f(columns: int, rows: int) -> NDArray[np.bool_]:
     return marks
 
 
-def _draw(shape: tuple[int, int], centres: NDArray[np.float64], radii: NDArray[np.float64]) -> Tensor:
+def _discs(shape: tuple[int, int], centres: NDArray[np.float64], radii: NDArray[np.float64]) -> Tensor:
     """Discs of light with an edge two pixels wide: soft enough for the band of a display with an iris."""
     image = np.zeros(shape)
     y, x = np.mgrid[: shape[0], : shape[1]]

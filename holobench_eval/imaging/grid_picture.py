@@ -42,13 +42,13 @@ def grid_picture(frame: Frame, grid: FiducialGrid, registration: Registration, c
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
     for centre, mark in zip(grid.centres, grid.marks, strict=True):
         outline = warp.to_sensor(centre + circle * (grid.mark_radius if mark else grid.radius))
-        _draw(picture, outline, larger, MARK if mark else CIRCLE)
-    _draw(picture, warp.to_sensor(_border(grid.shape)), larger, BORDER)
+        _polygon(picture, outline, larger, MARK if mark else CIRCLE)
+    _polygon(picture, warp.to_sensor(_outline(grid.shape)), larger, BORDER)
     _label(picture, frame, warp, grid, larger)
     return picture
 
 
-def _border(shape: tuple[int, int]) -> Array:
+def _outline(shape: tuple[int, int]) -> Array:
     """Points ``(N, 2)`` along the outer edges of the region's pixels, in order."""
     low, steps = -0.5, np.linspace(0, 1, 32, endpoint=False)
     size = np.array([shape[1], shape[0]], dtype=np.float64)
@@ -61,7 +61,7 @@ def _on_picture(points: Array, larger: int) -> Array:
     return np.asarray((points + 0.5) * larger - 0.5)
 
 
-def _draw(picture: NDArray[np.uint8], points: Array, larger: int, colour: Colour) -> None:
+def _polygon(picture: NDArray[np.uint8], points: Array, larger: int, colour: Colour) -> None:
     fixed = np.round(_on_picture(points, larger) * 2**FRACTION).astype(np.int32)
     cv2.polylines(picture, [fixed], isClosed=True, color=colour, thickness=2, lineType=cv2.LINE_AA, shift=FRACTION)
 

@@ -15,7 +15,7 @@ from .warp import Array, Frame
 
 FURTHEST_SHIFT = 2.0  # region pixels
 FURTHEST_TURN = 0.1  # degrees
-BLUR = 1.0  # region pixels: averages over speckle grains; wide enough a basin for the furthest shift
+REFINE_BLUR = 1.0  # region pixels: averages over speckle grains; wide enough a basin for the furthest shift
 BORDER = 4  # region pixels that take no part: the furthest shift and the reach of the interpolation
 ITERATIONS = 50
 STEP = 1e-3  # region pixels, at the corners: a smaller step ends the search
@@ -74,7 +74,7 @@ def refine(capture: Tensor, target: Tensor) -> Refined:
         return Refined(capture, 0.0, 0.0, 0.0)
     where = _coordinates((capture.shape[1], capture.shape[2]), move)
     frames = capture.detach().to("cpu", torch.float32).numpy()
-    image = torch.from_numpy(np.stack([_moved(frame, where) for frame in frames])).to(capture.device)
+    image = torch.from_numpy(np.stack([_resampled(frame, where) for frame in frames])).to(capture.device)
     return Refined(image, float(move[0]), float(move[1]), math.degrees(move[2]))
 
 
@@ -84,14 +84,14 @@ def _search(capture: Tensor, target: Tensor) -> Array | None:
     move = _climb(seen, wanted)
     if move is None or not _within(move, 1.0):
         return None
-    before, after = (_moved(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
-    return move if _correlation(after, wanted) > _correlation(before, wanted) else None
+    before, after = (_resampled(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
+    return move if _inner_correlation(after, wanted) > _inner_correlation(before, wanted) else None
 
 
 def _amplitude(image: Tensor) -> Frame:
     """Square root of the blurred light: blurred first, as the root of speckled edges would spread into the dark."""
     light = image.detach().to("cpu", torch.float32).sum(0).clamp_min(0.0).numpy()
-    return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), BLUR)))
+    return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), REFINE_BLUR)))
 
 
 def _climb(seen: Frame, wanted: Frame) -> Array | None:
@@ -108,7 +108,7 @@ def _climb(seen: Frame, wanted: Frame) -> Array | None:
         return None
     move: Array = np.zeros(3)
     for _ in range(ITERATIONS):
-        now = _inner(_moved(seen, _coordinates((height, width), move))).ravel()
+        now = _inner(_resampled(seen, _coordinates((height, width), move))).ravel()
         solved = np.linalg.solve(normal, model.T @ now.astype(np.float64))
         if solved[0] <= 0:
             return None
@@ -138,7 +138,7 @@ def _coordinates(shape: tuple[int, ...], move: Array) -> tuple[Frame, Frame]:
     return moved_x.astype(np.float32), moved_y.astype(np.float32)
 
 
-def _moved(frame: Frame, where: tuple[Frame, Frame]) -> Frame:
+def _resampled(frame: Frame, where: tuple[Frame, Frame]) -> Frame:
     """``frame`` at coordinates x, y by cubic interpolation; beyond its border the last pixel repeats."""
     return np.asarray(cv2.remap(frame, *where, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
 
@@ -147,5 +147,5 @@ def _inner(image: NDArray[np.floating]) -> NDArray[np.floating]:
     return image[BORDER:-BORDER, BORDER:-BORDER]
 
 
-def _correlation(a: Frame, b: Frame) -> float:
+def _inner_correlation(a: Frame, b: Frame) -> float:
     return float(np.corrcoef(_inner(a).ravel(), _inner(b).ravel())[0, 1])

@@ -22,13 +22,13 @@ from torch import Tensor
 from ..core.errors import CellError
 from .circles import find_circles
 from .grid import FiducialGrid
-from .grid_check import impostor
+from .grid_check import mismatch
 from .subpixel import correlation, even_picture, offsets
 from .warp import Array, Frame, Warp, quadratic_terms, remap
 
-ITERATIONS = 3
-OUTLIER = 1.5  # region pixels from the homography: not speckle but dust, or not a circle at all
-FURTHEST = 2.0  # region pixels that the sub-pixel fit may move a corner from where the detector put it
+FIT_ITERATIONS = 3
+CIRCLE_OUTLIER = 1.5  # region pixels from the homography: not speckle but dust, or not a circle at all
+FURTHEST_CORNER = 2.0  # region pixels that the sub-pixel fit may move a corner from where the detector put it
 SIGNIFICANCE = 0.999
 WORTHWHILE = 0.85  # of the residual: fringes of 10 % alone can look like a distortion that lowers it to 0.89
 
@@ -148,13 +148,13 @@ def _register_channel(frame: Frame, grid: FiducialGrid, channel: int) -> tuple[W
         raise CellError(
             f"registration of channel {channel}: no grid of {grid.columns}x{grid.rows} circles and its marks is seen"
         )
-    start = Warp(grid.shape, _homography(grid.centres, points, 3 * OUTLIER), np.zeros((6, 2)))
+    start = Warp(grid.shape, _homography(grid.centres, points, 3 * CIRCLE_OUTLIER), np.zeros((6, 2)))
     warp = _refined(frame, start, grid)
     corners = warp.corners()
     height, width = frame.shape
     if np.any(corners < -0.5) or np.any(corners > (width - 0.5, height - 0.5)):
         raise CellError(f"registration of channel {channel}: the region lies partly outside the sensor")
-    doubt = impostor(frame, warp, grid)
+    doubt = mismatch(frame, warp, grid)
     if doubt is not None:
         raise CellError(f"registration of channel {channel}: {doubt}")
     residual = offsets(even_picture(frame, warp, grid), grid)
@@ -164,21 +164,21 @@ def _register_channel(frame: Frame, grid: FiducialGrid, channel: int) -> tuple[W
 def _refined(frame: Frame, start: Warp, grid: FiducialGrid) -> Warp:
     """The sub-pixel fit, or ``start`` when it does not raise the correlation or moves a corner too far."""
     warp = start
-    for _ in range(ITERATIONS):
+    for _ in range(FIT_ITERATIONS):
         moved = offsets(even_picture(frame, warp, grid), grid)
-        correction = _homography(grid.centres, grid.centres + moved, OUTLIER)
+        correction = _homography(grid.centres, grid.centres + moved, CIRCLE_OUTLIER)
         warp = replace(warp, homography=warp.homography @ correction)
     warp = _bent(frame, warp, grid)
     moved_corners = np.linalg.norm(warp.corners() - start.corners(), axis=1).max() / start.scale()
     before, after = (correlation(even_picture(frame, each, grid), grid) for each in (start, warp))
-    return warp if after > before and moved_corners <= FURTHEST else start
+    return warp if after > before and moved_corners <= FURTHEST_CORNER else start
 
 
 def _homography(source: Array, target: Array, outlier: float) -> Array:
-    found, _ = cv2.findHomography(source, target, cv2.RANSAC, outlier)
-    if found is None:
+    homography, _ = cv2.findHomography(source, target, cv2.RANSAC, outlier)
+    if homography is None:
         raise CellError("registration: the circles lie on no common plane")
-    return np.asarray(found, dtype=np.float64)
+    return np.asarray(homography, dtype=np.float64)
 
 
 def _bent(frame: Frame, warp: Warp, grid: FiducialGrid) -> Warp:
@@ -193,7 +193,7 @@ def _bent(frame: Frame, warp: Warp, grid: FiducialGrid) -> Warp:
     if not significant or remaining > WORTHWHILE**2 * without:
         return warp
     bent = replace(warp, quadratic=warp.quadratic + coefficients)
-    for _ in range(ITERATIONS - 1):
+    for _ in range(FIT_ITERATIONS - 1):
         moved = offsets(even_picture(frame, bent, grid), grid)
         bent = replace(bent, quadratic=bent.quadratic + np.linalg.lstsq(terms, moved, rcond=None)[0])
     return bent

@@ -125,13 +125,13 @@ class AngularSpectrum(Convolution):
             dtype = torch.complex128 if padding == "reference" else torch.complex64
         padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
         twice = (int(next_fast_len(2 * shape[0] - 1)), int(next_fast_len(2 * shape[1] - 1)))
-        optics, place = _Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil), torch.device(device)
+        optics, where = _Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil), torch.device(device)
         if padding is None and (padded[0] > twice[0] or padded[1] > twice[1]):
             padded = (min(padded[0], twice[0]), min(padded[1], twice[1]))
             grid = padded_shape(shape, pitch, wavelength, distance, pupil, None, DEFAULT_ERROR / 3)
-            transfer = _cut_transfer(optics, padded, grid, dtype, place)
+            transfer = _cut_off_transfer(optics, padded, grid, dtype, where)
         else:
-            transfer = _transfer(optics, padded, dtype, place)
+            transfer = _band_limited_transfer(optics, padded, dtype, where)
         super().__init__(optics.shape, transfer)
         self.pitch, self.wavelength, self.distance, self.pupil = pitch, wavelength, distance, pupil
 
@@ -168,13 +168,15 @@ class _Optics:
 
 
 @lru_cache(maxsize=24)
-def _transfer(optics: _Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device) -> Tensor:
+def _band_limited_transfer(
+    optics: _Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device
+) -> Tensor:
     fy, fx = frequencies(padded, optics.pitch, device)
     return as_used(optics.sampled(fy, fx, padded).to(dtype))
 
 
 @lru_cache(maxsize=24)
-def _cut_transfer(
+def _cut_off_transfer(
     optics: _Optics, padded: tuple[int, int], grid: tuple[int, int], dtype: torch.dtype, device: torch.device
 ) -> Tensor:
     """Transfer function of the kernel of a larger ``grid``, cut off beyond the panel's own size.

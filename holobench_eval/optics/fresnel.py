@@ -50,12 +50,13 @@ class Fresnel(Convolution):
             dtype = torch.complex128 if padding == "reference" else torch.complex64
         padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
         super().__init__(
-            (shape[0], shape[1]), _transfer(padded, pitch, wavelength, distance, pupil, dtype, torch.device(device))
+            (shape[0], shape[1]),
+            _paraxial_transfer(padded, pitch, wavelength, distance, pupil, dtype, torch.device(device)),
         )
 
 
 @lru_cache(maxsize=24)
-def _transfer(
+def _paraxial_transfer(
     padded: tuple[int, int],
     pitch: float,
     wavelength: float,

@@ -57,7 +57,7 @@ class PointSource(Convolution):
         check_geometry(shape, pitch, wavelength, None)
         if distance == 0:
             raise ValueError("the point-source kernel needs a distance that is not zero")
-        transfer = _transfer((shape[0], shape[1]), pitch, wavelength, distance, dtype, torch.device(device))
+        transfer = _kernel_transfer((shape[0], shape[1]), pitch, wavelength, distance, dtype, torch.device(device))
         super().__init__((shape[0], shape[1]), transfer)
 
 
@@ -86,7 +86,7 @@ def impulse_response(y: Tensor, x: Tensor, wavelength: float, distance: float) -
 
 
 @lru_cache(maxsize=8)
-def _transfer(
+def _kernel_transfer(
     shape: tuple[int, int],
     pitch: float,
     wavelength: float,
@@ -102,11 +102,11 @@ def _transfer(
         offsets.append(index * pitch)
     y, x = offsets[0][:, None], offsets[1][None, :]
     kernel = impulse_response(y, x, wavelength, distance) * pitch**2
-    kernel = kernel * _sampled(y, pitch, wavelength, distance) * _sampled(x, pitch, wavelength, distance)
+    kernel = kernel * _resolved(y, pitch, wavelength, distance) * _resolved(x, pitch, wavelength, distance)
     return as_used(torch.fft.fft2(kernel).to(dtype))
 
 
-def _sampled(offset: Tensor, pitch: float, wavelength: float, distance: float) -> Tensor:
+def _resolved(offset: Tensor, pitch: float, wavelength: float, distance: float) -> Tensor:
     """1 where the kernel oscillates slower than the pixels sample it, 0 where faster; soft, or the edge rings."""
     local = offset.abs() / (wavelength * torch.sqrt(offset**2 + distance**2)) * (2 * pitch)
     edge = ((local - 1 + TAPER) / (2 * TAPER)).clamp(0.0, 1.0)

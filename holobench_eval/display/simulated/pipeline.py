@@ -158,8 +158,8 @@ class SimulatedBench:
         """Intensity at the image plane of one line of the source."""
         profile = self.profile
         level = straight_through_level(phase + maps.added, profile.panel.bits)
-        shown = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
-        fine = profile.crosstalk.apply(shown, self.crosstalk).view(self.samples, self.samples, *shown.shape)
+        driven = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
+        fine = profile.crosstalk.apply(driven, self.crosstalk).view(self.samples, self.samples, *driven.shape)
         # the light that follows the phase, its carrier taken off; what follows no phase is in the path
         field = phasor(self.modulated * maps.amplitude, fine + maps.angle)
         return squared_modulus(maps.path.image(field)) * maps.laser_power

@@ -198,16 +198,16 @@ def checked(kind: str, value: Value) -> Value:
     """A value as its kind has it: a number within its range, a name as text. UserError for anything else."""
     if kind not in KINDS:
         raise UserError(f"unknown condition '{kind}'; {suggest(kind, KINDS)}")
-    found = KINDS[kind]
-    if found.counted:
+    limits = KINDS[kind]
+    if limits.counted:
         text = f"{value:g}" if isinstance(value, float) else str(value)
         if not re.fullmatch(r"[1-9]\d{0,8}", text):
             raise UserError(f"{kind} is named by a whole number from 1, got {value!r}")
         return text
-    if not found.numeric:
-        return found.read(str(value))
-    if not isinstance(value, int | float) or isinstance(value, bool) or not found.low <= value <= found.high:
-        raise UserError(f"{kind} is a number from {found.low:g} to {found.high:g}, got {value!r}")
+    if not limits.numeric:
+        return limits.read(str(value))
+    if not isinstance(value, int | float) or isinstance(value, bool) or not limits.low <= value <= limits.high:
+        raise UserError(f"{kind} is a number from {limits.low:g} to {limits.high:g}, got {value!r}")
     return float(value)
 
 

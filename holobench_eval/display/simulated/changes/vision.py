@@ -29,10 +29,10 @@ class Prescription:
     @classmethod
     def read(cls, text: str) -> Prescription:
         """``"-2"`` or ``"-2 / -1 x 30"``. UserError for anything else."""
-        found = WRITTEN.fullmatch(text.strip())
-        if found is None:
+        written = WRITTEN.fullmatch(text.strip())
+        if written is None:
             raise UserError(f"prescription '{text}': write 'sphere' or 'sphere / cylinder x axis', as '-2 / -1 x 30'")
-        sphere, cylinder, axis = (float(part or 0) for part in found.groups())
+        sphere, cylinder, axis = (float(part or 0) for part in written.groups())
         if max(abs(sphere), abs(cylinder)) > STRONGEST or axis > 180:
             raise UserError(f"prescription '{text}': at most {STRONGEST:g} dioptres, and an axis of 0 to 180 degrees")
         return cls(sphere, cylinder, axis)

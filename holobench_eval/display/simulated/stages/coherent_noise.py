@@ -112,5 +112,5 @@ class DustPlane(Stage):
         """The specks and their plane."""
         dirt = profile.coherent_noise
         if dirt.plane_specks:
-            place = f"{percent(dirt.plane_distance)} of the way before the image"
-            yield Effect("plane_dust", f"dust on an intermediate plane, {dirt.plane_specks} specks {place}")
+            plane = f"{percent(dirt.plane_distance)} of the way before the image"
+            yield Effect("plane_dust", f"dust on an intermediate plane, {dirt.plane_specks} specks {plane}")
