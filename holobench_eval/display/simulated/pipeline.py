@@ -154,15 +154,16 @@ class SimulatedBench:
         panel = self.profile.panel
         return padded_shape(panel.shape, panel.pitch, max(panel.wavelengths), panel.distance, panel.pupil, None)
 
-    def _light(self, phase: Tensor, maps: ChannelMaps, channel: int, flicker: float) -> Tensor:
-        """Intensity at the image plane of one line of the source."""
-        profile = self.profile
+    def _modulated_field(self, phase: Tensor, maps: ChannelMaps, flicker: float) -> Tensor:
+        """Field ``(samples, samples, H, W)`` of the sub-samples' light that follows ``phase`` ``(H, W)`` [rad].
+
+        The carrier is off. The light that follows no phase is in ``ChannelMaps.path``.
+        """
+        profile, gain = self.profile, maps.lut_gain * (flicker * self.drift_gain)
         level = straight_through_level(phase + maps.added, profile.panel.bits)
-        driven = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
+        driven = profile.lut.phase(level, profile.panel.bits, gain, maps.geometry.channel)
         fine = profile.crosstalk.apply(driven, self.crosstalk).view(self.samples, self.samples, *driven.shape)
-        # the light that follows the phase, its carrier taken off; what follows no phase is in the path
-        field = phasor(self.modulated * maps.amplitude, fine + maps.angle)
-        return squared_modulus(maps.path.image(field)) * maps.laser_power
+        return phasor(self.modulated * maps.amplitude, fine + maps.angle)
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane.
@@ -181,7 +182,11 @@ class SimulatedBench:
         Tensor
             ``(n H, n W)`` for n = ``image_samples``; the mean incident intensity on the panel is 1.
         """
-        return reduce(add, (self._light(phase, maps, channel, flicker) for maps in self.lines[channel]))
+        lines = (
+            squared_modulus(maps.path.image(self._modulated_field(phase, maps, flicker))) * maps.laser_power
+            for maps in self.lines[channel]
+        )
+        return reduce(add, lines)
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """``intensity`` as it falls on the sensor: after what spreads it, averaged over the area of a sensor pixel."""
