@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..profile import Profile
 
 PerChannel = tuple[float, float, float]
-TI_PLM_PERCENT = (0, 1.07, 2.19, 4.50, 5.98, 7.75, 12.06, 18.5, 36.55, 39.55, 45.1, 52.44, 63.93, 71.16, 85.02, 100)
 
 
 @dataclass(frozen=True)
