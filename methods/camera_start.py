@@ -20,7 +20,7 @@ from .hil.retrieval import matched
 from .wirtinger import Wirtinger
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredDisplay
+    from ..display.metered import MeteredDisplay
 
 LEAST_SHARE = 4
 """Neither the search for a start nor the decision at the end takes more than one capture in so many."""

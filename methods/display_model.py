@@ -33,7 +33,7 @@ MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "sphe
 """Zernike polynomials of the aberration, see ``optics.zernike``."""
 FIRST_CROSSTALK = 0.3
 FORM = frozenset({"look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES})
-"""Effects (``display.simulated.effects``) that the model has a term for. All others of a bench lie outside its form:
+"""Effects (``Profile.effects``) that the model has a term for. All others of a bench lie outside its form:
 fringes, of which ``SOURCE_GRID`` follows the coarser ones alone, and the light from between the pixels as far as it is
 not simply unmodulated, are among them."""
 

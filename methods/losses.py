@@ -16,7 +16,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..core.errors import UserError
-from ..metrics.ms_ssim import SMALLEST, ms_ssim
+from ..metrics.ms_ssim import SMALLEST_MS_SSIM as SMALLEST
+from ..metrics.ms_ssim import ms_ssim
 from .common import intensity_scale, safe_amplitude
 
 LossName = Literal["intensity_l2", "amplitude_l2", "intensity_l1", "huber", "ms_ssim"]

@@ -22,7 +22,7 @@ from .hil.retrieval import matched
 
 if TYPE_CHECKING:
     from ..display.api import DisplaySpec
-    from ..display.calibrated import MeteredDisplay
+    from ..display.metered import MeteredDisplay
 
 MOMENTS = (0.6, 0.99)
 """Adam's decay rates. Little momentum: the gradient is that of another display."""

@@ -23,7 +23,7 @@ from .hil.objective import Objective
 from .hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredDisplay
+    from ..display.metered import MeteredDisplay
 
 SMOOTHING = 0.7
 """Width [px] of the Gaussian that what the network misses of the captures is filtered with."""

@@ -14,7 +14,7 @@ from .losses import intensity_l2
 from .wirtinger import Wirtinger
 
 if TYPE_CHECKING:
-    from ..display.calibrated import MeteredDisplay
+    from ..display.metered import MeteredDisplay
 
 
 @dataclass(frozen=True)

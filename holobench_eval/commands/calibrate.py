@@ -61,9 +61,9 @@ def fit(profile: Profile, panel: tuple[int, int], seed: int) -> Calibration:
     from scipy.optimize import least_squares
 
     from ..core import plugins
-    from ..display import open_bench
     from ..display.simulated.pipeline import SimulatedBench
     from ..metrics import score
+    from ..study.opening import open_bench
 
     spec = profile.spec(panel)
     photographs = plugins.build("datasets", "photographs", {})

@@ -1,7 +1,8 @@
 """Displays: what a method may touch, and the simulated bench."""
 
-from .api import Capture, Display, DisplaySpec, Region
-from .calibrated import CalibratedBench, MeteredDisplay, RectifiedCapture, open_bench
+from .api import Capture, Display, DisplaySpec, RectifiedCapture, Region
+from .calibrated import CalibratedBench
+from .metered import MeteredDisplay
 from .simulated.profile import Profile, load_profile
 
 __all__ = [
@@ -14,5 +15,4 @@ __all__ = [
     "RectifiedCapture",
     "Region",
     "load_profile",
-    "open_bench",
 ]

@@ -1,23 +1,44 @@
-"""What a method may know about a display, and what a display gives back."""
+"""What a display is: its nominal optics, what it is asked for and what it gives back."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
 
+from ..core.errors import CellError
+from ..imaging.register import Registration
 from ..optics import AngularSpectrum
 from ..optics.convolution import frequencies
-from .simulated.stages.eye import eye_phase
-from .simulated.stages.lens import Matrix
+from ..optics.phase import Matrix, refocus
+
+Exposure = Literal["equal", "matched"]
+DARKEST_MEAN = 0.01  # a target channel darker than this is exposed as if it had this mean: exposure stays finite
 
 
 @dataclass(frozen=True)
 class Region:
-    """The scored window of the panel, in panel pixels; loss and score both use exactly this window."""
+    """The scored window of the panel, in panel pixels; loss and score both use exactly this window.
+
+    Parameters
+    ----------
+    top, left
+        First row and column.
+    height, width
+        Rows and columns.
+
+    Examples
+    --------
+    >>> region = Region(top=1, left=2, height=2, width=3)
+    >>> region.crop(torch.zeros(3, 8, 8)).shape
+    torch.Size([3, 2, 3])
+    >>> float(region.embed(torch.ones(2, 3), (8, 8)).sum())
+    6.0
+    """
 
     top: int
     left: int
@@ -51,10 +72,29 @@ class Region:
 class DisplaySpec:
     """Nominal optics of a display: all that a method may know about it.
 
-    Lengths are in metres. ``pupil`` is the diameter of the iris as a fraction of the panel's band 1/pitch
-    (None: no iris). The blaze that an off-axis display adds to every phase, and the re-centring of its image,
-    belong to the display, so the nominal model is on axis for every method. ``eye``: that of the viewer, where its
-    prescription is known; see ``stages.eye``.
+    The blaze that an off-axis display adds to every phase, and the re-centring of its image, belong to the display, so
+    the nominal model is on axis for every method.
+
+    Parameters
+    ----------
+    name
+        That of the profile or of the bench file.
+    shape
+        Rows and columns of the panel.
+    pitch
+        Of the panel's pixels [m].
+    wavelengths
+        One a colour channel [m].
+    distance
+        From the panel to the image plane [m].
+    bits
+        Of the panel.
+    pupil
+        Diameter of the iris as a fraction of the panel's band 1 / pitch, None for no iris.
+    region
+        The scored window.
+    eye
+        That of the viewer, where its prescription is known: ``focus`` of ``stages.eye.Eye``.
     """
 
     name: str
@@ -70,7 +110,15 @@ class DisplaySpec:
     def propagator(
         self, channel: int, dtype: torch.dtype = torch.complex64, device: torch.device | str = "cpu"
     ) -> AngularSpectrum:
-        """The ideal propagator of a colour channel, panel to image plane (cached)."""
+        """The ideal propagator of a colour channel, panel to image plane (cached).
+
+        Parameters
+        ----------
+        channel
+            Index of the wavelength.
+        dtype, device
+            Those of the fields that it propagates.
+        """
         return _propagator(self, channel, dtype, torch.device(device))
 
 
@@ -88,8 +136,8 @@ def _propagator(spec: DisplaySpec, channel: int, dtype: torch.dtype, device: tor
     )
     if any(spec.eye):
         fy, fx = frequencies(model.padded_shape, spec.pitch, device)
-        seen = eye_phase(spec.eye, fy, fx, wavelength, spec.distance)
-        model.transfer = model.transfer * torch.polar(torch.ones_like(seen), seen).to(dtype)
+        eye = refocus(spec.eye, fy, fx, wavelength, spec.distance)
+        model.transfer = model.transfer * torch.polar(torch.ones_like(eye), eye).to(dtype)
     return model
 
 
@@ -97,8 +145,20 @@ def _propagator(spec: DisplaySpec, channel: int, dtype: torch.dtype, device: tor
 class Capture:
     """One colour-sequential camera capture, as the camera gives it.
 
-    frame: ``(C, Hs, Ws)`` sensor counts (DN), float32; dark, white: dark level and saturation level in DN;
-    gain: per channel, DN above dark that light as strong as the mean incident light on the panel would give.
+    Parameters
+    ----------
+    frame
+        ``(C, Hs, Ws)`` sensor counts [DN], float32.
+    dark, white
+        Dark level and saturation level [DN].
+    gain
+        Per channel, counts above dark that light as strong as the mean incident light on the panel would give [DN].
+
+    Examples
+    --------
+    >>> capture = Capture(torch.full((1, 2, 2), 612.0), dark=512.0, white=4095.0, gain=(200.0,))
+    >>> float(capture.linear().mean())
+    0.5
     """
 
     frame: Tensor
@@ -117,14 +177,166 @@ class Capture:
         return float((self.frame >= self.white).float().mean())
 
 
+@dataclass(frozen=True)
+class RectifiedCapture:
+    """A capture brought into the target's frame.
+
+    Parameters
+    ----------
+    image
+        ``(C, h, w)`` linear light; 1 is what a white pixel gets if all light of the panel went into the target.
+    capture
+        The capture itself.
+    saturated
+        Fraction of saturated samples.
+    efficiency
+        Light in the region over light on the panel, mean over channels.
+    residual
+        Registration residual [region px, rms], worst channel.
+    exposure
+        Per channel, electrons per unit of light, or the exposure time of a real camera.
+    """
+
+    image: Tensor
+    capture: Capture
+    saturated: float
+    efficiency: float
+    residual: float
+    exposure: tuple[float, ...]
+
+
+class Camera(Protocol):
+    """A camera that counts its frames."""
+
+    def announce(self, phases: Sequence[Tensor]) -> None:
+        """Tell which phases ``(C, H, W)`` [rad] are captured next, so that they can be captured in one go."""
+        ...
+
+    def capture(self, phase: Tensor) -> Capture:
+        """Show ``phase`` ``(C, H, W)`` [rad, any range: the display wraps it] and photograph the image plane."""
+        ...
+
+
+class Simulation(Protocol):
+    """A bench as its registered camera sees it, without noise."""
+
+    def image(self, phase: Tensor) -> Tensor:
+        """Intensity ``(C, h, w)`` for a phase ``(C, H, W)`` [rad], differentiable; incident light is 1."""
+        ...
+
+
 class Display(Protocol):
-    """Anything that shows a phase and gives back a capture: a simulated bench, a real one, a learned network."""
+    """Anything that shows a phase and gives back a capture: a simulated bench, a real one, a trained network."""
+
+    @property
+    def seed(self) -> int:
+        """What all random numbers of the display depend on."""
+        ...
 
     @property
     def spec(self) -> DisplaySpec:
         """Nominal optics, public."""
         ...
 
-    def capture(self, phase: Tensor) -> Capture:
-        """Show ``phase`` ``(C, H, W)`` [rad, any range: the display wraps it] and photograph the image plane."""
+    @property
+    def simulation(self) -> Simulation:
+        """The bench itself. CellError where there is none."""
         ...
+
+    def session(self, names: tuple[object, ...], target: Tensor) -> Camera:
+        """The camera, exposed for ``target`` ``(C, h, w)``, under noise that depends on ``names``."""
+        ...
+
+    def photograph(
+        self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
+    ) -> RectifiedCapture:
+        """Show a phase and bring its capture into the frame of the target: what is scored.
+
+        Parameters
+        ----------
+        phase
+            ``(C, H, W)`` [rad].
+        target
+            ``(C, h, w)`` linear light in [0, 1].
+        item, repeat
+            What the noise depends on, besides the display's seed.
+        exposure
+            "equal": the same light for every method; "matched": a metering capture first, then the laser power (of a
+            real bench the exposure time) that gives the region the target's mean brightness, as paper section 7 does
+            for double-phase holograms.
+        label
+            Name of the method in error messages.
+
+        Raises
+        ------
+        CellError
+            No display can show the phase, or the camera cannot be registered.
+        """
+        ...
+
+    def rectified(self, capture: Capture, target: Tensor) -> Tensor:
+        """A capture in the target's frame, on its device, ``(C, h, w)`` in the unit of ``RectifiedCapture.image``."""
+        ...
+
+
+Fiducials = Callable[[Display, Tensor], Mapping[tuple[int, int], Tensor]]
+"""Phases ``(C, H, W)`` [rad] of the holograms of a grid ``(C, h, w)`` that registers a display's camera, by name."""
+
+
+def white_irradiance(target: Tensor, spec: DisplaySpec) -> Tensor:
+    """Light at a white pixel if all light of the panel went into the target.
+
+    Parameters
+    ----------
+    target
+        ``(C, h, w)`` linear light in [0, 1].
+    spec
+        The display's nominal optics.
+
+    Returns
+    -------
+    Tensor
+        ``(C,)``; the mean incident light on the panel is 1.
+    """
+    share = target.mean((-2, -1)).clamp_min(DARKEST_MEAN) * (target.shape[-2] * target.shape[-1])
+    return spec.shape[0] * spec.shape[1] / share
+
+
+def in_target_frame(capture: Capture, target: Tensor, spec: DisplaySpec, registration: Registration) -> Tensor:
+    """A capture as ``(C, h, w)`` in the frame of the target, on its device, in the unit of ``RectifiedCapture``."""
+    light = registration.rectify(capture.linear()).to(target.device)
+    return light / white_irradiance(target, spec)[: light.shape[0], None, None]
+
+
+def efficiency(image: Tensor, target: Tensor) -> float:
+    """``RectifiedCapture.efficiency`` of its image and the target, both ``(C, h, w)``."""
+    return float((image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)).mean())
+
+
+def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
+    """Refuse what no display can show.
+
+    Parameters
+    ----------
+    phase
+        ``(C, H, W)`` real numbers [rad].
+    spec
+        The display's nominal optics.
+    label
+        Name of the method in the error message.
+
+    Raises
+    ------
+    CellError
+        Another shape or type, or values that are not finite.
+    """
+    who = f"{label}: " if label else ""
+    if phase.ndim != 3 or tuple(phase.shape[-2:]) != spec.shape:
+        raise CellError(
+            f"{who}phase is {tuple(phase.shape)}, the display shows (channels, {spec.shape[0]}, {spec.shape[1]})"
+        )
+    if phase.is_complex() or not phase.is_floating_point():
+        raise CellError(f"{who}phase is {phase.dtype}, the display shows real numbers in radians")
+    bad = int((~torch.isfinite(phase)).sum())
+    if bad:
+        raise CellError(f"{who}phase holds {bad} values that are NaN or infinite; the display refuses it")

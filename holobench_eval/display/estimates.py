@@ -1,4 +1,4 @@
-"""Quantities that say what a display does, defined once, for a bench whose truth is known and for a model of it.
+"""Quantities that describe a display, defined once, for a bench whose truth is known and for a model of it.
 
 A display that is seen only through its images has gauge freedoms: a constant phase may sit in the look-up table or in
 the beam, a curved beam focuses as a defocused lens does. Each quantity here is chosen so that such freedoms cancel.
@@ -7,7 +7,7 @@ the beam, a curved beam focuses as a defocused lens does. Each quantity here is 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +20,9 @@ from ..optics.phase import TAU
 from ..optics.zernike import NAMES, zernike
 
 MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "trefoil_y", "trefoil_x", "spherical")
-"""Zernike polynomials that are told, see ``optics.zernike``; piston and tilts are not seen after registration."""
-DARK = 1e-3
-"""Of the light; what is unmodulated below this share has no phase worth telling."""
-DISC_POINTS = 129
+"""Zernike polynomials of the estimates, see ``optics.zernike``; registration hides piston and tilts."""
+DARK = 1e-3  # share of unmodulated light below which its phase has no meaning
+DISC_POINTS = 129  # along the diameter
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         for name in MODES
     },
 }
-"""Everything that is told of a display."""
+"""Every quantity of a display."""
 
 
 def estimate(name: str, colour: int | None, value: float) -> Estimate:
@@ -84,8 +83,8 @@ def stroke(levels: Tensor, phase: Tensor) -> Stroke:
 
     def line(exponent: float) -> tuple[list[float], float]:
         basis = np.stack([level**exponent, np.ones_like(level)], 1)
-        found = np.linalg.lstsq(basis, turns, rcond=None)[0]
-        return found.tolist(), float(np.square(basis @ found - turns).sum())
+        coefficients = np.linalg.lstsq(basis, turns, rcond=None)[0]
+        return coefficients.tolist(), float(np.square(basis @ coefficients - turns).sum())
 
     exponent = float(
         minimize_scalar(lambda x: line(x)[1], bounds=(0.2, 5), method="bounded", options={"xatol": 1e-6}).x
@@ -102,10 +101,10 @@ def undiffracted(ratio: complex, colour: int) -> list[Estimate]:
     holds their coherent sum. The phase is left out where there is next to no such light.
     """
     share = abs(ratio) ** 2 / (1 + abs(ratio) ** 2)
-    told = [estimate("undiffracted_fraction", colour, share)]
+    estimates = [estimate("undiffracted_fraction", colour, share)]
     if share > DARK:
-        told.append(estimate("undiffracted_phase", colour, math.atan2(ratio.imag, ratio.real)))
-    return told
+        estimates.append(estimate("undiffracted_phase", colour, math.atan2(ratio.imag, ratio.real)))
+    return estimates
 
 
 def disc() -> tuple[Tensor, Tensor]:
@@ -121,8 +120,8 @@ def zernike_waves(phase: Tensor) -> dict[str, float]:
     y, x = disc()
     named = ("piston", "tilt_x", "tilt_y", *MODES)
     basis = torch.stack([zernike(NAMES[name], y, x) for name in named], 1)
-    found = torch.linalg.lstsq(basis, phase[:, None]).solution[:, 0] / TAU
-    return dict(zip(named, found.tolist(), strict=True))
+    waves = torch.linalg.lstsq(basis, phase[:, None]).solution[:, 0] / TAU
+    return dict(zip(named, waves.tolist(), strict=True))
 
 
 def focusing(beam: Tensor, reach: float) -> Tensor:
@@ -139,9 +138,9 @@ def focusing(beam: Tensor, reach: float) -> Tensor:
     columns = torch.arange(width, dtype=torch.float64) - (width - 1) / 2
     y, x = torch.meshgrid(rows / height, columns / height, indexing="ij")
     basis = torch.stack([y * y, y * x, x * x, y, x, torch.ones_like(y)], -1).reshape(-1, 6)
-    found = torch.linalg.lstsq(basis, beam.double().reshape(-1, 1)).solution[:3, 0] * (reach / height) ** 2
+    curvature = torch.linalg.lstsq(basis, beam.double().reshape(-1, 1)).solution[:3, 0] * (reach / height) ** 2
     v, u = disc()
-    return found[0] * v * v + found[1] * v * u + found[2] * u * u
+    return curvature[0] * v * v + curvature[1] * v * u + curvature[2] * u * u
 
 
 def reach(wavelength: float, distance: float, pitch: float, pupil: float | None) -> float:
@@ -149,25 +148,25 @@ def reach(wavelength: float, distance: float, pitch: float, pupil: float | None)
     return wavelength * distance * (pupil or 1.0) / (2 * pitch**2)
 
 
-def joined(found: Sequence[Estimate], truths: Iterable[Estimate]) -> list[dict[str, object]]:
+def joined(estimates: Iterable[Estimate], truths: Iterable[Estimate]) -> list[dict[str, object]]:
     """Estimates beside the truth of the same name and colour, None where there is none, as plain values for a file.
 
     error: the stated error of the quantity, None for one that is not in ``QUANTITIES``.
     """
-    known = {(one.name, one.colour): one.value for one in truths}
+    known = {(item.name, item.colour): item.value for item in truths}
     return [
         {
-            "name": one.name,
-            "colour": one.colour,
-            "unit": one.unit,
-            "value": _finite(one.value),
-            "truth": _finite(known.get((one.name, one.colour))),
-            "error": QUANTITIES[one.name].error if one.name in QUANTITIES else None,
+            "name": item.name,
+            "colour": item.colour,
+            "unit": item.unit,
+            "value": _finite(item.value),
+            "truth": _finite(known.get((item.name, item.colour))),
+            "error": QUANTITIES[item.name].error if item.name in QUANTITIES else None,
         }
-        for one in found
+        for item in estimates
     ]
 
 
 def _finite(value: float | None) -> float | None:
-    """Six digits, which are more than any estimate has; what is no number has none."""
+    """Six digits, more than any estimate has; None for NaN and infinity."""
     return None if value is None or not math.isfinite(value) else float(f"{value:.6g}")

@@ -11,18 +11,18 @@ from torch import Tensor
 
 from ..core.device import CPU
 from ..core.errors import CellError
-from .api import Capture, DisplaySpec
-from .calibrated import (
-    DARKEST_MEAN,
+from .api import (
+    Camera,
+    Capture,
+    DisplaySpec,
     Exposure,
-    MeteredDisplay,
     RectifiedCapture,
-    Shows,
     Simulation,
     check_phase,
+    efficiency,
     white_irradiance,
 )
-from .simulated.pipeline import BenchSession
+from .metered import MeteredDisplay, MethodHandles
 
 
 class Predictor(Protocol):
@@ -34,7 +34,7 @@ class Predictor(Protocol):
 
 
 @dataclass(frozen=True)
-class LearnedBench(Shows):
+class LearnedBench(MethodHandles):
     """A display without noise, camera or registration; ``method`` predicts on ``device`` with what it ``learned``."""
 
     spec: DisplaySpec
@@ -56,14 +56,13 @@ class LearnedBench(Shows):
         check_phase(phase, self.spec, label)
         handle = MeteredDisplay(self, label, target.to(self.device), (self.seed, item, repeat), learned=self.learned)
         image = self.method.predict(phase[None].to(self.device), handle)[0].detach().cpu()
-        share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
         light = tuple(white_irradiance(target, self.spec).tolist())
         capture = Capture(image, dark=0.0, white=float("inf"), gain=(1.0,) * len(image))
         return RectifiedCapture(
-            image, capture, saturated=0.0, efficiency=float(share.mean()), residual=0.0, exposure=light
+            image, capture, saturated=0.0, efficiency=efficiency(image, target), residual=0.0, exposure=light
         )
 
-    def session(self, names: tuple[object, ...], target: Tensor) -> BenchSession:
+    def session(self, names: tuple[object, ...], target: Tensor) -> Camera:
         """There is none: a learned display has no camera."""
         raise CellError("a learned display has no camera")
 

@@ -14,8 +14,7 @@ from torch import Tensor
 from ..core.device import CPU, moved
 from ..core.errors import BudgetError
 from ..core.seeds import generator
-from .api import DisplaySpec
-from .calibrated import Session, Source, check_phase, white_irradiance
+from .api import Camera, Display, DisplaySpec, check_phase, white_irradiance
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
@@ -54,7 +53,7 @@ class TrainingBench:
 
     def __init__(
         self,
-        workbench: Source,
+        display: Display,
         label: str,
         images: Sequence[TrainingImage],
         held_out: Sequence[TrainingImage],
@@ -64,7 +63,7 @@ class TrainingBench:
     ) -> None:
         self.images = tuple(images)
         self.held_out = tuple(held_out)
-        self._workbench = workbench
+        self._display = display
         self._label = label
         self._memory = memory
         self._budget = budget
@@ -76,7 +75,7 @@ class TrainingBench:
     @property
     def spec(self) -> DisplaySpec:
         """Nominal optics, public."""
-        return self._workbench.spec
+        return self._display.spec
 
     @property
     def device(self) -> torch.device:
@@ -111,19 +110,19 @@ class TrainingBench:
             raise BudgetError(f"{self._label} has used its {self._budget} captures for training")
         check_phase(phase, self.spec, self._label)
         self._captures += 1
-        return self._workbench.rectified(self._camera(image, *names).capture(phase.detach()), image.target)
+        return self._display.rectified(self._camera(image, *names).capture(phase.detach()), image.target)
 
-    def announce(self, shown: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
+    def announce(self, photographs: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
         """Tell the display the arguments of the next calls of ``photograph``, whatever those captures show.
 
         A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
         """
         left = None if self._budget is None else max(0, self._budget - self._captures)
-        for phase, image, names in itertools.islice(shown, left):
+        for phase, image, names in itertools.islice(photographs, left):
             self._camera(image, *names).announce([phase.detach()])
 
-    def _camera(self, image: TrainingImage, *names: object) -> Session:
-        return self._workbench.session((self._seed, "training", image.item, *names), image.target)
+    def _camera(self, image: TrainingImage, *names: object) -> Camera:
+        return self._display.session((self._seed, "training", image.item, *names), image.target)
 
     def kept(self, name: str, make: Callable[[], Value]) -> Value:
         """The value kept under ``name``; made and kept if there is none. What it took is counted once."""

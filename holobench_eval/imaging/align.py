@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import CellError
 from .features import by_features, by_templates
-from .similarity import PARTS, SIDE, Likeness, likeness, reduced, structured, view
+from .similarity import PARTS, SIDE, Similarity, reduced, similarity, structured, view
 from .warp import Array, Frame, Warp
 
 ALIKE = 0.6  # least correlation of target and capture; pairs of other pictures stay below 0.45
@@ -30,10 +30,10 @@ FEWEST_PARTS = 4  # with structure, of nine
 NEARLY = 0.1  # in correlation: what the fine levels may add
 COARSE = (64, 128, 256)  # pixels of the target's longer side at which it is refined
 FINE = (512, 1024)
-BLUR = 5  # pixels, odd: the filter before each step
-ITERATIONS = 60
-STEP = 1e-6
-FURTHEST = 0.15  # of the target's longer side in the capture: how far a corner moves in the refinement
+ECC_BLUR = 5  # pixels, odd: the filter before each step
+ECC_ITERATIONS = 60
+ECC_STEP = 1e-6
+FURTHEST_REFINED = 0.15  # of the target's longer side in the capture: how far a corner moves in the refinement
 STEEPEST = 2.5  # between the scales at two corners
 OVERHANG = 2.0  # target pixels that may lie beyond the capture's border
 SCALES = (0.2, 8.0)  # capture pixels a target pixel
@@ -41,7 +41,15 @@ SCALES = (0.2, 8.0)  # capture pixels a target pixel
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Where a target lies in a capture, and their correlation there, in structures far coarser than speckle."""
+    """Where a target lies in a capture.
+
+    Parameters
+    ----------
+    warp
+        From pixels of the target to pixels of the capture.
+    correlation
+        Of the two there, in structures far coarser than speckle.
+    """
 
     warp: Warp
     correlation: float
@@ -55,34 +63,55 @@ class Alignment:
     def from_dict(cls, plain: Mapping[str, Any]) -> Alignment:
         """The alignment that `to_dict` described."""
         height, width = plain["shape"]
-        return cls(_plane((height, width), np.array(plain["homography"])), float(plain["correlation"]))
+        return cls(_planar((height, width), np.array(plain["homography"])), float(plain["correlation"]))
 
 
 def align(capture: NDArray[np.floating], target: NDArray[np.floating]) -> Alignment:
-    """Find a target ``(C, h, w)`` in its capture ``(C', Hs, Ws)``, from the two alone.
+    """Find a target in its capture, from the two alone.
 
-    Values in [0, 1], as displays are given them (or square roots of light). The target may be mirrored, turned by
-    quarters and by some degrees more, seen in perspective, scaled by 0.3 to 5, and fill a part of the capture; all of
-    it must be there. Raises `CellError` where the target has too little structure, and where it is not found.
+    Enhanced correlation coefficient from coarse to fine (Evangelidis & Psarakis, IEEE Trans. Pattern Anal. Mach.
+    Intell. 30, 1858, 2008), from where features or templates propose. The target may be mirrored, turned by quarters
+    and by some degrees more, seen in perspective, scaled by 0.3 to 5, and fill a part of the capture; all of it must be
+    there.
+
+    Parameters
+    ----------
+    capture
+        ``(C', Hs, Ws)`` in [0, 1], values as displays are given them, or square roots of light.
+    target
+        ``(C, h, w)``, as the capture.
+
+    Raises
+    ------
+    CellError
+        The target has too little structure, or it is not found.
+
+    Examples
+    --------
+    >>> from skimage.data import camera
+    >>> target = camera()[None, ::2, ::2] / 255
+    >>> alignment = align(np.pad(target, ((0, 0), (30, 20), (40, 60))), target)
+    >>> [round(float(edge)) for edge in alignment.warp.corners()[0]]
+    [40, 30]
     """
     frame, reference = gray(capture), gray(target)
     _refuse_plain(reference)
     best = -1.0
     for start in _proposals(frame, reference):
-        if not _sane(start, frame.shape, slack=10.0) or likeness(frame, reference, start).whole < HOPEFUL:
+        if not _sane(start, frame.shape, slack=10.0) or similarity(frame, reference, start).overall < HOPEFUL:
             continue
         near = refined(frame, reference, start, COARSE)
-        alike = likeness(frame, reference, near)
-        best = max(best, alike.whole)
-        if alike.whole < ALIKE - NEARLY:
+        alike = similarity(frame, reference, near)
+        best = max(best, alike.overall)
+        if alike.overall < ALIKE - NEARLY:
             continue
-        found = refined(frame, reference, near, FINE)
-        if accepted(likeness(frame, reference, found)) and _sane(found, frame.shape):
-            found = _settled(frame, reference, found)
-            alike = likeness(frame, reference, found)
-            if accepted(alike) and _sane(found, frame.shape):
-                _refuse_overhang(found, frame.shape)
-                return Alignment(found, alike.whole)
+        warp = refined(frame, reference, near, FINE)
+        if accepted(similarity(frame, reference, warp)) and _sane(warp, frame.shape):
+            warp = _settled(frame, reference, warp)
+            alike = similarity(frame, reference, warp)
+            if accepted(alike) and _sane(warp, frame.shape):
+                _refuse_overhang(warp, frame.shape)
+                return Alignment(warp, alike.overall)
     seen = f"the best correlation is {best:.2f}" if best > 0 else "nothing is alike"
     raise CellError(
         f"the target is not found in the capture ({seen}; {ALIKE} and no displaced parts are needed): it shows another "
@@ -95,12 +124,12 @@ def _settled(frame: Frame, reference: Frame, warp: Warp) -> Warp:
 
     Raises `CellError` where one fits as well, unless the target itself looks the same.
     """
-    here, rivals = likeness(frame, reference, warp).whole, []
+    here, rivals = similarity(frame, reference, warp).overall, []
     for symmetry in _symmetries(warp.shape):
-        if likeness(reference, reference, symmetry).whole < SAME:
-            start = _plane(warp.shape, warp.homography @ symmetry.homography)
+        if similarity(reference, reference, symmetry).overall < SAME:
+            start = _planar(warp.shape, warp.homography @ symmetry.homography)
             turned = refined(frame, reference, start, COARSE[:-1])
-            rivals.append((likeness(frame, reference, turned).whole, turned))
+            rivals.append((similarity(frame, reference, turned).overall, turned))
     best, other = max(rivals, key=lambda rival: rival[0], default=(-1.0, warp))
     if abs(best - here) < CLEARLY:
         raise CellError("the target is found in the capture in two ways, one of them turned or mirrored, equally well")
@@ -116,15 +145,15 @@ def _symmetries(shape: tuple[int, int]) -> Iterator[Warp]:
         if swapped or (across, down) != (1.0, 1.0):
             turn = np.eye(3)
             turn[:2, :2] = linear
-            yield _plane(shape, centre @ turn @ np.linalg.inv(centre))
+            yield _planar(shape, centre @ turn @ np.linalg.inv(centre))
 
 
 def confirmed(capture: NDArray[np.floating], target: NDArray[np.floating], warp: Warp) -> Alignment | None:
     """The alignment by a given warp, where capture and target are as alike under it as `align` asks for; else None."""
     frame, reference = gray(capture), gray(target)
-    found = likeness(frame, reference, warp)
-    enough = len(structured(reference)) >= FEWEST_PARTS and accepted(found)
-    return Alignment(warp, found.whole) if enough and _sane(warp, frame.shape) else None
+    alike = similarity(frame, reference, warp)
+    enough = len(structured(reference)) >= FEWEST_PARTS and accepted(alike)
+    return Alignment(warp, alike.overall) if enough and _sane(warp, frame.shape) else None
 
 
 def gray(picture: NDArray[np.floating]) -> Frame:
@@ -132,10 +161,10 @@ def gray(picture: NDArray[np.floating]) -> Frame:
     return np.ascontiguousarray(picture.mean(axis=0), dtype=np.float32)
 
 
-def accepted(found: Likeness) -> bool:
-    """Whether two pictures are alike as a whole and in their parts, of which one in six may be odd."""
-    odd = sum(part < PART_ALIKE for part in found.parts) + found.displaced
-    return found.whole >= ALIKE and len(found.parts) >= FEWEST_PARTS and odd <= len(found.parts) // 6
+def accepted(alike: Similarity) -> bool:
+    """Whether two pictures are alike overall and in their parts, of which one in six may be odd."""
+    odd = sum(part < PART_ALIKE for part in alike.parts) + alike.displaced
+    return alike.overall >= ALIKE and len(alike.parts) >= FEWEST_PARTS and odd <= len(alike.parts) // 6
 
 
 def refined(frame: Frame, reference: Frame, start: Warp, levels: tuple[int, ...]) -> Warp:
@@ -148,7 +177,7 @@ def refined(frame: Frame, reference: Frame, start: Warp, levels: tuple[int, ...]
     for side in sorted({min(side, longest) for side in levels}):
         warp = _climbed(frame, reference, warp, side)
     moved = np.linalg.norm(warp.corners() - start.corners(), axis=1).max()
-    return warp if moved <= FURTHEST * max(reference.shape) * start.scale() else start
+    return warp if moved <= FURTHEST_REFINED * max(reference.shape) * start.scale() else start
 
 
 def _climbed(frame: Frame, reference: Frame, warp: Warp, side: int) -> Warp:
@@ -156,35 +185,35 @@ def _climbed(frame: Frame, reference: Frame, warp: Warp, side: int) -> Warp:
     if not seen.inside.any():
         return warp
     target, capture = seen.even()
-    stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, ITERATIONS, STEP)
+    stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, ECC_ITERATIONS, ECC_STEP)
     inside = seen.inside.astype(np.uint8) * 255
     start = np.eye(3, dtype=np.float32)
     try:
-        _, step = cv2.findTransformECC(target, capture, start, cv2.MOTION_HOMOGRAPHY, stop, inside, BLUR)
+        _, step = cv2.findTransformECC(target, capture, start, cv2.MOTION_HOMOGRAPHY, stop, inside, ECC_BLUR)
     except cv2.error:  # it does not converge
         return warp
     homography = warp.homography @ seen.to_target @ np.asarray(step, np.float64) @ np.linalg.inv(seen.to_target)
-    after = _plane(warp.shape, homography)
-    before = _correlation(target, capture, seen.inside)
+    after = _planar(warp.shape, homography)
+    before = _blurred_correlation(target, capture, seen.inside)
     again = view(frame, reference, after, side)
-    return after if _correlation(*again.even(), again.inside & seen.inside) > before else warp
+    return after if _blurred_correlation(*again.even(), again.inside & seen.inside) > before else warp
 
 
-def _correlation(target: Frame, capture: Frame, inside: NDArray[np.bool_]) -> float:
+def _blurred_correlation(target: Frame, capture: Frame, inside: NDArray[np.bool_]) -> float:
     if inside.sum() < 0.5 * inside.size:
         return -1.0
-    a, b = (np.asarray(cv2.GaussianBlur(side, (BLUR, BLUR), 0))[inside] for side in (target, capture))
+    a, b = (np.asarray(cv2.GaussianBlur(side, (ECC_BLUR, ECC_BLUR), 0))[inside] for side in (target, capture))
     return float(np.corrcoef(a, b)[0, 1]) if min(a.std(), b.std()) > 0 else -1.0
 
 
 def _proposals(frame: Frame, reference: Frame) -> Iterator[Warp]:
     """Where the target may lie, likely places first."""
     shape = (reference.shape[0], reference.shape[1])
-    yield from (_plane(shape, homography) for homography in by_features(frame, reference))
-    yield from (_plane(shape, homography) for homography in by_templates(frame, reference))
+    yield from (_planar(shape, homography) for homography in by_features(frame, reference))
+    yield from (_planar(shape, homography) for homography in by_templates(frame, reference))
 
 
-def _plane(shape: tuple[int, int], homography: Array) -> Warp:
+def _planar(shape: tuple[int, int], homography: Array) -> Warp:
     return Warp(shape, homography / homography[2, 2], np.zeros((6, 2)))
 
 
@@ -207,8 +236,8 @@ def _refuse_plain(reference: Frame) -> None:
     parts = structured(reference)
     rows, columns = ({part[axis].start for part in parts} for axis in (0, 1))
     if len(parts) < FEWEST_PARTS or min(len(rows), len(columns)) < 2:
-        every = PARTS * PARTS
-        raise CellError(f"the target has structure in {len(parts)} of its {every} parts only, too little to find it by")
+        share = f"{len(parts)} of its {PARTS * PARTS} parts"
+        raise CellError(f"the target has structure in {share} only, too little to find it by")
     slope_y, slope_x = np.gradient(reduced(reference, SIDE)[0].astype(np.float64))
     spread = np.linalg.eigvalsh(np.cov(slope_x.ravel(), slope_y.ravel()))
     if spread[0] < STRIPES * spread[1]:

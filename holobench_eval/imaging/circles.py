@@ -1,4 +1,4 @@
-"""Find the circles of a fiducial grid in a speckled capture, and tell which circle is which."""
+"""Find the circles of a fiducial grid in a speckled capture, and which circle is which."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .grid import FiducialGrid
 from .warp import Array, Frame
 
-BLUR = 0.35  # of a circle's radius: about 2 region pixels for the smallest circles, beyond the speckle grain
+CIRCLE_BLUR = 0.35  # of a circle's radius: about 2 region pixels for the smallest circles, beyond the speckle grain
 FILLED = (0.75, 0.5, 0.33, 1.0, 0.22)  # the part of the frame's side that the region may fill, likely ones first
 DETECTION_RADIUS = 6.0  # pixels; larger circles are detected on a smaller picture
 CLUTTER = 1.5  # blobs for each circle; the search among more is slow and hopeless
@@ -44,13 +44,13 @@ def _find_at(frame: Frame, grid: FiducialGrid, scale: float) -> Iterator[Array]:
         if not 1 <= len(detector.detect(picture)) / len(grid.centres) <= CLUTTER:
             continue
         for method in (0, cv2.CALIB_CB_CLUSTERING):
-            found, points = cv2.findCirclesGrid(
+            complete, points = cv2.findCirclesGrid(
                 picture,
                 (grid.columns, grid.rows),
                 flags=cv2.CALIB_CB_SYMMETRIC_GRID | method,
                 blobDetector=detector,
             )
-            if found:
+            if complete:
                 yield (np.asarray(points, dtype=np.float64).reshape(-1, 2) + 0.5) * shrink - 0.5
                 break
 
@@ -71,9 +71,9 @@ def _pictures(frame: Frame, grid: FiducialGrid, scale: float) -> Iterator[NDArra
     """8-bit versions of a frame, blurred beyond the speckle grain: linear, square root, divided by the local mean."""
     window = int(1.6 * grid.spacing * scale) | 1
     amplitude = np.sqrt(np.clip(frame, 0, None))
-    smooth = cv2.GaussianBlur(amplitude, (0, 0), BLUR * grid.radius * scale)
+    smooth = cv2.GaussianBlur(amplitude, (0, 0), CIRCLE_BLUR * grid.radius * scale)
     mean = cv2.blur(smooth, (window, window))
-    linear = cv2.GaussianBlur(frame, (0, 0), BLUR * grid.radius * scale)
+    linear = cv2.GaussianBlur(frame, (0, 0), CIRCLE_BLUR * grid.radius * scale)
     for picture in (smooth, linear, smooth / (mean + 0.15 * mean.max() + 1e-12)):
         dark, bright = np.percentile(picture, (2, 99.5))
         yield (np.clip((picture - dark) / max(bright - dark, 1e-12), 0, 1) * 255).astype(np.uint8)

@@ -17,13 +17,13 @@ from skimage.registration import phase_cross_correlation
 
 from .warp import Array, Frame, Warp, quadratic_terms
 
-BLUR = 0.7  # region pixels: gathers some of the speckle grains
+GRAIN_BLUR = 0.7  # region pixels: gathers some of the speckle grains
 WIDE = 12.0  # region pixels: what is smoother is illumination
-PARTS = (1, 2, 4, 4, 6)  # of the region's sides in a block's, from a shift of the whole to a homography of many
-SMALLEST = 24  # pixels a side of a block
+DIVISIONS = (1, 2, 4, 4, 6)  # of the region's sides in a block's, from a shift of the whole to a homography of many
+SMALLEST_BLOCK = 24  # pixels a side of a block
 FINENESS = 20  # steps of a displacement in a pixel
-FURTHEST = 0.25  # of a block's side: what moves further was not found
-LIKENESS = 0.35  # correlation of picture and reference at the end, below which there is no opinion
+FURTHEST_BLOCK = 0.25  # of a block's side: what moves further was not found
+LEAST_CORRELATION = 0.35  # correlation of picture and reference at the end, below which there is no opinion
 MARGIN = 0.1  # of the region's larger side is sampled around it: the furthest error of the first that is exposed
 REWEIGHTINGS = 6
 TYPICAL = 0.15  # region pixels: displacements further from the common homography than this count less and less
@@ -50,23 +50,23 @@ def second_warp(frame: Frame, reference: Frame, first: Warp) -> Warp | None:
     if reference.shape != first.shape:
         raise ValueError(f"reference {reference.shape} and region {first.shape} must have one shape")
     wanted = _relief(reference)
-    warp = Warp(first.shape, _plane(first), np.zeros((6, 2)))
-    for parts in PARTS:
-        moved = _moved(frame, wanted, warp, parts)
+    warp = Warp(first.shape, _nearest_homography(first), np.zeros((6, 2)))
+    for parts in DIVISIONS:
+        moved = _displaced_blocks(frame, wanted, warp, parts)
         if moved is None:
             return None
-        correction = _homography(moved, warp.shape, terms=2 if parts == 1 else 6 if parts == 2 else 8)
+        correction = _correction(moved, warp.shape, terms=2 if parts == 1 else 6 if parts == 2 else 8)
         warp = replace(warp, homography=warp.homography @ correction)
     if first.quadratic.any():
         for _ in range(2):
-            moved = _moved(frame, wanted, warp, PARTS[-1])
+            moved = _displaced_blocks(frame, wanted, warp, DIVISIONS[-1])
             if moved is None:
                 return None
             warp = replace(warp, quadratic=warp.quadratic + _quadratic(moved, warp.shape))
-    border = _border(warp.shape)
-    seen = _relief(_sampled(frame, warp, border))[border:-border, border:-border]
-    likeness = np.corrcoef(seen.ravel(), wanted.ravel())[0, 1]
-    return warp if likeness >= LIKENESS else None
+    border = _margin(warp.shape)
+    seen = _relief(_with_margin(frame, warp, border))[border:-border, border:-border]
+    correlation = np.corrcoef(seen.ravel(), wanted.ravel())[0, 1]
+    return warp if correlation >= LEAST_CORRELATION else None
 
 
 def disagreement(first: Warp, second: Warp) -> float:
@@ -75,18 +75,18 @@ def disagreement(first: Warp, second: Warp) -> float:
     return float(apart.max() / first.scale())
 
 
-def _plane(warp: Warp) -> Array:
+def _nearest_homography(warp: Warp) -> Array:
     """The homography nearest to a warp, its distortion left out."""
     height, width = warp.shape
     points = np.stack(np.meshgrid(np.linspace(0, width - 1, 7), np.linspace(0, height - 1, 7)), axis=-1).reshape(-1, 2)
     return np.asarray(cv2.findHomography(points, warp.to_sensor(points), 0)[0], dtype=np.float64)
 
 
-def _border(shape: tuple[int, int]) -> int:
+def _margin(shape: tuple[int, int]) -> int:
     return round(MARGIN * max(shape))
 
 
-def _sampled(frame: Frame, warp: Warp, border: int) -> Frame:
+def _with_margin(frame: Frame, warp: Warp, border: int) -> Frame:
     """The region and ``border`` pixels around it as ``warp`` sees them; the edge of the frame repeats outside it."""
     height, width = warp.shape
     x, y = np.meshgrid(np.arange(-border, width + border), np.arange(-border, height + border))
@@ -100,30 +100,30 @@ def _sampled(frame: Frame, warp: Warp, border: int) -> Frame:
 
 def _relief(light: Frame) -> Frame:
     """Square root of blurred light, without what is smoother than `WIDE`."""
-    light = np.asarray(cv2.GaussianBlur(np.maximum(light, 0).astype(np.float32), (0, 0), BLUR))
+    light = np.asarray(cv2.GaussianBlur(np.maximum(light, 0).astype(np.float32), (0, 0), GRAIN_BLUR))
     amplitude = np.sqrt(light)
     return np.asarray(amplitude - cv2.GaussianBlur(amplitude, (0, 0), WIDE))
 
 
-def _moved(frame: Frame, wanted: Frame, warp: Warp, parts: int) -> Blocks | None:
+def _displaced_blocks(frame: Frame, wanted: Frame, warp: Warp, parts: int) -> Blocks | None:
     """How far blocks of a ``parts``-th of the region's sides lie from where ``warp`` has them; None: too few found."""
-    border = _border(warp.shape)
-    seen = _relief(_sampled(frame, warp, border))
+    border = _margin(warp.shape)
+    seen = _relief(_with_margin(frame, warp, border))
     if not seen.std() > 0:
         return None
     if parts == 1:
-        return _whole(seen, np.pad(wanted, border), warp.shape)
+        return _single_block(seen, np.pad(wanted, border), warp.shape)
     seen = seen[border:-border, border:-border]
     rows, columns = (_spans(side, parts) for side in warp.shape)
-    found = [_block(seen, wanted, row, column) for row in rows for column in columns]
-    kept = [each for each in found if each is not None]
-    if len(kept) < max(4, len(found) // 4):
+    blocks = [_block(seen, wanted, row, column) for row in rows for column in columns]
+    kept = [block for block in blocks if block is not None]
+    if len(kept) < max(4, len(blocks) // 4):
         return None
     centres, displacements, weights = (np.array(part) for part in zip(*kept, strict=True))
     return Blocks(centres, displacements, weights)
 
 
-def _whole(seen: Frame, wanted: Frame, shape: tuple[int, int]) -> Blocks:
+def _single_block(seen: Frame, wanted: Frame, shape: tuple[int, int]) -> Blocks:
     shift = _shift(seen, wanted, 1)
     centre = np.array([[shape[1] - 1.0, shape[0] - 1.0]]) / 2
     return Blocks(centre, shift[None], np.eye(2)[None])
@@ -137,8 +137,8 @@ def _shift(seen: NDArray[np.floating], wanted: NDArray[np.floating], fineness: i
 
 
 def _spans(side: int, parts: int) -> list[tuple[int, int]]:
-    """Half-overlapping spans, each at least `SMALLEST` long."""
-    length = max(SMALLEST, side // parts)
+    """Half-overlapping spans, each at least `SMALLEST_BLOCK` long."""
+    length = max(SMALLEST_BLOCK, side // parts)
     count = max(2, 2 * side // length - 1)
     return [(int(start), int(start) + length) for start in np.linspace(0, side - length, count)]
 
@@ -153,14 +153,14 @@ def _block(
     if min(a.std(), b.std()) < 1e-6 * max(wanted.std(), 1e-12):
         return None
     displacement = _shift(a, b, FINENESS)
-    if np.any(np.abs(displacement) > FURTHEST * np.array([column[1] - column[0], row[1] - row[0]])):
+    if np.any(np.abs(displacement) > FURTHEST_BLOCK * np.array([column[1] - column[0], row[1] - row[0]])):
         return None
     matrix = np.array([[1.0, 0.0, displacement[0]], [0.0, 1.0, displacement[1]]])
     back = cv2.warpAffine(a, matrix, a.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-    likeness = float(np.clip(np.corrcoef(np.asarray(back).ravel(), b.ravel())[0, 1], 0.05, 0.99))
+    correlation = float(np.clip(np.corrcoef(np.asarray(back).ravel(), b.ravel())[0, 1], 0.05, 0.99))
     slope_y, slope_x = np.gradient(b)
     slopes = np.stack([slope_x.ravel(), slope_y.ravel()])
-    weight = slopes @ slopes.T / float(np.sum(b**2)) * likeness**2 / (1 - likeness**2)
+    weight = slopes @ slopes.T / float(np.sum(b**2)) * correlation**2 / (1 - correlation**2)
     centre = np.array([column[0] + column[1] - 1.0, row[0] + row[1] - 1.0]) / 2
     return centre, displacement, weight
 
@@ -180,13 +180,13 @@ def _solved(model: Array, blocks: Blocks) -> Array:
     return np.asarray(parameters)
 
 
-def _homography(blocks: Blocks, shape: tuple[int, int], terms: int) -> Array:
+def _correction(blocks: Blocks, shape: tuple[int, int], terms: int) -> Array:
     """The correction ``(3, 3)`` in region pixels; 2 terms: a shift, 6: affine, 8: a homography, to first order."""
     half = np.array([shape[1] - 1.0, shape[0] - 1.0]) / 2
     x, y = ((blocks.centres - half) / half.max()).T
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    right = [one, zero, x, y, zero, zero, x * x, x * y]
-    down = [zero, one, zero, zero, x, y, x * y, y * y]
+    zeros, ones = np.zeros_like(x), np.ones_like(x)
+    right = [ones, zeros, x, y, zeros, zeros, x * x, x * y]
+    down = [zeros, ones, zeros, zeros, x, y, x * y, y * y]
     model = np.stack([np.stack(right[:terms], axis=1), np.stack(down[:terms], axis=1)], axis=1)
     p = np.zeros(8)
     p[:terms] = _solved(model, blocks) / half.max()

@@ -19,7 +19,7 @@ BLURS = (1.0, 2.5, 6.0)  # pixels of the reduced capture: beyond the grain of fi
 FEATURES = 3000
 FAINT = 0.02  # contrast of a feature
 RATIO = 0.85  # of the distances to the best and the second best match (Lowe 2004)
-OUTLIER = 4.0  # pixels of the reduced capture
+MATCH_OUTLIER = 4.0  # pixels of the reduced capture
 FEWEST = 12  # matches on one homography
 
 TEMPLATE_SIDE = 48  # pixels
@@ -41,8 +41,8 @@ def by_features(frame: Frame, reference: Frame) -> Iterator[Array]:
     mirror = np.array([[-1.0, 0, small.shape[1] - 1], [0, 1, 0], [0, 0, 1]])
     sides = [(np.eye(3), _features(small)), (mirror, _features(np.ascontiguousarray(small[:, ::-1])))]
     for blur in BLURS:
-        found = _features(np.asarray(cv2.GaussianBlur(shrunk, (0, 0), blur)))
-        fits = [(*_matched(side, found), unmirrored) for unmirrored, side in sides]
+        features = _features(np.asarray(cv2.GaussianBlur(shrunk, (0, 0), blur)))
+        fits = [(*_matched(side, features), unmirrored) for unmirrored, side in sides]
         count, homography, unmirrored = max(fits, key=lambda fit: fit[0])
         if count >= FEWEST and homography is not None:
             yield to_frame @ homography @ unmirrored @ np.linalg.inv(to_reference)
@@ -70,13 +70,13 @@ def _matched(source: Features, target: Features) -> tuple[int, Array | None]:
         return 0, None
     first, second = np.array(near).T
     homography, inliers = cv2.findHomography(
-        source[0][first], target[0][second], cv2.USAC_MAGSAC, OUTLIER, maxIters=5000, confidence=0.999
+        source[0][first], target[0][second], cv2.USAC_MAGSAC, MATCH_OUTLIER, maxIters=5000, confidence=0.999
     )
     if homography is None:
         return 0, None
     # Counted in places of the source: a repeated pattern may match one place a hundred times.
-    places = {tuple(place) for place in np.round(source[0][first][inliers.ravel() > 0] / OUTLIER)}
-    targets = {tuple(place) for place in np.round(target[0][second][inliers.ravel() > 0] / OUTLIER)}
+    places = {tuple(point) for point in np.round(source[0][first][inliers.ravel() > 0] / MATCH_OUTLIER)}
+    targets = {tuple(point) for point in np.round(target[0][second][inliers.ravel() > 0] / MATCH_OUTLIER)}
     return min(len(places), len(targets)), np.asarray(homography, dtype=np.float64)
 
 
@@ -88,7 +88,7 @@ def by_templates(frame: Frame, reference: Frame) -> list[Array]:
     """
     small, to_reference = reduced(reference, TEMPLATE_SIDE)
     template = evened(small, np.ones(small.shape, dtype=bool))
-    found: list[tuple[float, Array]] = []
+    matches: list[tuple[float, Array]] = []
     for filled, turns in itertools.product(FILLED, (0, 1)):
         height, width = small.shape if turns == 0 else small.shape[::-1]
         wanted = max(height / frame.shape[0], width / frame.shape[1]) / filled  # template pixels a capture pixel
@@ -105,8 +105,8 @@ def by_templates(frame: Frame, reference: Frame) -> list[Array]:
             alike = np.asarray(cv2.matchTemplate(scene, turned, cv2.TM_CCORR_NORMED))
             row, column = np.unravel_index(int(alike.argmax()), alike.shape)
             shift = np.array([[1.0, 0, column - border], [0, 1, row - border], [0, 0, 1]])
-            found.append((float(alike[row, column]), to_frame @ shift @ to_turned @ np.linalg.inv(to_reference)))
-    return [homography for _, homography in sorted(found, key=lambda one: -one[0])[:KEPT]]
+            matches.append((float(alike[row, column]), to_frame @ shift @ to_turned @ np.linalg.inv(to_reference)))
+    return [homography for _, homography in sorted(matches, key=lambda match: -match[0])[:KEPT]]
 
 
 def _turned(template: Frame, angle: float, mirrored: bool) -> tuple[Frame, NDArray[np.float64]]:

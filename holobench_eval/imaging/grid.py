@@ -43,11 +43,27 @@ class FiducialGrid:
 
 
 def fiducial(shape: tuple[int, int]) -> FiducialGrid:
-    """The grid for a region of ``shape`` (height, width) pixels.
+    """The grid of circles for a region.
 
     Many small circles locate better than a few large ones, but a circle has to be several speckle grains wide, and
     the search for the lattice slows down with the cube of their number: 64 circles at 160x160 pixels, about 300 at
-    1080x1920. Raises `UserError` for a region too small for the marks.
+    1080x1920.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns of the region.
+
+    Raises
+    ------
+    UserError
+        A region too small for the marks.
+
+    Examples
+    --------
+    >>> grid = fiducial((160, 160))
+    >>> grid.columns, grid.rows, grid.centres.shape
+    (8, 8, (64, 2))
     """
     height, width = shape
     if min(shape) < SMALLEST_REGION:
@@ -62,7 +78,7 @@ def fiducial(shape: tuple[int, int]) -> FiducialGrid:
     marks = _letter_f(columns, rows).ravel()
     radii = np.where(marks, MARK_RADIUS, RADIUS) * spacing
     return FiducialGrid(
-        image=_draw(shape, centres, radii),
+        image=_discs(shape, centres, radii),
         centres=centres,
         marks=marks,
         columns=columns,
@@ -82,7 +98,7 @@ def _letter_f(columns: int, rows: int) -> NDArray[np.bool_]:
     return marks
 
 
-def _draw(shape: tuple[int, int], centres: NDArray[np.float64], radii: NDArray[np.float64]) -> Tensor:
+def _discs(shape: tuple[int, int], centres: NDArray[np.float64], radii: NDArray[np.float64]) -> Tensor:
     """Discs of light with an edge two pixels wide: soft enough for the band of a display with an iris."""
     image = np.zeros(shape)
     y, x = np.mgrid[: shape[0], : shape[1]]

@@ -13,16 +13,18 @@ from .grid import FiducialGrid
 from .subpixel import correlation, even_picture
 from .warp import Array, Frame, Warp
 
-LIKENESS = 0.85  # correlation with the template; genuine ones have 0.92 and more, two grids in one picture below 0.8
-GOES_ON = 0.3  # of a circle's light; genuine grids have less than 0.1 around them, larger grids 0.9, a second grid 0.5
+GRID_CORRELATION = 0.85  # with the template: the grid itself has 0.92 and more, two grids in one picture below 0.8
+GOES_ON = 0.3  # of a circle's light around the grid: its own is below 0.1, a larger grid's 0.9, a second grid's 0.5
 FEW = 90  # percent of the places around the grid; bright dirt may lie on the others
 
 
-def impostor(frame: Frame, warp: Warp, grid: FiducialGrid) -> str | None:
+def mismatch(frame: Frame, warp: Warp, grid: FiducialGrid) -> str | None:
     """Why ``frame`` ``(Hs, Ws)``, seen through ``warp``, shows something else than ``grid``: one line, or None."""
-    likeness = correlation(even_picture(frame, warp, grid), grid)
-    if not likeness >= LIKENESS:
-        return f"what was found is not this grid alone: its correlation with it is {likeness:.2f}, not {LIKENESS}"
+    agreement = correlation(even_picture(frame, warp, grid), grid)
+    if not agreement >= GRID_CORRELATION:
+        return (
+            f"what was found is not this grid alone: its correlation with it is {agreement:.2f}, not {GRID_CORRELATION}"
+        )
     if _beyond(frame, warp, grid) > GOES_ON:
         return f"the circles go on beyond {grid.columns}x{grid.rows}: this is the grid of another region"
     return None

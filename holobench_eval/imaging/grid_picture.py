@@ -20,7 +20,7 @@ MARK: Colour = (230, 159, 0)
 BORDER: Colour = (240, 228, 66)
 BRIGHTEST = 99.5  # percentile of the light that is brightest
 GREY = 180  # its level: white would swallow the colours
-SMALLEST = 720  # pixels of the picture's shorter side
+SMALLEST_PICTURE = 720  # pixels of the picture's shorter side
 FRACTION = 4  # bits of a drawn point's position below the pixel
 
 
@@ -32,7 +32,7 @@ def grid_picture(frame: Frame, grid: FiducialGrid, registration: Registration, c
     corners their names and the residual [region px, RMS] of the quarter of the circles next to them.
     """
     warp = registration.warps[channel]
-    larger = max(1, -(-SMALLEST // min(frame.shape)))
+    larger = max(1, -(-SMALLEST_PICTURE // min(frame.shape)))
     amplitude = np.sqrt(np.maximum(frame, 0))
     white = max(float(np.percentile(amplitude, BRIGHTEST)), 1e-12)
     grey = np.round(np.clip(amplitude / white, 0, 1) * GREY).astype(np.uint8)
@@ -42,13 +42,13 @@ def grid_picture(frame: Frame, grid: FiducialGrid, registration: Registration, c
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
     for centre, mark in zip(grid.centres, grid.marks, strict=True):
         outline = warp.to_sensor(centre + circle * (grid.mark_radius if mark else grid.radius))
-        _draw(picture, outline, larger, MARK if mark else CIRCLE)
-    _draw(picture, warp.to_sensor(_border(grid.shape)), larger, BORDER)
+        _polygon(picture, outline, larger, MARK if mark else CIRCLE)
+    _polygon(picture, warp.to_sensor(_outline(grid.shape)), larger, BORDER)
     _label(picture, frame, warp, grid, larger)
     return picture
 
 
-def _border(shape: tuple[int, int]) -> Array:
+def _outline(shape: tuple[int, int]) -> Array:
     """Points ``(N, 2)`` along the outer edges of the region's pixels, in order."""
     low, steps = -0.5, np.linspace(0, 1, 32, endpoint=False)
     size = np.array([shape[1], shape[0]], dtype=np.float64)
@@ -61,7 +61,7 @@ def _on_picture(points: Array, larger: int) -> Array:
     return np.asarray((points + 0.5) * larger - 0.5)
 
 
-def _draw(picture: NDArray[np.uint8], points: Array, larger: int, colour: Colour) -> None:
+def _polygon(picture: NDArray[np.uint8], points: Array, larger: int, colour: Colour) -> None:
     fixed = np.round(_on_picture(points, larger) * 2**FRACTION).astype(np.int32)
     cv2.polylines(picture, [fixed], isClosed=True, color=colour, thickness=2, lineType=cv2.LINE_AA, shift=FRACTION)
 

@@ -15,7 +15,7 @@ from .warp import Array, Frame
 
 FURTHEST_SHIFT = 2.0  # region pixels
 FURTHEST_TURN = 0.1  # degrees
-BLUR = 1.0  # region pixels: averages over speckle grains; wide enough a basin for the furthest shift
+REFINE_BLUR = 1.0  # region pixels: averages over speckle grains; wide enough a basin for the furthest shift
 BORDER = 4  # region pixels that take no part: the furthest shift and the reach of the interpolation
 ITERATIONS = 50
 STEP = 1e-3  # region pixels, at the corners: a smaller step ends the search
@@ -23,10 +23,16 @@ STEP = 1e-3  # region pixels, at the corners: a smaller step ends the search
 
 @dataclass(frozen=True)
 class Refined:
-    """A capture ``(C, h, w)`` moved onto its target, and the move.
+    """A capture moved onto its target, and the move; all zero when no move within the bounds was found.
 
-    dx, dy: where the centre of the target was found in the capture, right and down [px]; theta: rotation about the
-    centre from x towards y [degrees]. All zero, and the capture unchanged, when no move within the bounds was found.
+    Parameters
+    ----------
+    image
+        ``(C, h, w)``, moved; unchanged without a move.
+    dx, dy
+        Where the centre of the target was found in the capture, right and down [px].
+    theta
+        Rotation about the centre from x towards y [degrees].
     """
 
     image: Tensor
@@ -36,12 +42,30 @@ class Refined:
 
 
 def refine(capture: Tensor, target: Tensor) -> Refined:
-    """Align a rectified capture ``(C, h, w)`` with its target ``(C, h, w)``, both in linear light.
+    """Align a rectified capture with its target by a bounded rigid move (protocol v1, point 3).
 
     One shift and rotation for all channels, at most 2 px and 0.1 degree, that maximises the correlation of the square
-    root of the light summed over the channels (the enhanced correlation coefficient of Evangelidis & Psarakis 2008
-    for a rigid move). No score takes part. Without convergence, outside the bounds or without a gain in
-    correlation, the capture comes back as it is. Raises `ValueError` for shapes that differ or are too small.
+    root of the light summed over the channels (the enhanced correlation coefficient of Evangelidis & Psarakis, IEEE
+    Trans. Pattern Anal. Mach. Intell. 30, 1858, 2008, for a rigid move). No score takes part. Without convergence,
+    outside the bounds or without a gain in correlation, the capture comes back as it is.
+
+    Parameters
+    ----------
+    capture, target
+        ``(C, h, w)`` linear light.
+
+    Raises
+    ------
+    ValueError
+        Shapes that differ or are too small.
+
+    Examples
+    --------
+    >>> smooth = torch.rand(1, 1, 8, 8, generator=torch.Generator().manual_seed(0))
+    >>> target = torch.nn.functional.interpolate(smooth, (64, 64), mode="bicubic")[0].clamp(0, 1)
+    >>> refined = refine(target.roll(1, dims=-1), target)
+    >>> abs(refined.dx - 1) < 0.05, abs(refined.dy) < 0.05
+    (True, True)
     """
     if capture.shape != target.shape or capture.ndim != 3 or min(capture.shape[1:]) <= 4 * BORDER:
         raise ValueError(f"capture {tuple(capture.shape)} and target {tuple(target.shape)} must both be (C, h, w)")
@@ -50,7 +74,7 @@ def refine(capture: Tensor, target: Tensor) -> Refined:
         return Refined(capture, 0.0, 0.0, 0.0)
     where = _coordinates((capture.shape[1], capture.shape[2]), move)
     frames = capture.detach().to("cpu", torch.float32).numpy()
-    image = torch.from_numpy(np.stack([_moved(frame, where) for frame in frames])).to(capture.device)
+    image = torch.from_numpy(np.stack([_resampled(frame, where) for frame in frames])).to(capture.device)
     return Refined(image, float(move[0]), float(move[1]), math.degrees(move[2]))
 
 
@@ -60,14 +84,14 @@ def _search(capture: Tensor, target: Tensor) -> Array | None:
     move = _climb(seen, wanted)
     if move is None or not _within(move, 1.0):
         return None
-    before, after = (_moved(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
-    return move if _correlation(after, wanted) > _correlation(before, wanted) else None
+    before, after = (_resampled(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
+    return move if _inner_correlation(after, wanted) > _inner_correlation(before, wanted) else None
 
 
 def _amplitude(image: Tensor) -> Frame:
     """Square root of the blurred light: blurred first, as the root of speckled edges would spread into the dark."""
     light = image.detach().to("cpu", torch.float32).sum(0).clamp_min(0.0).numpy()
-    return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), BLUR)))
+    return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), REFINE_BLUR)))
 
 
 def _climb(seen: Frame, wanted: Frame) -> Array | None:
@@ -84,7 +108,7 @@ def _climb(seen: Frame, wanted: Frame) -> Array | None:
         return None
     move: Array = np.zeros(3)
     for _ in range(ITERATIONS):
-        now = _inner(_moved(seen, _coordinates((height, width), move))).ravel()
+        now = _inner(_resampled(seen, _coordinates((height, width), move))).ravel()
         solved = np.linalg.solve(normal, model.T @ now.astype(np.float64))
         if solved[0] <= 0:
             return None
@@ -114,7 +138,7 @@ def _coordinates(shape: tuple[int, ...], move: Array) -> tuple[Frame, Frame]:
     return moved_x.astype(np.float32), moved_y.astype(np.float32)
 
 
-def _moved(frame: Frame, where: tuple[Frame, Frame]) -> Frame:
+def _resampled(frame: Frame, where: tuple[Frame, Frame]) -> Frame:
     """``frame`` at coordinates x, y by cubic interpolation; beyond its border the last pixel repeats."""
     return np.asarray(cv2.remap(frame, *where, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
 
@@ -123,5 +147,5 @@ def _inner(image: NDArray[np.floating]) -> NDArray[np.floating]:
     return image[BORDER:-BORDER, BORDER:-BORDER]
 
 
-def _correlation(a: Frame, b: Frame) -> float:
+def _inner_correlation(a: Frame, b: Frame) -> float:
     return float(np.corrcoef(_inner(a).ravel(), _inner(b).ravel())[0, 1])

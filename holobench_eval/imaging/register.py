@@ -22,13 +22,13 @@ from torch import Tensor
 from ..core.errors import CellError
 from .circles import find_circles
 from .grid import FiducialGrid
-from .grid_check import impostor
+from .grid_check import mismatch
 from .subpixel import correlation, even_picture, offsets
 from .warp import Array, Frame, Warp, quadratic_terms, remap
 
-ITERATIONS = 3
-OUTLIER = 1.5  # region pixels from the homography: not speckle but dust, or not a circle at all
-FURTHEST = 2.0  # region pixels that the sub-pixel fit may move a corner from where the detector put it
+FIT_ITERATIONS = 3
+CIRCLE_OUTLIER = 1.5  # region pixels from the homography: not speckle but dust, or not a circle at all
+FURTHEST_CORNER = 2.0  # region pixels that the sub-pixel fit may move a corner from where the detector put it
 SIGNIFICANCE = 0.999
 WORTHWHILE = 0.85  # of the residual: fringes of 10 % alone can look like a distortion that lowers it to 0.89
 
@@ -37,20 +37,40 @@ WORTHWHILE = 0.85  # of the residual: fringes of 10 % alone can look like a dist
 class Registration:
     """Region to sensor, one `Warp` a channel, and how well the grid's circles fit it.
 
-    residual: per channel, root mean square over the circles of the distance [region px] between where a circle is
-    measured and where the warp puts it. Speckle moves single circles, so that the warp, fitted to all, is several
-    times more exact than its residual.
+    Parameters
+    ----------
+    warps
+        One a channel.
+    residual
+        Per channel, root mean square over the circles of the distance between where a circle is measured and where the
+        warp puts it [region px]. Speckle moves single circles, so that the warp, fitted to all, is several times more
+        exact than its residual.
     """
 
     warps: tuple[Warp, ...]
     residual: tuple[float, ...]
 
     def rectify(self, linear: Tensor) -> Tensor:
-        """A capture ``(C, Hs, Ws)`` in linear light as region ``(C, h, w)``, same device, float32.
+        """A capture in the frame of the region.
 
         Cubic interpolation at the region's pixel centres, positions to 1/32 sensor pixel (`cv2.remap`), zero outside
         the sensor. There is no low-pass filter: like the panel model, the result samples the intensity, so a
-        sensor finer than the panel keeps its full speckle contrast. Raises `CellError` for another channel count.
+        sensor finer than the panel keeps its full speckle contrast.
+
+        Parameters
+        ----------
+        linear
+            ``(C, Hs, Ws)`` linear light.
+
+        Returns
+        -------
+        Tensor
+            ``(C, h, w)``, same device, float32.
+
+        Raises
+        ------
+        CellError
+            Another number of channels.
         """
         if linear.ndim != 3 or linear.shape[0] != len(self.warps):
             raise CellError(
@@ -85,10 +105,30 @@ class Registration:
 
 
 def register(image: Tensor, grid: FiducialGrid, bound: float = 0.3) -> Registration:
-    """Register a capture ``(C, Hs, Ws)`` of the grid's hologram, linear light, dark level subtracted.
+    """Register a camera from the capture of the grid's hologram (protocol v1, point 2).
 
-    Raises `CellError`, with the channel and the reason, when the grid is not found, lies partly outside the sensor,
-    is not the one that was shown, or fits worse than ``bound`` [region px, RMS].
+    Parameters
+    ----------
+    image
+        ``(C, Hs, Ws)`` linear light, dark level subtracted.
+    grid
+        The grid that was shown.
+    bound
+        Largest residual [region px, rms].
+
+    Raises
+    ------
+    CellError
+        The grid is not found, lies partly outside the sensor, is not the one that was shown, or fits worse than the
+        bound: with the channel and the reason.
+
+    Examples
+    --------
+    >>> from holobench_eval.imaging import fiducial
+    >>> grid = fiducial((160, 160))
+    >>> registration = register(torch.nn.functional.pad(grid.image, (20, 20, 20, 20))[None], grid)
+    >>> registration.rectify(torch.ones(1, 200, 200)).shape, max(registration.residual) < 0.05
+    (torch.Size([1, 160, 160]), True)
     """
     if image.ndim != 3 or not bool(torch.isfinite(image).all()):
         raise CellError(f"registration needs a finite capture (C, Hs, Ws), got shape {tuple(image.shape)}")
@@ -108,13 +148,13 @@ def _register_channel(frame: Frame, grid: FiducialGrid, channel: int) -> tuple[W
         raise CellError(
             f"registration of channel {channel}: no grid of {grid.columns}x{grid.rows} circles and its marks is seen"
         )
-    start = Warp(grid.shape, _homography(grid.centres, points, 3 * OUTLIER), np.zeros((6, 2)))
+    start = Warp(grid.shape, _homography(grid.centres, points, 3 * CIRCLE_OUTLIER), np.zeros((6, 2)))
     warp = _refined(frame, start, grid)
     corners = warp.corners()
     height, width = frame.shape
     if np.any(corners < -0.5) or np.any(corners > (width - 0.5, height - 0.5)):
         raise CellError(f"registration of channel {channel}: the region lies partly outside the sensor")
-    doubt = impostor(frame, warp, grid)
+    doubt = mismatch(frame, warp, grid)
     if doubt is not None:
         raise CellError(f"registration of channel {channel}: {doubt}")
     residual = offsets(even_picture(frame, warp, grid), grid)
@@ -124,21 +164,21 @@ def _register_channel(frame: Frame, grid: FiducialGrid, channel: int) -> tuple[W
 def _refined(frame: Frame, start: Warp, grid: FiducialGrid) -> Warp:
     """The sub-pixel fit, or ``start`` when it does not raise the correlation or moves a corner too far."""
     warp = start
-    for _ in range(ITERATIONS):
+    for _ in range(FIT_ITERATIONS):
         moved = offsets(even_picture(frame, warp, grid), grid)
-        correction = _homography(grid.centres, grid.centres + moved, OUTLIER)
+        correction = _homography(grid.centres, grid.centres + moved, CIRCLE_OUTLIER)
         warp = replace(warp, homography=warp.homography @ correction)
     warp = _bent(frame, warp, grid)
     moved_corners = np.linalg.norm(warp.corners() - start.corners(), axis=1).max() / start.scale()
     before, after = (correlation(even_picture(frame, each, grid), grid) for each in (start, warp))
-    return warp if after > before and moved_corners <= FURTHEST else start
+    return warp if after > before and moved_corners <= FURTHEST_CORNER else start
 
 
 def _homography(source: Array, target: Array, outlier: float) -> Array:
-    found, _ = cv2.findHomography(source, target, cv2.RANSAC, outlier)
-    if found is None:
+    homography, _ = cv2.findHomography(source, target, cv2.RANSAC, outlier)
+    if homography is None:
         raise CellError("registration: the circles lie on no common plane")
-    return np.asarray(found, dtype=np.float64)
+    return np.asarray(homography, dtype=np.float64)
 
 
 def _bent(frame: Frame, warp: Warp, grid: FiducialGrid) -> Warp:
@@ -153,7 +193,7 @@ def _bent(frame: Frame, warp: Warp, grid: FiducialGrid) -> Warp:
     if not significant or remaining > WORTHWHILE**2 * without:
         return warp
     bent = replace(warp, quadratic=warp.quadratic + coefficients)
-    for _ in range(ITERATIONS - 1):
+    for _ in range(FIT_ITERATIONS - 1):
         moved = offsets(even_picture(frame, bent, grid), grid)
         bent = replace(bent, quadratic=bent.quadratic + np.linalg.lstsq(terms, moved, rcond=None)[0])
     return bent

@@ -19,23 +19,23 @@ AGREE = 1.0  # capture pixels, or target pixels where those are larger: corners 
 Key = TypeVar("Key", bound=Hashable)
 
 
-def shared(found: Mapping[Key, Alignment]) -> tuple[Warp, frozenset[Key]] | None:
+def shared(alignments: Mapping[Key, Alignment]) -> tuple[Warp, frozenset[Key]] | None:
     """One warp for those of several alignments that agree, and which these are; None where no two agree.
 
     For captures of one size and targets of one shape. Alignments agree whose corners lie within `AGREE` of their
     median. Each has an error of its own, by the speckle of its capture; the common corners are their mean, weighted by
     the inverse of the variance that a correlation leaves unexplained.
     """
-    if len(found) < 2:
+    if len(alignments) < 2:
         return None
-    corners = {key: one.warp.corners() for key, one in found.items()}
+    corners = {key: alignment.warp.corners() for key, alignment in alignments.items()}
     middle = np.median(list(corners.values()), axis=0)
-    first = next(iter(found.values())).warp
+    first = next(iter(alignments.values())).warp
     allowed = AGREE * max(1.0, first.scale())
-    near = [key for key in found if np.linalg.norm(corners[key] - middle, axis=1).max() <= allowed]
+    near = [key for key in alignments if np.linalg.norm(corners[key] - middle, axis=1).max() <= allowed]
     if len(near) < 2:
         return None
-    weights = [1 / max(1 - found[key].correlation ** 2, 1e-6) for key in near]
+    weights = [1 / max(1 - alignments[key].correlation ** 2, 1e-6) for key in near]
     common = np.average([corners[key] for key in near], axis=0, weights=weights)
     height, width = first.shape
     ends = np.array([[0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]], dtype=np.float32)

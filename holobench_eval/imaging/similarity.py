@@ -43,13 +43,13 @@ class View:
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """Correlation of a capture with its target under a warp: of the whole, and of each part that holds structure.
+class Similarity:
+    """Correlation of a capture with its target under a warp: overall, and of each part that holds structure.
 
     displaced: how many parts fit clearly better a little elsewhere.
     """
 
-    whole: float
+    overall: float
     parts: tuple[float, ...] = ()
     displaced: int = 0
 
@@ -71,11 +71,11 @@ def view(frame: Frame, reference: Frame, warp: Warp, side: int = SIDE) -> View:
     to_frame = warp.homography @ to_target
     scale = Warp((small.shape[0], small.shape[1]), to_frame, np.zeros((6, 2))).scale()
     shrunk, back = reduced(frame, max(8, int(max(frame.shape) / max(1.0, scale))))
-    place = np.linalg.inv(back) @ to_frame
+    to_shrunk = np.linalg.inv(back) @ to_frame
     size = (small.shape[1], small.shape[0])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    picture = np.asarray(cv2.warpPerspective(shrunk, place, size, flags=flags), dtype=np.float32)
-    inside = cv2.warpPerspective(np.ones_like(shrunk), place, size, flags=flags) > 0.999
+    picture = np.asarray(cv2.warpPerspective(shrunk, to_shrunk, size, flags=flags), dtype=np.float32)
+    inside = cv2.warpPerspective(np.ones_like(shrunk), to_shrunk, size, flags=flags) > 0.999
     return View(small, picture, np.asarray(inside), to_target)
 
 
@@ -93,22 +93,22 @@ def evened(picture: Frame, inside: Mask) -> Frame:
     return np.asarray(structure / (contrast + FLAT * contrast.max() + 1e-9), dtype=np.float32)
 
 
-def likeness(frame: Frame, reference: Frame, warp: Warp) -> Likeness:
+def similarity(frame: Frame, reference: Frame, warp: Warp) -> Similarity:
     """How alike a capture ``(Hs, Ws)`` and its target ``(h, w)`` are under a warp; -1 where too little is covered."""
     seen = view(frame, reference, warp)
     if seen.inside.mean() < SEEN:
-        return Likeness(-1.0)
+        return Similarity(-1.0)
     target, capture = seen.even()
     parts = [part for part in structured(seen.reference) if seen.inside[part].mean() >= SEEN]
-    alike = [_correlation(target[part], capture[part], seen.inside[part]) for part in parts]
+    alike = [_masked_correlation(target[part], capture[part], seen.inside[part]) for part in parts]
     displaced = sum(_displaced(target, capture, part) for part in parts)
-    return Likeness(_correlation(target, capture, seen.inside), tuple(alike), displaced)
+    return Similarity(_masked_correlation(target, capture, seen.inside), tuple(alike), displaced)
 
 
 def _displaced(target: Frame, capture: Frame, part: tuple[slice, slice]) -> bool:
     """Whether a part of the capture fits the target clearly better some pixels away."""
     wide = cv2.copyMakeBorder(target, REACH, REACH, REACH, REACH, cv2.BORDER_CONSTANT, value=0.0)
-    row, column = (slice(place.start, place.stop + 2 * REACH) for place in part)
+    row, column = (slice(span.start, span.stop + 2 * REACH) for span in part)
     alike = cv2.matchTemplate(wide[row, column], np.ascontiguousarray(capture[part]), cv2.TM_CCOEFF_NORMED)
     y, x = np.unravel_index(int(alike.argmax()), alike.shape)
     better = float(alike[y, x] - alike[REACH, REACH]) > BETTER
@@ -128,6 +128,6 @@ def _thirds(edge: int) -> list[slice]:
     return [slice(*pair) for pair in itertools.pairwise(ends)]
 
 
-def _correlation(a: Frame, b: Frame, where: Mask) -> float:
+def _masked_correlation(a: Frame, b: Frame, where: Mask) -> float:
     a, b = a[where].astype(np.float64), b[where].astype(np.float64)
     return float((a * b).sum() / np.sqrt(max((a * a).sum() * (b * b).sum(), 1e-24)))

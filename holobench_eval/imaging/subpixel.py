@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from .grid import FiducialGrid
 from .warp import Array, Frame, Warp, quadratic_surface, quadratic_terms
 
-BLUR = 0.5  # region pixels: gathers the light between the samples, without rounding the edges away
+SAMPLE_BLUR = 0.5  # region pixels: gathers the light between the samples, without rounding the edges away
 KNEE = 0.2  # of a circle's light: brighter light counts as simply bright, which tames the speckle inside a circle
-FURTHEST = 2.0  # region pixels that a linearised fit may move a circle
+FURTHEST_CIRCLE = 2.0  # region pixels that a linearised fit may move a circle
 
 
 def even_picture(frame: Frame, warp: Warp, grid: FiducialGrid) -> Frame:
@@ -20,7 +20,7 @@ def even_picture(frame: Frame, warp: Warp, grid: FiducialGrid) -> Frame:
     The dark level is taken off and the illumination, a quadratic in the logarithm of the circles' light (exact for a
     Gaussian beam), is divided out. Otherwise every circle is pulled towards the bright side.
     """
-    smooth = cv2.GaussianBlur(frame, (0, 0), BLUR * warp.scale())
+    smooth = cv2.GaussianBlur(frame, (0, 0), SAMPLE_BLUR * warp.scale())
     picture = warp.sample(np.asarray(smooth))
     target = grid.image.numpy()
     picture = picture - np.median(picture[target == 0])
@@ -41,7 +41,7 @@ def compress(light: Frame) -> Frame:
 
 def template(grid: FiducialGrid) -> Frame:
     """What `even_picture` shows of a perfectly registered grid without speckle."""
-    return compress(np.asarray(cv2.GaussianBlur(grid.image.numpy(), (0, 0), BLUR)))
+    return compress(np.asarray(cv2.GaussianBlur(grid.image.numpy(), (0, 0), SAMPLE_BLUR)))
 
 
 def offsets(picture: Frame, grid: FiducialGrid) -> Array:
@@ -59,7 +59,7 @@ def offsets(picture: Frame, grid: FiducialGrid) -> Array:
     normal = model.transpose(0, 2, 1)
     gain, _, x, y = np.linalg.solve(normal @ model, normal @ values)[..., 0].T
     gain = np.maximum(gain, 0.05)
-    return np.asarray(np.clip(np.stack([x / gain, y / gain], axis=1), -FURTHEST, FURTHEST))
+    return np.asarray(np.clip(np.stack([x / gain, y / gain], axis=1), -FURTHEST_CIRCLE, FURTHEST_CIRCLE))
 
 
 def correlation(picture: Frame, grid: FiducialGrid) -> float:

@@ -13,7 +13,8 @@ from annotated_types import Interval, MinLen
 from ..core.errors import UserError
 from ..core.schema import typed
 from ..core.yaml_source import load
-from ..display.simulated.profile import SMALLEST_PANEL, Panel
+from ..display.simulated.profile import SMALLEST_PANEL
+from ..display.simulated.stages import Panel
 from ..imaging.convention import Convention
 from .laser import LaserSettings
 from .settings import CaptureSettings

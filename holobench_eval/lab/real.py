@@ -11,20 +11,23 @@ import torch
 from torch import Tensor
 
 from ..core.errors import CellError
-from ..display.api import Capture, DisplaySpec
-from ..display.calibrated import (
+from ..display.api import (
     DARKEST_MEAN,
+    Capture,
+    DisplaySpec,
     Exposure,
     RectifiedCapture,
-    Shows,
     Simulation,
     check_phase,
-    fiducial_phases,
+    efficiency,
+    in_target_frame,
     white_irradiance,
 )
+from ..display.metered import MethodHandles
 from ..imaging.cross_check import disagreement, second_warp
 from ..imaging.grid import fiducial
 from ..imaging.register import Registration, register
+from ..methods.fiducials import fiducial_phases
 from ..optics.phase import blaze
 from .photograph import MOST_SATURATED, Photograph, Photographer, Request
 
@@ -33,7 +36,7 @@ BRIGHTER = 100.0
 
 
 @dataclass(frozen=True)
-class RealBench(Shows):
+class RealBench(MethodHandles):
     """A panel and a camera that exist.
 
     spec: nominal optics; carrier: (vertical, horizontal) cycles per pixel of a blaze that is added to every phase;
@@ -56,7 +59,7 @@ class RealBench(Shows):
     @cached_property
     def _grid_requests(self) -> list[Request]:
         phases = fiducial_phases(self, self._grid_target)
-        return [Request(self.shown(phase), 1.0, "fiducial", (index,)) for index, phase in enumerate(phases)]
+        return [Request(self.shown(phase), 1.0, "fiducial", (index,)) for index, phase in enumerate(phases.values())]
 
     @cached_property
     def _grid_target(self) -> Tensor:
@@ -137,10 +140,7 @@ class RealBench(Shows):
     def photograph(
         self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
     ) -> RectifiedCapture:
-        """Show ``phase`` ``(C, H, W)`` [rad] and bring its photograph into the frame of ``target`` ``(C, h, w)``.
-
-        Exposures as in ``CalibratedBench.photograph``; "matched" sets the exposure time, not the laser power.
-        """
+        """See ``Display.photograph``."""
         check_phase(phase, self.spec, label)
         names, relative = (self.seed, item, repeat, "score"), self.relative_exposure(target)
         if exposure == "matched":
@@ -155,28 +155,23 @@ class RealBench(Shows):
         registered = self.registration
         photo = self.photographer.photograph(request)
         image = self.rectified(self.capture(photo), target)
-        share = image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)
         return RectifiedCapture(
             image=image,
             capture=self.capture(photo),
             saturated=photo.saturated,
-            efficiency=float(share.mean()),
+            efficiency=efficiency(image, target),
             residual=max(registered.residual),
             exposure=photo.exposure,
         )
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        """A capture as ``(C, h, w)`` in the target's frame and in the unit of ``RectifiedCapture.image``."""
-        return self._in_frame(capture, target, self.registration)
+        """See ``Display.rectified``."""
+        return in_target_frame(capture, target, self.spec, self.registration)
 
     def second_image(self, shot: RectifiedCapture, target: Tensor) -> Tensor | None:
         """``RectifiedCapture.image`` by the second geometry; None where there is none."""
         second = self.second_registration
-        return None if second is None else self._in_frame(shot.capture, target, second)
-
-    def _in_frame(self, capture: Capture, target: Tensor, registration: Registration) -> Tensor:
-        light = registration.rectify(capture.linear()).to(target.device)
-        return light / white_irradiance(target, self.spec)[: light.shape[0], None, None]
+        return None if second is None else in_target_frame(shot.capture, target, self.spec, second)
 
 
 @dataclass

@@ -35,12 +35,28 @@ def always() -> str | None:
 class Metric:
     """One full-reference image metric, called as ``function(image, target)``.
 
-    name: report name; the column is ``<name>_<domain>``. version: raised whenever a value would change.
-    direction: is a better image higher or lower? best: the value of identical images.
-    domains: the encodings of the images it is reported in (linear light, its square root, sRGB).
-    smallest: shortest image side in pixels that it is defined for.
-    symmetric: may the images be exchanged? differentiable: does autograd pass through?
-    available: why it cannot be computed here and what to do about it, or None.
+    Parameters
+    ----------
+    name
+        In reports; the column is ``<name>_<domain>``.
+    version
+        Raised whenever a value would change.
+    direction
+        Whether a better image is higher or lower.
+    best
+        The value of identical images.
+    domains
+        The encodings of the images it is reported in: linear light, its square root, sRGB.
+    function
+        ``(C, H, W)`` or ``(B, C, H, W)`` twice, in [0, 1], to a scalar or ``(B,)``.
+    smallest
+        Shortest image side that it is defined for [px].
+    symmetric
+        Whether the images may be exchanged.
+    differentiable
+        Whether autograd passes through.
+    available
+        Why it cannot be computed here and what to do about it, or None.
     """
 
     name: str
@@ -118,6 +134,12 @@ def block_means(image: Tensor, k: int) -> Tensor:
     return functional.avg_pool2d(image, k) if k > 1 else image  # torch takes long to average single pixels
 
 
+def halved(image: Tensor) -> Tensor:
+    """Means over 2 x 2 pixels, an odd side padded with zeros, (B, C, H, W) to (B, C, H / 2, W / 2)."""
+    odd = max(image.shape[-2] % 2, image.shape[-1] % 2)
+    return functional.avg_pool2d(functional.pad(image, (0, odd, 0, odd)), 2)
+
+
 def safe_sqrt(x: Tensor) -> Tensor:
     """The square root of x >= 0, exact, with gradient zero (not infinity) where x is zero. Any shape."""
     if not x.requires_grad:
@@ -161,19 +183,19 @@ def gaussian_valid(image: Tensor, sigma: float, radius: int) -> Tensor:
     """Gaussian filter of 2 radius + 1 taps where it fits wholly: (..., H, W) to (..., H - 2 radius, W - 2 radius)."""
     taps = gaussian_taps(sigma, radius)
     if image.is_cpu and not (image.requires_grad and torch.is_grad_enabled()):
-        return _filtered(image, taps)
+        return _opencv_filtered(image, taps)
     return correlate(correlate(image, taps, dim=-1), taps, dim=-2)
 
 
-def _filtered(image: Tensor, taps: Sequence[float]) -> Tensor:
+def _opencv_filtered(image: Tensor, taps: Sequence[float]) -> Tensor:
     """``gaussian_valid`` without a gradient, by OpenCV: 20 times as fast at 1080x1920."""
     radius, kernel = len(taps) // 2, np.array(taps)
     height, width = image.shape[-2:]
     result = image.new_empty((*image.shape[:-2], height - 2 * radius, width - 2 * radius))
     planes = zip(image.detach().reshape(-1, height, width), result.view(-1, *result.shape[-2:]), strict=True)
-    for plane, place in planes:
+    for plane, result_plane in planes:
         filtered = cv2.sepFilter2D(plane.numpy(), -1, kernel, kernel)
-        place.copy_(torch.from_numpy(filtered[radius : height - radius, radius : width - radius]))
+        result_plane.copy_(torch.from_numpy(filtered[radius : height - radius, radius : width - radius]))
     return result
 
 

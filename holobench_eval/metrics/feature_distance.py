@@ -28,7 +28,7 @@ WIDTH_ACROSS, WIDTH_ALONG = 1.0, 1.5
 POOLING_SIGMA = 2.0
 CONTRAST_THRESHOLD = 0.02
 COLOUR_THRESHOLD = 0.1
-SMALLEST = 72
+SMALLEST_MOFD = 72
 
 # Luma and two opponent colours, for which the eye has half the acuity.
 OPPONENT = ((0.299, 0.587, 0.114), (0.5, -0.5, 0.0), (0.25, 0.25, -0.5))
@@ -117,7 +117,7 @@ class FixedMofd:
 
     def __init__(self, target: Tensor) -> None:
         self.target = target
-        _, side = paired(target, target, smallest=SMALLEST)
+        _, side = paired(target, target, smallest=SMALLEST_MOFD)
         self._scales = []
         for scale in range(SCALES):
             responses = _responses(_opponent(side, scale))
@@ -128,7 +128,7 @@ class FixedMofd:
 
     def __call__(self, image: Tensor) -> Tensor:
         """The distance of an image of the target's shape, as ``mofd`` gives it."""
-        x, _ = paired(image, self.target, smallest=SMALLEST)
+        x, _ = paired(image, self.target, smallest=SMALLEST_MOFD)
         parts = []
         for scale, fixed in enumerate(self._scales):
             parts.append(fixed.distance(_opponent(x, scale)))
@@ -153,11 +153,24 @@ def mofd(image: Tensor, target: Tensor) -> Tensor:
     3. Per position: sum of squared feature differences over the sum of squared features of both images, both pooled
        with a Gaussian of 2 px, plus a floor that stands for a contrast of 0.02; averaged over the image.
     4. Colour of the last low-pass image (1/16 of the size): squared difference D over D + 0.1^2, averaged.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded, sides of at least 72 px.
-    Returns a scalar or (B,) in [0, 1]; lower is better, identical images give 0. Raises ValueError (see ``paired``).
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3, sides of at least 72 px.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; lower is better, from 0 (identical) to 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
-    paired(image, target, smallest=SMALLEST)
+    paired(image, target, smallest=SMALLEST_MOFD)
     return _fixed(target)(image)
 
 
-MOFD = Metric("mofd", "1", "lower", 0.0, ("srgb",), mofd, smallest=SMALLEST)
+MOFD = Metric("mofd", "1", "lower", 0.0, ("srgb",), mofd, smallest=SMALLEST_MOFD)

@@ -16,8 +16,21 @@ from .base import Metric, as_rgb, paired
 def flip(image: Tensor, target: Tensor) -> Tensor:
     """Mean FLIP error for low dynamic range at the default viewing condition of 67 pixels a degree.
 
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded; a gray image is taken as three equal channels.
-    Returns a scalar or (B,) without gradient; 0 (identical) to 1, lower is better. Raises ValueError (see ``paired``).
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3; gray is taken as three
+        equal channels.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)`` without gradient; lower is better, from 0 (identical) to 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
     x, y = (as_rgb(side.detach().clamp(0, 1).float().cpu()) for side in paired(image, target))
     means = []

@@ -25,8 +25,21 @@ def fsim(image: Tensor, target: Tensor) -> Tensor:
     A colour image gets FSIMc, the form with the I and Q channels of YIQ; a gray image FSIM. Values in [0, 255]; images
     are averaged over k x k pixels first, k = shorter side / 256 rounded; T1 = 0.85, T2 = 160, T3 = T4 = 200,
     lambda = 0.03.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded.
-    Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3, sides of at least 16 px.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; higher is better, identical images give 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
     x, y = paired(image, target, smallest=16)
     k = max(1, round(min(x.shape[-2:]) / 256))

@@ -7,9 +7,8 @@ quality index", IEEE Trans. Image Process. 23 (2014).
 from __future__ import annotations
 
 from torch import Tensor
-from torch.nn import functional
 
-from .base import Metric, gradient_magnitude, mix, paired, safe_sqrt, similarity
+from .base import Metric, gradient_magnitude, halved, mix, paired, safe_sqrt, similarity
 
 LUMA = ((0.299, 0.587, 0.114),)
 CONSTANT = 170 / 255**2
@@ -19,16 +18,27 @@ def gmsd(image: Tensor, target: Tensor) -> Tensor:
     """Standard deviation over the image of the similarity of Prewitt gradient magnitudes (Eq. 4-6 of the paper).
 
     Images are halved by 2x2 means first (an odd side is padded with zeros); colour is reduced to luma; c = 170 / 255^2.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded.
-    Returns a scalar or (B,); lower is better, identical images give 0. Raises ValueError (see ``paired``).
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3, sides of at least 2 px.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; lower is better, identical images give 0.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
     magnitudes = []
     for luma in paired(image, target, smallest=2):
         if luma.shape[1] == 3:
             luma = mix(luma, LUMA)
-        odd = max(luma.shape[-2] % 2, luma.shape[-1] % 2)
-        halved = functional.avg_pool2d(functional.pad(luma, (0, odd, 0, odd)), 2)
-        magnitudes.append(gradient_magnitude(halved, "prewitt"))
+        magnitudes.append(gradient_magnitude(halved(luma), "prewitt"))
     a, b = magnitudes
     alike = similarity(a, b, CONSTANT)
     variance = (alike - alike.mean(dim=(1, 2, 3), keepdim=True)).square().mean(dim=(1, 2, 3))

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from .base import Metric, mix, paired, similarity
+from .base import Metric, halved, mix, paired, similarity
 
 YIQ = ((0.299, 0.587, 0.114), (0.5959, -0.2746, -0.3213), (0.2115, -0.5227, 0.3112))
 C = 30.0
@@ -26,20 +26,28 @@ def _haar(luma: Tensor, size: int) -> Tensor:
     return functional.conv2d(padded, torch.stack([kernel, kernel.T])[:, None]).abs()
 
 
-def _halved(image: Tensor) -> Tensor:
-    odd = max(image.shape[-2] % 2, image.shape[-1] % 2)
-    return functional.avg_pool2d(functional.pad(image, (0, odd, 0, odd)), 2)
-
-
 def haarpsi(image: Tensor, target: Tensor) -> Tensor:
     """Similarity of Haar coefficients at two scales, weighted by those of the third (Eq. 10-12 of the paper).
 
     Images are halved by 2x2 means first, values scaled to [0, 255]; C = 30, alpha = 4.2; colour adds the similarity of
     the I and Q channels of YIQ, averaged over 2x2 pixels.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded.
-    Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3, sides of at least 2 px.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; higher is better, identical images give 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
-    x, y = (_halved(255 * side) for side in paired(image, target, smallest=2))
+    x, y = (halved(255 * side) for side in paired(image, target, smallest=2))
     if x.shape[1] == 3:
         x, y = mix(x, YIQ), mix(y, YIQ)
     fine = similarity(_haar(x[:, :1], 2), _haar(y[:, :1], 2), C)

@@ -21,7 +21,7 @@ from ..core.errors import UserError
 from .base import Metric, as_rgb, paired
 
 Network = Literal["alex", "vgg"]
-SMALLEST = 32
+SMALLEST_LPIPS = 32
 
 # Mean and deviation of ImageNet for images in [-1, 1], as in the authors' release.
 SHIFT = (-0.030, -0.088, -0.188)
@@ -146,13 +146,31 @@ def _unit(features: Tensor) -> Tensor:
 def lpips(image: Tensor, target: Tensor, network: Network = "alex", weights: Path | None = None) -> Tensor:
     """LPIPS v0.1: squared differences of unit-length deep features, weighted by the learned heads (Eq. 1 of the paper).
 
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded, sides of at least 32 px; gray is taken as three
-    equal channels; computed in float32.
-    weights: trunk file or folder, default torch's hub cache (see ``find_weights``).
-    Returns a scalar or (B,); lower is better, identical images give 0. Raises ValueError (see ``paired``) and UserError
-    when the weights are absent or not what they should be: there is never a value without them.
+    Computed in float32.
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3, sides of at least 32 px; gray
+        is taken as three equal channels.
+    network
+        Trunk of the features.
+    weights
+        File or folder of the trunk, by default torch's hub cache; see ``find_weights``.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; lower is better, identical images give 0.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
+    UserError
+        The weights are absent or not what they should be: there is never a value without them.
     """
-    x, y = paired(image, target, smallest=SMALLEST)
+    x, y = paired(image, target, smallest=SMALLEST_LPIPS)
     reason = available(network, weights)
     path = find_weights(network, weights)
     if reason is not None or path is None:
@@ -180,6 +198,6 @@ def lpips_metric(network: Network, weights: Path | None = None) -> Metric:
         best=0.0,
         domains=("srgb",),
         function=partial(lpips, network=network, weights=weights),
-        smallest=SMALLEST,
+        smallest=SMALLEST_LPIPS,
         available=partial(available, network, weights),
     )

@@ -31,10 +31,24 @@ def _reduced(image: Tensor) -> Tensor:
 def mdsi(image: Tensor, target: Tensor) -> Tensor:
     """Mean deviation of the pooled gradient and chromaticity similarity (Eq. 3-11 of the paper, summation form).
 
-    Values in [0, 255]; C1 = 140, C2 = 55, C3 = 550, alpha = 0.6, rho = 1, q = o = 1/4; a gray image is taken as three
-    equal channels. It is not symmetric: the gradient of the mean image is compared with each side by opposite signs.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded.
-    Returns a scalar or (B,); lower is better, identical images give 0. Raises ValueError (see ``paired``).
+    Values in [0, 255]; C1 = 140, C2 = 55, C3 = 550, alpha = 0.6, rho = 1, q = o = 1/4. It is not symmetric: the
+    gradient of the mean image is compared with each side by opposite signs.
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3, sides of at least 3 px; gray
+        is taken as three equal channels.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; lower is better, identical images give 0.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
     x, y = (mix(_reduced(255 * as_rgb(side)), LHM) for side in paired(image, target, smallest=3))
     gradient_x = gradient_magnitude(x[:, :1], "prewitt")

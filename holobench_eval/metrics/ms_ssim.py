@@ -15,7 +15,7 @@ from .base import Metric, paired
 from .ssim import RADIUS, LocalStatistics
 
 EXPONENTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
-SMALLEST = 161
+SMALLEST_MS_SSIM = 161
 _IS_LAST = (False, False, False, False, True)
 
 
@@ -24,7 +24,7 @@ class FixedMsSsim:
 
     def __init__(self, target: Tensor) -> None:
         self.target = target
-        _, side = paired(target, target, smallest=SMALLEST)
+        _, side = paired(target, target, smallest=SMALLEST_MS_SSIM)
         self.scales = []
         for last in _IS_LAST:
             self.scales.append(LocalStatistics(_mirrored(side) if last else side))
@@ -32,11 +32,11 @@ class FixedMsSsim:
 
     def __call__(self, image: Tensor) -> Tensor:
         """The value of an image of the target's shape, as ``ms_ssim`` gives it."""
-        x, _ = paired(image, self.target, smallest=SMALLEST)
+        x, _ = paired(image, self.target, smallest=SMALLEST_MS_SSIM)
         value = x.new_ones(x.shape[0])
         for last, scale, exponent in zip(_IS_LAST, self.scales, EXPONENTS, strict=True):
-            whole, structure = scale.means(_mirrored(x) if last else x)
-            mean = whole if last else structure
+            entire, structure = scale.means(_mirrored(x) if last else x)
+            mean = entire if last else structure
             # The power of zero has an infinite gradient, so zero is a branch of its own.
             value = value * torch.where(mean > 0, torch.where(mean > 0, mean, 1.0).pow(exponent), 0.0)
             x = functional.avg_pool2d(x, 2)
@@ -52,12 +52,25 @@ def ms_ssim(image: Tensor, target: Tensor) -> Tensor:
 
     The windows are those of ``ssim``; a scale is half the one before by 2x2 means; the means go over pixels and
     channels, and a negative mean counts as zero. As in torchmetrics, whose value this equals, the coarsest SSIM is
-    averaged over the whole image, mirrored at its edges, and the other terms over the windows that lie in the image.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sides of at least 161 px.
-    Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
+    averaged over the entire image, mirrored at its edges, and the other terms over the windows that lie in the image.
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sides of at least 161 px.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; higher is better, identical images give 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
-    paired(image, target, smallest=SMALLEST)
+    paired(image, target, smallest=SMALLEST_MS_SSIM)
     return FixedMsSsim(target)(image)
 
 
-MS_SSIM = Metric("ms_ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ms_ssim, smallest=SMALLEST)
+MS_SSIM = Metric("ms_ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ms_ssim, smallest=SMALLEST_MS_SSIM)

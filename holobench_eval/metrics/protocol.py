@@ -22,7 +22,7 @@ from .catalogue import catalogue
 from .speckle import speckle_contrast
 
 VERSION = "v1"
-SMALLEST = 16
+SMALLEST_SCORED = 16
 
 Image = Tensor | NDArray[np.floating]
 
@@ -38,9 +38,27 @@ _REPEATED = ("psnr", "ssim")  # also given after refinement and after blur
 def match(capture: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     """Match the brightness of each colour channel by least squares, then clip to [0, 1].
 
-    s = sum(I T) / sum(I I) in linear light over the whole region, without an offset, and never negative.
-    capture: (C, h, w) linear light in any unit; target: (C, h, w) linear light in [0, 1].
-    Returns the matched image (C, h, w) and the factors (C,); a black channel has factor 0 and stays black.
+    The factor is sum(I T) / sum(I I) in linear light over the entire region, without an offset, and never negative.
+
+    Parameters
+    ----------
+    capture
+        ``(C, h, w)`` linear light in any unit.
+    target
+        ``(C, h, w)`` linear light in [0, 1].
+
+    Returns
+    -------
+    image
+        ``(C, h, w)``, matched.
+    factors
+        ``(C,)``; a black channel has factor 0 and stays black.
+
+    Examples
+    --------
+    >>> image, factors = match(torch.full((1, 2, 2), 4.0), torch.full((1, 2, 2), 0.5))
+    >>> float(factors), float(image.mean())
+    (0.125, 0.5)
     """
     factors = _factors(capture, target)
     return (factors.view(-1, 1, 1) * capture).clamp(0, 1), factors
@@ -67,26 +85,50 @@ def score(
     lpips_weights: str | Path | None = None,
     stored: bool = False,
 ) -> dict[str, float]:
-    """All scores of a capture against its target, after the intensity match.
+    """All scores of a capture against its target, after the intensity match (protocol v1).
 
-    capture: (C, h, w) linear light in any unit, dark level subtracted (noise may make it negative).
-    target: (C, h, w) linear light in [0, 1]; C = 1 or 3, sides of at least 16 px.
-    stored: both are values as pictures store them, display-encoded, and are compared as they are: matched, refined,
-    blurred and scored without decoding. The only domain is then ``stored``, and there is no speckle contrast.
-    refine: also score after the bounded rigid refinement, whose move is given.
-    blur: widths [px] of Gaussians by which capture and target alike are blurred, in linear light and before the match.
-    metrics: names to compute (as in ``catalogue``, and ``speckle_contrast``), default all.
-    lpips_weights: file or folder of the LPIPS trunk, default torch's hub cache.
+    Parameters
+    ----------
+    capture
+        ``(C, h, w)`` linear light in any unit, dark level subtracted; noise may make it negative.
+    target
+        ``(C, h, w)`` linear light in [0, 1]; C = 1 or 3, sides of at least 16 px.
+    refine
+        Also score after the bounded rigid refinement, whose move is given.
+    blur
+        Widths [px] of Gaussians by which capture and target alike are blurred, in linear light and before the match.
+    metrics
+        Names to compute (as in ``catalogue``, and ``speckle_contrast``), default all.
+    lpips_weights
+        File or folder of the LPIPS trunk, by default torch's hub cache.
+    stored
+        Both are values as pictures store them, display-encoded, and are compared as they are: matched, refined, blurred
+        and scored without decoding. The only domain is then ``stored``, and there is no speckle contrast.
 
-    Returns ``<metric>_<domain>``; ``<metric>_linear_refined`` and ``<metric>_linear_blur<width>`` for PSNR and SSIM
-    (``stored`` in the place of ``linear`` where values are stored ones);
-    ``refine_dx_px``, ``refine_dy_px``, ``refine_theta_deg``; ``speckle_contrast``; ``brightness_ratio`` (mean of the
-    capture over mean of the target, before the match); ``scale_<channel>``, the match's factors. What cannot be given
-    is absent: a metric without its weights or for a larger image, the speckle contrast without a flat patch.
-    Raises ValueError for wrong shapes, values that are not finite and a target outside [0, 1]; UserError for unknown
-    metric names and for LPIPS weights that are named but cannot be used.
+    Returns
+    -------
+    dict of float
+        ``<metric>_<domain>``; ``<metric>_linear_refined`` and ``<metric>_linear_blur<width>`` for PSNR and SSIM
+        (``stored`` in the place of ``linear`` for stored values); ``refine_dx_px``, ``refine_dy_px``,
+        ``refine_theta_deg``; ``speckle_contrast``; ``brightness_ratio``, mean of the capture over mean of the target
+        before the match; ``scale_<channel>``, the match's factors. Absent is what cannot be computed: a metric without
+        its weights or for a larger image, the speckle contrast without a flat patch.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, values that are not finite, a target outside [0, 1].
+    UserError
+        Unknown metric names, LPIPS weights that are named but cannot be used.
+
+    Examples
+    --------
+    >>> target = torch.linspace(0, 1, 1024).view(1, 32, 32)
+    >>> scores = score(target / 2, target, metrics=("psnr",), refine=False, blur=())
+    >>> round(scores["psnr_linear"]), scores["scale_0"]
+    (80, 2.0)
     """
-    light, wanted = _checked(capture, target)
+    light, wanted = _as_pair(capture, target)
     names, chosen = _chosen(metrics, lpips_weights)
     first: Domain = "stored" if stored else "linear"
     image, factors = match(light, wanted)
@@ -114,7 +156,7 @@ def score(
     return scores | {f"scale_{channel}": float(factor) for channel, factor in enumerate(factors)}
 
 
-def _checked(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
+def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
     """Both as float64 tensors on one device; float64, since SSIM subtracts nearly equal squares."""
     light, wanted = (
         (side if isinstance(side, Tensor) else torch.from_numpy(np.array(side, dtype=np.float64))).detach().double()
@@ -125,8 +167,8 @@ def _checked(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
         raise ValueError(
             f"capture {tuple(light.shape)} and target {tuple(wanted.shape)} must both be (C, h, w) with C = 1 or 3"
         )
-    if min(light.shape[1:]) < SMALLEST:
-        raise ValueError(f"image sides must be at least {SMALLEST} pixels, got {tuple(light.shape[1:])}")
+    if min(light.shape[1:]) < SMALLEST_SCORED:
+        raise ValueError(f"image sides must be at least {SMALLEST_SCORED} pixels, got {tuple(light.shape[1:])}")
     if not bool(light.isfinite().all()):
         raise ValueError("the capture holds values that are not finite")
     low, high = (float(value) for value in wanted.aminmax())

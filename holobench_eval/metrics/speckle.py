@@ -16,13 +16,32 @@ DIMMEST = 0.05
 
 
 def speckle_contrast(capture: Tensor, target: Tensor) -> float:
-    """Mean of std/mean of the captured intensity over the patches where the target is flat and not dark.
+    """Mean of std / mean of the captured intensity over the patches where the target is flat and not dark.
 
-    capture: (C, H, W) linear light in any unit; target: (C, H, W) linear light in [0, 1].
     Patches are 16 x 16 px side by side, per channel. A patch counts when the target in it has a mean of at least 0.05
-    and a std/mean of at most 0.05, and the capture a positive mean. About 1 for fully developed speckle, 0 for none;
-    lower is better. NaN where no patch counts. Raises ValueError for shapes that differ or are smaller than a
-    patch, and for values that are not finite.
+    and a std / mean of at most 0.05, and the capture a positive mean.
+
+    Parameters
+    ----------
+    capture
+        ``(C, H, W)`` linear light in any unit.
+    target
+        ``(C, H, W)`` linear light in [0, 1].
+
+    Returns
+    -------
+    float
+        About 1 for fully developed speckle, 0 for none; lower is better. NaN where no patch counts.
+
+    Raises
+    ------
+    ValueError
+        Shapes that differ or are smaller than a patch, values that are not finite.
+
+    Examples
+    --------
+    >>> speckle_contrast(torch.ones(1, 32, 32), torch.ones(1, 32, 32))
+    0.0
     """
     if capture.shape != target.shape or capture.ndim != 3:
         raise ValueError(f"expected (C, H, W) twice, got {tuple(capture.shape)} and {tuple(target.shape)}")

@@ -23,11 +23,8 @@ SIGMA = 1.5
 RADIUS = 5
 C1 = 0.01**2
 C2 = 0.03**2
-STRIP = 2**17
-"""Pixels that are compared together: few enough to stay in the cache."""
-
-LARGE = 2**20
-"""Pixels for each thread; to start one takes as long as to compare a tenth of them."""
+STRIP = 2**17  # pixels that are compared together: few enough to stay in the cache
+LARGE = 2**20  # pixels for each thread; to start a thread takes as long as to compare a tenth of them
 
 Plane = NDArray[np.floating]
 
@@ -72,8 +69,27 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
 
     It equals scikit-image's ``structural_similarity`` with ``gaussian_weights=True, sigma=1.5,
     use_sample_covariance=False, data_range=1``; channels are averaged.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sides of at least 11 px.
-    Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sides of at least 11 px.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; higher is better, identical images give 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
+
+    Examples
+    --------
+    >>> picture = torch.linspace(0, 1, 256).view(1, 16, 16)
+    >>> float(ssim(picture, picture))
+    1.0
     """
     x, y = paired(image, target, smallest=2 * RADIUS + 1)
     return LocalStatistics(y).means(x)[0].reshape(image.shape[:-3])
@@ -85,10 +101,10 @@ def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     planes = [side.detach().reshape(-1, height, width).numpy() for side in (image, target)]
     inner = height - 2 * RADIUS
     step = max(2 * RADIUS, STRIP // width)
-    places = list(product(range(batch * channels), range(0, inner, step)))
+    strips = list(product(range(batch * channels), range(0, inner, step)))
 
-    def sums(place: tuple[int, int]) -> tuple[float, float]:
-        plane, first = place
+    def sums(strip: tuple[int, int]) -> tuple[float, float]:
+        plane, first = strip
         rows = slice(first, min(first + step, inner) + 2 * RADIUS)
         return _sums(planes[0][plane, rows], planes[1][plane, rows])
 
@@ -96,12 +112,12 @@ def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     threads = min(torch.get_num_threads(), math.ceil(image.numel() / LARGE))
     if threads > 1:
         with ThreadPoolExecutor(threads) as pool:
-            found = list(pool.map(sums, places))
+            totals = list(pool.map(sums, strips))
     else:
-        found = [sums(place) for place in places]
-    added = np.array(found).reshape(batch, -1, 2).sum(1) / (channels * inner * (width - 2 * RADIUS))
-    whole, structure = torch.from_numpy(added).to(image.dtype).unbind(1)
-    return whole, structure
+        totals = [sums(strip) for strip in strips]
+    added = np.array(totals).reshape(batch, -1, 2).sum(1) / (channels * inner * (width - 2 * RADIUS))
+    full, structure = torch.from_numpy(added).to(image.dtype).unbind(1)
+    return full, structure
 
 
 def _sums(x: Plane, y: Plane) -> tuple[float, float]:
@@ -109,14 +125,14 @@ def _sums(x: Plane, y: Plane) -> tuple[float, float]:
 
     The SSIM has only the sum of the two variances, so that four filters do.
     """
-    mean_x, mean_y, squares, products = (_filtered(side) for side in (x, y, x * x + y * y, x * y))
+    mean_x, mean_y, squares, products = (_strip_filtered(side) for side in (x, y, x * x + y * y, x * y))
     mean_squares, mean_products = mean_x * mean_x + mean_y * mean_y, mean_x * mean_y
     structure = (2 * (products - mean_products) + C2) / (squares - mean_squares + C2)
     luminance = (2 * mean_products + C1) / (mean_squares + C1)
     return float((luminance * structure).sum(dtype=np.float64)), float(structure.sum(dtype=np.float64))
 
 
-def _filtered(plane: Plane) -> Plane:
+def _strip_filtered(plane: Plane) -> Plane:
     """``gaussian_valid`` of one plane."""
     taps = np.array(gaussian_taps(SIGMA, RADIUS))
     return np.asarray(cv2.sepFilter2D(plane, -1, taps, taps)[RADIUS:-RADIUS, RADIUS:-RADIUS], dtype=plane.dtype)

@@ -97,10 +97,23 @@ def vsi(image: Tensor, target: Tensor) -> Tensor:
     """Similarity of saliency, Scharr gradient and chroma, weighted by saliency (Eq. 6-10 of the paper).
 
     Values in [0, 255], colours as LMN; C1 = 1.27, C2 = 386, C3 = 130, alpha = 0.4, beta = 0.02; images are averaged
-    over k x k pixels after the saliency is taken, k = shorter side / 256 rounded; a gray image is taken as three equal
-    channels.
-    image, target: (C, H, W) or (B, C, H, W) in [0, 1], sRGB encoded.
-    Returns a scalar or (B,); higher is better, at most 1. Raises ValueError (see ``paired``).
+    over k x k pixels after the saliency is taken, k = shorter side / 256 rounded.
+
+    Parameters
+    ----------
+    image, target
+        ``(C, H, W)`` or ``(B, C, H, W)`` in [0, 1], sRGB encoded, C = 1 or 3, sides of at least 3 px; gray
+        is taken as three equal channels.
+
+    Returns
+    -------
+    Tensor
+        Scalar or ``(B,)``; higher is better, identical images give 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, types or values; see ``base.paired``.
     """
     x, y = (as_rgb(side) for side in paired(image, target, smallest=3))
     salience_x, salience_y = _reduced(_saliency(x, _priors_multiplied)), _reduced(_saliency_of_target(y))

@@ -18,20 +18,50 @@ LINES = 256
 
 
 def angular_spectrum_phase(f_squared: Tensor, wavelength: float, distance: float) -> Tensor:
-    """Phase [rad] of free space at squared spatial frequency [1/m^2], carrier 2 pi z / lambda removed.
+    """Phase of free space, the carrier 2 pi z / lambda removed (Goodman, Introduction to Fourier Optics, section 3.10).
 
-    2 pi z (sqrt(1/lambda^2 - f^2) - 1/lambda), written without the cancellation. float64 in, float64 out;
-    evanescent frequencies give the phase of the band's edge and are to be masked by the caller.
+    2 pi z (sqrt(1 / lambda^2 - f^2) - 1 / lambda), written without the cancellation.
+
+    Parameters
+    ----------
+    f_squared
+        Squared spatial frequency [1/m^2], float64.
+    wavelength, distance
+        Of the light and along the axis [m].
+
+    Returns
+    -------
+    Tensor
+        The shape of ``f_squared`` [rad], float64; evanescent frequencies give the phase of the band's edge and are to
+        be masked by the caller.
+
+    Examples
+    --------
+    >>> f_squared = torch.tensor([1e9, 1e10], dtype=torch.float64)
+    >>> angular_spectrum_phase(f_squared, wavelength=500e-9, distance=1e-3)
+    tensor([ -1.5709, -15.7178], dtype=torch.float64)
     """
     axial = torch.sqrt((1 / wavelength**2 - f_squared).clamp_min(0.0))
     return -2 * math.pi * distance * f_squared / (axial + 1 / wavelength)
 
 
 def band_limit(size: int, padded: int, pitch: float, wavelength: float, distance: float) -> float:
-    """Highest frequency [1/m] whose light does not wrap around into the picture.
+    """Highest frequency whose light does not wrap around into the picture.
 
     Matsushima & Shimobaba (Opt. Express 17, 19662, 2009, Eq. 13) stop light at half the padded window; with more
     padding than the picture is wide it may go on until the wrap-around would reach the picture.
+
+    Parameters
+    ----------
+    size, padded
+        Pixels of the picture and of the transform along the axis.
+    pitch, wavelength, distance
+        Lengths [m].
+
+    Returns
+    -------
+    float
+        Spatial frequency [1/m].
     """
     reach = max(padded / 2, padded - size) * pitch
     return 1 / (wavelength * math.sqrt((distance / reach) ** 2 + 1))
@@ -40,15 +70,43 @@ def band_limit(size: int, padded: int, pitch: float, wavelength: float, distance
 class AngularSpectrum(Convolution):
     """Exact scalar propagation between parallel planes (Goodman, Introduction to Fourier Optics, section 3.10).
 
-    shape: (H, W) pixels; pitch, wavelength, distance: metres (a negative distance propagates back);
-    pupil: diameter of a circular iris in the Fourier plane as a fraction of the band 1/pitch, None for no iris;
-    padding: None for the stated default accuracy, a number of samples added per axis, or "reference";
-    dtype: complex64 unless given; the reference setting is complex128.
-
     Frequencies whose light would wrap around into the picture are removed, evanescent ones as well. Errors at
     the default: at most 1e-2 rms on a white complex field, 1e-4 on a smooth one. Where light spreads so far that twice
     the panel would not be enough for that, its kernel is cut off where it no longer reaches from one pixel to another:
     then twice the panel is enough, at any distance. The transfer function is cached.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns.
+    pitch, wavelength
+        Of the pixels and of the light [m].
+    distance
+        Negative to propagate back [m].
+    pupil
+        Diameter of a circular iris in the Fourier plane as a fraction of the band 1 / pitch, None for no iris.
+    padding
+        None for the stated default accuracy, a number of samples added per axis, or "reference".
+    dtype
+        complex64 unless given; that of the reference setting is complex128.
+    device
+        Where the transfer function lies, and with it the fields.
+
+    Raises
+    ------
+    ValueError
+        A geometry without a meaning, or a wrong padding.
+
+    Examples
+    --------
+    >>> model = AngularSpectrum((64, 64), pitch=6.4e-6, wavelength=517e-9, distance=5e-3)
+    >>> field = torch.ones(64, 64, dtype=torch.complex64)
+    >>> image = model.forward(field)
+    >>> image.shape, image.dtype
+    (torch.Size([64, 64]), torch.complex64)
+    >>> energy, returned = image.abs().square().sum(), (field.conj() * model.adjoint(image)).sum().real
+    >>> bool(torch.isclose(energy, returned, rtol=1e-4))
+    True
     """
 
     def __init__(
@@ -67,13 +125,13 @@ class AngularSpectrum(Convolution):
             dtype = torch.complex128 if padding == "reference" else torch.complex64
         padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
         twice = (int(next_fast_len(2 * shape[0] - 1)), int(next_fast_len(2 * shape[1] - 1)))
-        optics, place = _Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil), torch.device(device)
+        optics, where = _Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil), torch.device(device)
         if padding is None and (padded[0] > twice[0] or padded[1] > twice[1]):
             padded = (min(padded[0], twice[0]), min(padded[1], twice[1]))
             grid = padded_shape(shape, pitch, wavelength, distance, pupil, None, DEFAULT_ERROR / 3)
-            transfer = _cut_transfer(optics, padded, grid, dtype, place)
+            transfer = _cut_off_transfer(optics, padded, grid, dtype, where)
         else:
-            transfer = _transfer(optics, padded, dtype, place)
+            transfer = _band_limited_transfer(optics, padded, dtype, where)
         super().__init__(optics.shape, transfer)
         self.pitch, self.wavelength, self.distance, self.pupil = pitch, wavelength, distance, pupil
 
@@ -110,13 +168,15 @@ class _Optics:
 
 
 @lru_cache(maxsize=24)
-def _transfer(optics: _Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device) -> Tensor:
+def _band_limited_transfer(
+    optics: _Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device
+) -> Tensor:
     fy, fx = frequencies(padded, optics.pitch, device)
     return as_used(optics.sampled(fy, fx, padded).to(dtype))
 
 
 @lru_cache(maxsize=24)
-def _cut_transfer(
+def _cut_off_transfer(
     optics: _Optics, padded: tuple[int, int], grid: tuple[int, int], dtype: torch.dtype, device: torch.device
 ) -> Tensor:
     """Transfer function of the kernel of a larger ``grid``, cut off beyond the panel's own size.

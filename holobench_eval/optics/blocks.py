@@ -27,8 +27,8 @@ def in_blocks(work: Callable[[slice], None], like: Tensor, lines: int, elements:
     threads = torch.get_num_threads()
     work = torch.inference_mode(torch.is_inference_mode_enabled())(torch.no_grad()(work))  # modes are a thread's own
     if threads == 1 or count == 1:
-        for one in slices:
-            work(one)
+        for block in slices:
+            work(block)
         return
     try:
         for _ in _pool(threads).map(work, slices):

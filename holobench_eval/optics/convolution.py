@@ -27,10 +27,17 @@ class Propagator(Protocol):
 
 
 class Convolution:
-    """A shift-invariant propagator given by its transfer function on the padded ``fftfreq`` grid.
+    """A shift-invariant propagator given by its transfer function.
 
     The field sits in the corner of the padded array, so no shifts are needed; the transfer function carries
     no constant phase exp(ikz).
+
+    Parameters
+    ----------
+    shape
+        Rows and columns of the fields.
+    transfer
+        Transfer function on the padded ``fftfreq`` grid, complex.
     """
 
     def __init__(self, shape: tuple[int, int], transfer: Tensor) -> None:
@@ -140,17 +147,52 @@ def by_columns(transfer: Tensor) -> Tensor:
 
 
 def frequencies(shape: tuple[int, int], pitch: float, device: torch.device | str = "cpu") -> tuple[Tensor, Tensor]:
-    """Spatial frequencies [1/m] of an FFT grid as a column ``(H, 1)`` and a row ``(1, W)``, float64."""
+    """Spatial frequencies of an FFT grid.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns.
+    pitch
+        Of the samples [m].
+    device
+        Of the result.
+
+    Returns
+    -------
+    fy, fx
+        A column ``(H, 1)`` and a row ``(1, W)`` [1/m], float64.
+
+    Examples
+    --------
+    >>> fy, fx = frequencies((2, 4), pitch=0.25)
+    >>> fx
+    tensor([[ 0.,  1., -2., -1.]], dtype=torch.float64)
+    """
     fy = torch.fft.fftfreq(shape[0], pitch, dtype=torch.float64, device=device)[:, None]
     fx = torch.fft.fftfreq(shape[1], pitch, dtype=torch.float64, device=device)[None, :]
     return fy, fx
 
 
 def iris(fy: Tensor, fx: Tensor, pitch: float, pupil: float | None) -> Tensor:
-    """Amplitude of a circular iris in the Fourier plane; diameter ``pupil`` of the panel's band 1/pitch, float64.
+    """Amplitude of a circular iris in the Fourier plane.
 
     The edge is a raised cosine from 0.95 to 1.05 of the radius: a hard one has tails across the whole image
     that only several times the padding removes, and an iris a little out of the Fourier plane is not hard.
+
+    Parameters
+    ----------
+    fy, fx
+        Spatial frequencies [1/m].
+    pitch
+        Of the panel [m].
+    pupil
+        Diameter of the iris as a fraction of the panel's band 1 / pitch, None for no iris.
+
+    Returns
+    -------
+    Tensor
+        The shape of ``fy`` and ``fx`` broadcast, in [0, 1], float64.
     """
     if pupil is None:
         return torch.ones_like(fy + fx, dtype=torch.float64)

@@ -11,9 +11,30 @@ from .angular_spectrum import check_geometry
 class Fraunhofer:
     """The field in the far field, or in the focal plane of a lens (Goodman, sections 4.3 and 5.2).
 
-    shape: (H, W) pixels; pitch, wavelength: metres; distance: metres of propagation, or the focal length.
-    The image has ``image_pitch`` (vertical, horizontal) metres a pixel and its origin at pixel (H // 2, W // 2).
-    Unitary: energy is conserved, and the constant phase and the quadratic phase of the image plane are dropped.
+    Unitary: energy is conserved, and the constant phase and the quadratic phase of the image plane are dropped. The
+    origin of the image is at pixel (H // 2, W // 2).
+
+    Parameters
+    ----------
+    shape
+        Rows and columns.
+    pitch, wavelength
+        Of the pixels and of the light [m].
+    distance
+        Of propagation, or the focal length [m].
+
+    Attributes
+    ----------
+    image_pitch
+        Of the image, vertical and horizontal [m].
+
+    Examples
+    --------
+    >>> model = Fraunhofer((64, 32), pitch=8e-6, wavelength=512e-9, distance=0.1)
+    >>> [round(1e6 * side) for side in model.image_pitch]
+    [100, 200]
+    >>> int(model.forward(torch.ones(64, 32, dtype=torch.complex64)).abs().argmax()) == 32 * 32 + 16
+    True
     """
 
     def __init__(self, shape: tuple[int, int], pitch: float, wavelength: float, distance: float) -> None:

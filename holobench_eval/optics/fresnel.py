@@ -14,10 +14,24 @@ from .padding import Padding, padded_shape
 
 
 class Fresnel(Convolution):
-    """Fresnel transfer-function propagation (Goodman, section 4.2), ``exp(-i pi lambda z f^2)``, carrier removed.
+    """Paraxial transfer-function propagation, ``exp(-i pi lambda z f^2)``, carrier removed (Goodman, section 4.2).
 
-    Parameters as ``AngularSpectrum``. The difference between the two is the model-approximation error of
-    paper Eq. 8.
+    The difference to ``AngularSpectrum`` is the model-approximation error of Chakravarthula et al. 2020, Eq. 8.
+
+    Parameters
+    ----------
+    shape, pitch, wavelength, distance, pupil, padding, dtype, device
+        As those of ``AngularSpectrum``.
+
+    Raises
+    ------
+    ValueError
+        A geometry without a meaning, or a wrong padding.
+
+    Examples
+    --------
+    >>> Fresnel((32, 32), pitch=6.4e-6, wavelength=517e-9, distance=1e-3).forward(torch.ones(32, 32)).shape
+    torch.Size([32, 32])
     """
 
     def __init__(
@@ -36,12 +50,13 @@ class Fresnel(Convolution):
             dtype = torch.complex128 if padding == "reference" else torch.complex64
         padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
         super().__init__(
-            (shape[0], shape[1]), _transfer(padded, pitch, wavelength, distance, pupil, dtype, torch.device(device))
+            (shape[0], shape[1]),
+            _paraxial_transfer(padded, pitch, wavelength, distance, pupil, dtype, torch.device(device)),
         )
 
 
 @lru_cache(maxsize=24)
-def _transfer(
+def _paraxial_transfer(
     padded: tuple[int, int],
     pitch: float,
     wavelength: float,

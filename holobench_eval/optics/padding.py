@@ -22,7 +22,25 @@ IRIS_EDGE = 0.05
 
 
 def spread(pitch: float, wavelength: float, distance: float, pupil: float | None = None) -> float:
-    """Pixels that light travels to each side: ``K = z tan(asin(lambda / 2p)) / p``; an iris scales the band."""
+    """Pixels that light travels to each side: ``K = z tan(asin(lambda / 2p)) / p``.
+
+    Parameters
+    ----------
+    pitch, wavelength, distance
+        Lengths [m].
+    pupil
+        Diameter of an iris as a fraction of the band, which it scales; None for no iris.
+
+    Returns
+    -------
+    float
+        Pixels.
+
+    Examples
+    --------
+    >>> round(spread(pitch=6.4e-6, wavelength=517e-9, distance=0.02))
+    126
+    """
     band = 1.0 if pupil is None else min(pupil * (1 + IRIS_EDGE), 1.0)
     sine = min(band * wavelength / (2 * pitch), 0.99)
     return abs(distance) * math.tan(math.asin(sine)) / pitch
@@ -47,11 +65,27 @@ def tail_error(size: int, spread_pixels: float, padded: int) -> float:
 def padded_size(
     size: int, spread_pixels: float, soft_edge: int | None, padding: Padding, error: float = DEFAULT_ERROR
 ) -> int:
-    """Samples per axis of the transform that propagates ``size`` pixels, rounded up to a fast FFT size.
+    """Samples of the transform that propagates the pixels of an axis, rounded up to a fast FFT size.
 
-    None: the smallest size whose tail error is below ``error`` (both axes together). With an iris inside the
-    band its soft edge leaves short tails, and ``N + K + soft_edge`` is enough (``soft_edge`` None: no such iris).
-    ``"reference"``: four times the size, more when the light spreads further. An integer: samples added.
+    Parameters
+    ----------
+    size
+        Pixels.
+    spread_pixels
+        See ``spread``.
+    soft_edge
+        Samples that the tails of the soft edge of an iris inside the band take: ``N + K + soft_edge`` is enough then.
+        None: no such iris.
+    padding
+        None: the smallest size whose tail error is below ``error``, both axes together. "reference": four times the
+        size, more when the light spreads further. An integer: samples added.
+    error
+        Relative rms, see ``tail_error``.
+
+    Raises
+    ------
+    ValueError
+        Another padding.
     """
     if padding == "reference":
         padded = 4 * size

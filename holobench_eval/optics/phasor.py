@@ -12,7 +12,22 @@ from torch.autograd.function import once_differentiable
 def phasor(amplitude: Tensor, phase: Tensor) -> Tensor:
     """``amplitude * exp(i phase)``, as ``torch.polar`` but several times as fast on a CPU.
 
-    amplitude: real, broadcast to the shape of phase [rad]; it gets no gradient. Differentiable once in the phase.
+    Parameters
+    ----------
+    amplitude
+        Real, broadcast to the shape of the phase; it gets no gradient.
+    phase
+        Any shape [rad]; differentiable once.
+
+    Returns
+    -------
+    Tensor
+        The shape of the phase, complex.
+
+    Examples
+    --------
+    >>> phasor(torch.tensor(2.0), torch.tensor([0.0, torch.pi / 2])).abs()
+    tensor([2., 2.])
     """
     field: Tensor = _Phasor.apply(amplitude.detach(), phase)  # type: ignore[no-untyped-call]
     return field

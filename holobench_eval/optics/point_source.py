@@ -17,11 +17,32 @@ TAPER = 0.1
 
 
 class PointSource(Convolution):
-    """The model of Chakravarthula et al. 2019: every pixel is a point source (paper Eq. 3), summed by FFT (Eq. 4).
+    """Every pixel is a point source, summed by FFT (Chakravarthula et al. 2020, Eq. 3 and 4).
 
-    shape: (H, W) pixels; pitch, wavelength, distance: metres. The convolution is linear, not circular. The kernel
-    exp(ik rho) / (i lambda rho) is cut where it oscillates faster than the pixels sample it, since beyond that
-    it would make ghosts; its phase is formed in float64 without the carrier exp(ikz).
+    The convolution is linear, not circular. The kernel exp(ik rho) / (i lambda rho) is cut where it oscillates faster
+    than the pixels sample it, since beyond that it would make ghosts; its phase is formed in float64 without the
+    carrier exp(ikz).
+
+    Parameters
+    ----------
+    shape
+        Rows and columns.
+    pitch, wavelength
+        Of the pixels and of the light [m].
+    distance
+        Negative to propagate back, not zero [m].
+    dtype, device
+        Those of the transfer function, and with it of the fields.
+
+    Raises
+    ------
+    ValueError
+        A geometry without a meaning, or no distance.
+
+    Examples
+    --------
+    >>> PointSource((32, 32), pitch=6.4e-6, wavelength=517e-9, distance=5e-3).forward(torch.ones(32, 32)).shape
+    torch.Size([32, 32])
     """
 
     def __init__(
@@ -36,14 +57,24 @@ class PointSource(Convolution):
         check_geometry(shape, pitch, wavelength, None)
         if distance == 0:
             raise ValueError("the point-source kernel needs a distance that is not zero")
-        transfer = _transfer((shape[0], shape[1]), pitch, wavelength, distance, dtype, torch.device(device))
+        transfer = _kernel_transfer((shape[0], shape[1]), pitch, wavelength, distance, dtype, torch.device(device))
         super().__init__((shape[0], shape[1]), transfer)
 
 
 def impulse_response(y: Tensor, x: Tensor, wavelength: float, distance: float) -> Tensor:
-    """Paper Eq. 3 at lateral offsets y, x [m], carrier removed, in 1/m^2; complex128.
+    """The kernel of a point source, carrier removed (Chakravarthula et al. 2020, Eq. 3).
 
-    A negative distance gives the conjugate, the field that converges.
+    Parameters
+    ----------
+    y, x
+        Lateral offsets [m].
+    wavelength, distance
+        Lengths [m]; a negative distance gives the conjugate, the field that converges.
+
+    Returns
+    -------
+    Tensor
+        complex128 [1/m^2].
     """
     z = abs(distance)
     r_squared = (y**2 + x**2).double()
@@ -55,7 +86,7 @@ def impulse_response(y: Tensor, x: Tensor, wavelength: float, distance: float) -
 
 
 @lru_cache(maxsize=8)
-def _transfer(
+def _kernel_transfer(
     shape: tuple[int, int],
     pitch: float,
     wavelength: float,
@@ -71,11 +102,11 @@ def _transfer(
         offsets.append(index * pitch)
     y, x = offsets[0][:, None], offsets[1][None, :]
     kernel = impulse_response(y, x, wavelength, distance) * pitch**2
-    kernel = kernel * _sampled(y, pitch, wavelength, distance) * _sampled(x, pitch, wavelength, distance)
+    kernel = kernel * _resolved(y, pitch, wavelength, distance) * _resolved(x, pitch, wavelength, distance)
     return as_used(torch.fft.fft2(kernel).to(dtype))
 
 
-def _sampled(offset: Tensor, pitch: float, wavelength: float, distance: float) -> Tensor:
+def _resolved(offset: Tensor, pitch: float, wavelength: float, distance: float) -> Tensor:
     """1 where the kernel oscillates slower than the pixels sample it, 0 where faster; soft, or the edge rings."""
     local = offset.abs() / (wavelength * torch.sqrt(offset**2 + distance**2)) * (2 * pitch)
     edge = ((local - 1 + TAPER) / (2 * TAPER)).clamp(0.0, 1.0)

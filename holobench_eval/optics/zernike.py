@@ -24,7 +24,28 @@ NAMES = {
 
 
 def noll(index: int) -> tuple[int, int]:
-    """Radial order n and azimuthal order m of Noll's single index (1 is piston); m < 0 is a sine term."""
+    """Orders of Noll's single index (Noll 1976, Table I).
+
+    Parameters
+    ----------
+    index
+        From 1, which is piston.
+
+    Returns
+    -------
+    n, m
+        Radial and azimuthal order; m < 0 is a sine term.
+
+    Raises
+    ------
+    ValueError
+        An index below 1.
+
+    Examples
+    --------
+    >>> noll(4), noll(8)
+    ((2, 0), (3, 1))
+    """
     if index < 1:
         raise ValueError(f"Noll's index starts at 1, got {index}")
     n = 0
@@ -37,7 +58,25 @@ def noll(index: int) -> tuple[int, int]:
 
 
 def zernike(index: int, y: Tensor, x: Tensor) -> Tensor:
-    """The polynomial of Noll's ``index`` at points of the plane (unit disc); its rms over the disc is 1."""
+    """A polynomial of Noll's orthonormal set (Noll 1976, Eq. 1 and 2).
+
+    Parameters
+    ----------
+    index
+        Noll's, from 1.
+    y, x
+        Points of the plane, one shape; the unit disc is the pupil.
+
+    Returns
+    -------
+    Tensor
+        The same shape; its rms over the disc is 1.
+
+    Examples
+    --------
+    >>> zernike(NAMES["defocus"], torch.zeros(1), torch.ones(1))
+    tensor([1.7321])
+    """
     n, m = noll(index)
     order = abs(m)
     rho = torch.sqrt(x * x + y * y)
@@ -54,7 +93,20 @@ def zernike(index: int, y: Tensor, x: Tensor) -> Tensor:
 
 
 def wavefront(waves: Mapping[str, float], y: Tensor, x: Tensor) -> Tensor:
-    """Sum of named terms, each given by its rms in waves over the unit disc; returns radians."""
+    """Sum of named Zernike terms.
+
+    Parameters
+    ----------
+    waves
+        Rms over the unit disc of each term, by its name in ``NAMES`` [waves].
+    y, x
+        Points of the plane; the unit disc is the pupil.
+
+    Returns
+    -------
+    Tensor
+        The shape of ``y`` and ``x`` broadcast [rad].
+    """
     total = torch.zeros_like(y + x)
     for name, amount in waves.items():
         total = total + 2 * math.pi * amount * zernike(NAMES[name], *torch.broadcast_tensors(y, x))

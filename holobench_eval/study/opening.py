@@ -8,12 +8,14 @@ import torch
 
 from ..core.device import CPU
 from ..core.errors import CellError, UserError
-from ..display import CalibratedBench, load_profile, open_bench
+from ..display import CalibratedBench, Profile, load_profile
 from ..display.simulated.changes import KINDS, altered
+from ..display.simulated.pipeline import SimulatedBench
 from ..lab.bench_file import load_bench_file
 from ..lab.live import open_live
 from ..lab.real import RealBench
 from ..lab.session import session_photographer
+from ..methods.fiducials import fiducial_phases
 from .displays import Condition, RealSource
 
 OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
@@ -58,6 +60,21 @@ def forget_sessions() -> None:
     """Open the benches behind session folders anew when they are next asked for: their files may have changed."""
     for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
         del _open[key]
+
+
+def open_bench(
+    profile: Profile,
+    panel: tuple[int, int] | None = None,
+    seed: int = 0,
+    registered_as: CalibratedBench | None = None,
+    device: torch.device = CPU,
+) -> CalibratedBench:
+    """The simulated bench of a profile on a panel of (rows, columns) pixels; ``seed`` names its noise.
+
+    registered_as: see ``CalibratedBench``; device: see ``SimulatedBench``.
+    """
+    bench = SimulatedBench(profile.scaled(panel), device)
+    return CalibratedBench(bench, seed, fiducial_phases, registered_as)
 
 
 def _opened(place: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:

@@ -18,7 +18,6 @@ from ..core.errors import CellError, LostDeviceError, Pending
 from ..core.io import now, write_atomically
 from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
-from ..display.simulated.effects import effects
 from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
 from ..lab.real import RealBench
@@ -106,7 +105,7 @@ def diagnosis(method: object, state: Mapping[str, Any], place: CalibratedBench |
             known = () if isinstance(place, RealBench) else truth(place.bench)
             found["estimates"] = joined(estimates(state, place.spec), known)
         if form is not None and not isinstance(place, RealBench):
-            found["missing"] = [one.text for one in effects(place.bench.profile) if one.name not in form]
+            found["missing"] = [one.text for one in place.bench.profile.effects() if one.name not in form]
     except Exception as error:  # must not cost what was learned
         found["diagnosis_failed"] = " ".join(f"{type(error).__name__}: {error}".split())[:300]
     return found

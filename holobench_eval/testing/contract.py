@@ -11,7 +11,8 @@ from torch import Tensor
 from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
-from ..display import CalibratedBench, MeteredDisplay, load_profile, open_bench
+from ..display import CalibratedBench, MeteredDisplay, load_profile
+from ..study.opening import open_bench
 from ..study.versions import method_version
 
 PLAIN_PANEL, CAMERA_PANEL = (64, 64), (128, 128)

@@ -49,13 +49,13 @@ class Pose:
     ambient: float
     electrons: float
 
-    def corner_error(self, told: Array) -> float:
-        """Largest distance [region px] of the region's corners from where ``told`` ``(4, 2)`` [sensor px] has them.
+    def corner_error(self, corners: Array) -> float:
+        """Largest distance [region px] of the region's corners from where ``corners`` ``(4, 2)`` [sensor px] are.
 
         Order of the corners as in `Warp.corners`.
         """
-        found = _mapped(np.asarray(np.linalg.inv(self.homography), dtype=np.float64), told)
-        return float(np.linalg.norm(found - corner_points(self.shape), axis=1).max())
+        measured = _mapped(np.asarray(np.linalg.inv(self.homography), dtype=np.float64), corners)
+        return float(np.linalg.norm(measured - corner_points(self.shape), axis=1).max())
 
 
 def corner_points(shape: tuple[int, int]) -> Array:
@@ -84,13 +84,13 @@ def random_pose(number: int, shape: tuple[int, int] | None = None) -> Pose:
     low, size = corners.min(axis=0), np.ptp(corners, axis=0)
     room = size * draw.uniform(0.08, 0.6, 2) + 8
     sensor = np.ceil(size + room).astype(int)
-    place = np.eye(3)
-    place[:2, 2] = 4 + draw.uniform(0, 1, 2) * (room - 8) - low
+    offset = np.eye(3)
+    offset[:2, 2] = 4 + draw.uniform(0, 1, 2) * (room - 8) - low
     return Pose(
         number=number,
         shape=shape,
         sensor=(int(sensor[1]), int(sensor[0])),
-        homography=place @ homography,
+        homography=offset @ homography,
         quarter_turns=quarter_turns,
         mirrored=mirrored,
         perspective=perspective,

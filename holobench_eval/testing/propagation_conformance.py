@@ -79,8 +79,8 @@ def direct_sum(field: Tensor, rows: Tensor, columns: Tensor, distance: float) ->
     return out
 
 
-def _relative(found: Tensor, right: Tensor) -> float:
-    return float((found - right).norm() / right.norm())
+def _relative(image: Tensor, right: Tensor) -> float:
+    return float((image - right).norm() / right.norm())
 
 
 def _sum_error(make: Make, size: int, waist: float, distance: float) -> float:
@@ -88,9 +88,9 @@ def _sum_error(make: Make, size: int, waist: float, distance: float) -> float:
     field = gaussian_beam((size, size), waist)
     draw = generator("conformance", "points", size)
     points = torch.randint(size // 4, 3 * size // 4, (2, 64), generator=draw)
-    found = make((size, size), PITCH, WAVELENGTH, distance).forward(field.to(torch.complex64))
+    image = make((size, size), PITCH, WAVELENGTH, distance).forward(field.to(torch.complex64))
     right = direct_sum(field, points[0], points[1], distance)
-    return _relative(found[points[0], points[1]].to(torch.complex128), right)
+    return _relative(image[points[0], points[1]].to(torch.complex128), right)
 
 
 def _adjointness(make: Make) -> float:
@@ -104,8 +104,8 @@ def _adjointness(make: Make) -> float:
 
 def _energy(make: Make) -> float:
     field = gaussian_beam((128, 128), 120e-6).to(torch.complex64)
-    found = make((128, 128), PITCH, WAVELENGTH, 0.02).forward(field)
-    return abs(float(found.abs().square().sum() / field.abs().square().sum()) - 1)
+    image = make((128, 128), PITCH, WAVELENGTH, 0.02).forward(field)
+    return abs(float(image.abs().square().sum() / field.abs().square().sum()) - 1)
 
 
 def _centring(make: Make) -> float:
@@ -124,8 +124,8 @@ def _wrap_around(make: Make) -> float:
     """Share of the energy that is still in the window after a tilted beam has left it on the right."""
     size, distance = 96, 0.03
     field = gaussian_beam((size, size), 60e-6, tilt=(0.0, 0.35)).to(torch.complex64)
-    found = make((size, size), PITCH, WAVELENGTH, distance).forward(field)
-    return float(found.abs().square().sum() / field.abs().square().sum())
+    image = make((size, size), PITCH, WAVELENGTH, distance).forward(field)
+    return float(image.abs().square().sum() / field.abs().square().sum())
 
 
 def _round_trip(make: Make) -> float:

@@ -45,10 +45,10 @@ def outcome(pose: Pose) -> Outcome:
     """Register the photograph of one pose."""
     frame = torch.from_numpy(photograph(pose))
     try:
-        found = register(frame[None], fiducial(pose.shape))
+        registration = register(frame[None], fiducial(pose.shape))
     except CellError as error:
         return Outcome(pose, float("nan"), str(error))
-    return Outcome(pose, pose.corner_error(found.warps[0].corners()), "")
+    return Outcome(pose, pose.corner_error(registration.warps[0].corners()), "")
 
 
 def outcomes(numbers: Iterable[int] = range(POSES)) -> list[Outcome]:
@@ -100,15 +100,15 @@ def main(poses: int = POSES) -> int:
 
 def conforms(seen: list[Outcome]) -> bool:
     """Whether these outcomes are what is asked of registration."""
-    found = errors(seen)
-    refused = float(np.mean(np.isnan(found)))
+    corner_errors = errors(seen)
+    refused = float(np.mean(np.isnan(corner_errors)))
     silent = any(each.silently_wrong for each in seen)
-    return not silent and refused <= REFUSED and bool(np.nanmedian(found) <= MEDIAN_ERROR)
+    return not silent and refused <= REFUSED and bool(np.nanmedian(corner_errors) <= MEDIAN_ERROR)
 
 
 def _row(name: str, seen: list[Outcome]) -> None:
-    found = errors(seen)
-    told = found[np.isfinite(found)]
-    numbers = [*np.percentile(told, (50, 95)), told.max()] if len(told) else [float("nan")] * 3
+    corner_errors = errors(seen)
+    finite = corner_errors[np.isfinite(corner_errors)]
+    numbers = [*np.percentile(finite, (50, 95)), finite.max()] if len(finite) else [float("nan")] * 3
     text = "".join(f"{number:>9.3f}" for number in numbers)
-    print(f"{name:<22}{len(found):>6}{int(np.isnan(found).sum()):>9}{text}")
+    print(f"{name:<22}{len(seen):>6}{len(seen) - len(finite):>9}{text}")

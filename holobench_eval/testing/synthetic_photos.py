@@ -95,10 +95,10 @@ def _other_shapes(shape: tuple[int, int]) -> list[tuple[int, int]]:
 
 def _halves(shape: tuple[int, int]) -> list[tuple[str, tuple[slice, slice]]]:
     middle = (shape[0] // 2, shape[1] // 2)
-    every = slice(None)
+    full = slice(None)
     return [
-        ("upper", (slice(None, middle[0]), every)),
-        ("lower", (slice(middle[0], None), every)),
-        ("left", (every, slice(None, middle[1]))),
-        ("right", (every, slice(middle[1], None))),
+        ("upper", (slice(None, middle[0]), full)),
+        ("lower", (slice(middle[0], None), full)),
+        ("left", (full, slice(None, middle[1]))),
+        ("right", (full, slice(middle[1], None))),
     ]

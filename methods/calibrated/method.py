@@ -19,7 +19,7 @@ from .patterns import pattern_samples
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
-    from ...display.calibrated import MeteredDisplay
+    from ...display.metered import MeteredDisplay
     from ...display.training import TrainingBench, TrainingImage
     from .approximator import ModelApproximator
 

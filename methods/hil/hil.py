@@ -23,7 +23,7 @@ from .retrieval import Image, Retrieval, check_region, retrieve
 from .start import SmoothStart
 
 if TYPE_CHECKING:
-    from ...display.calibrated import MeteredDisplay
+    from ...display.metered import MeteredDisplay
     from ...display.training import TrainingBench, TrainingImage
 
 

@@ -22,7 +22,7 @@ from .retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
-    from ...display.calibrated import MeteredDisplay
+    from ...display.metered import MeteredDisplay
     from ...display.training import TrainingBench, TrainingImage
 
 

@@ -15,11 +15,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from ...core.errors import UserError
-from ...metrics.feature_distance import SMALLEST as SMALLEST_PERCEPTUAL
+from ...metrics.feature_distance import SMALLEST_MOFD as SMALLEST_PERCEPTUAL
 from ...metrics.feature_distance import FixedMofd
 from ...metrics.lpips import available, lpips
-from ...metrics.ms_ssim import SMALLEST as SMALLEST_MS_SSIM
-from ...metrics.ms_ssim import FixedMsSsim
+from ...metrics.ms_ssim import SMALLEST_MS_SSIM, FixedMsSsim
 from ...optics import srgb_encode
 from ..descent import Best, cosine_decay
 from .judge import Judge

@@ -11,7 +11,8 @@ import torch
 from holobench_eval.commands.new_method import write_method
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
-from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display import load_profile
+from holobench_eval.study.opening import open_bench
 
 
 def test_a_new_method_passes_its_own_test(tmp_path: Path) -> None:

@@ -12,13 +12,14 @@ from torch import Tensor
 
 from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU, repeatable
-from holobench_eval.display import CalibratedBench, load_profile, open_bench
+from holobench_eval.display import CalibratedBench, load_profile
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.retrieval import Retrieval, retrieve
 from holobench_eval.optics import AngularSpectrum
 from holobench_eval.study import cost
+from holobench_eval.study.opening import open_bench
 
 pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
 

@@ -19,6 +19,7 @@ from holobench_eval.display.learned import LearnedBench
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.methods.calibrated.method import ThroughModel
+from holobench_eval.methods.fiducials import fiducial_phases
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
@@ -58,7 +59,7 @@ class Registered:
 def bench(name: str, **stages: Any) -> CalibratedBench:
     profile = replace(load_profile(name).scaled(PANEL), **stages)
     registered: Any = SimpleNamespace(registration=Registered(profile.spec().region.shape))
-    return CalibratedBench(SimulatedBench(profile, ELSEWHERE), 0, registered_as=registered)
+    return CalibratedBench(SimulatedBench(profile, ELSEWHERE), 0, fiducial_phases, registered)
 
 
 @pytest.fixture(scope="module")

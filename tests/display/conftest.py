@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.simulated.stages import Geometry
+from holobench_eval.display.simulated.geometry import Geometry
 
 PANEL = (96, 128)
 

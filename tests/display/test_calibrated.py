@@ -2,8 +2,11 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import BudgetError, CellError
-from holobench_eval.display import load_profile, open_bench
-from holobench_eval.display.calibrated import MeteredDisplay, white_irradiance
+from holobench_eval.display import CalibratedBench, Profile, load_profile
+from holobench_eval.display.api import white_irradiance
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.imaging import Registration
+from holobench_eval.study.opening import open_bench
 from holobench_eval.testing.propagation_conformance import gaussian_beam
 
 PANEL = (192, 192)
@@ -100,10 +103,17 @@ def test_dark_targets_have_a_finite_exposure(bench):
     assert torch.isfinite(white_irradiance(torch.zeros(3, 8, 8), bench.spec)).all()
 
 
-def test_handle_is_what_the_methods_expect(bench, target):
+def test_a_handle_gives_the_nominal_optics_and_nothing_of_the_bench(bench, target):
     handle = bench.for_method(object(), "m", target, "t", 0)
-    assert isinstance(handle, MeteredDisplay)
     assert handle.spec is bench.spec
+    assert torch.equal(handle.light, white_irradiance(target, bench.spec))
+    refused, hidden = set(), (CalibratedBench, SimulatedBench, Profile, Registration)
+    for name in (name for name in dir(handle) if not name.startswith("_")):
+        try:
+            assert not isinstance(getattr(handle, name), hidden), name
+        except CellError:
+            refused.add(name)
+    assert refused == {"simulation", "learned"}
 
 
 def test_simulation_is_the_noise_free_capture_in_the_target_frame(target):

@@ -5,7 +5,7 @@ import torch
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.display import load_profile
-from holobench_eval.display.calibrated import MeteredDisplay
+from holobench_eval.display.metered import MeteredDisplay
 
 PANEL = (96, 128)
 

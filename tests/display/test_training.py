@@ -2,8 +2,9 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import BudgetError, CellError
-from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display import load_profile
 from holobench_eval.display.training import TrainingBench, TrainingImage
+from holobench_eval.study.opening import open_bench
 
 PANEL = (128, 128)
 

@@ -11,8 +11,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.api import DisplaySpec, Region
-from holobench_eval.display.calibrated import white_irradiance
+from holobench_eval.display.api import DisplaySpec, Region, white_irradiance
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import LookUpTable, ZeroOrder
 from holobench_eval.methods.display_model import KNOTS, MODES, DisplayModel

@@ -17,6 +17,7 @@ from holobench_eval.display.simulated.stages.relay import sample
 from holobench_eval.imaging.convention import Levels
 from holobench_eval.lab.devices import Counts, DeviceError
 from holobench_eval.lab.test_pattern import draw_pattern
+from holobench_eval.methods.fiducials import fiducial_phases
 from holobench_eval.methods.initial_phase import InitialPhase
 from holobench_eval.methods.wirtinger import Wirtinger
 
@@ -42,7 +43,7 @@ def bench(profile: str = "leto-mild") -> SimulatedBench:
 @lru_cache(maxsize=4)
 def pattern_phase(profile: str = "leto-mild", initial_phase: InitialPhase = "random") -> Tensor:
     """Hologram ``(3, H, W)`` of the test pattern from nominal optics."""
-    display = CalibratedBench(bench(profile), 0)
+    display = CalibratedBench(bench(profile), 0, fiducial_phases)
     target = draw_pattern(display.spec.region.shape).expand(3, -1, -1)
     handle = display.for_method(Wirtinger(), "wirtinger", target, "letter", 0)
     return Wirtinger(iterations=30, initial_phase=initial_phase).solve(target[None], handle)[0]

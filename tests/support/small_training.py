@@ -14,8 +14,9 @@ from torch import Tensor
 from torch.nn import functional
 
 from holobench_eval.core import seeds
-from holobench_eval.display.api import Capture, DisplaySpec, Region
-from holobench_eval.display.calibrated import CalibratedBench, MeteredDisplay, white_irradiance
+from holobench_eval.display.api import Capture, DisplaySpec, Region, white_irradiance
+from holobench_eval.display.calibrated import CalibratedBench
+from holobench_eval.display.metered import MeteredDisplay
 from holobench_eval.display.training import TrainingBench, TrainingImage
 
 

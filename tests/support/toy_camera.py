@@ -11,8 +11,8 @@ from torch.nn import functional
 
 from holobench_eval.core import seeds
 from holobench_eval.core.errors import BudgetError
-from holobench_eval.display.api import Capture, DisplaySpec, Region
-from holobench_eval.display.calibrated import MeteredDisplay, white_irradiance
+from holobench_eval.display.api import Capture, DisplaySpec, Region, white_irradiance
+from holobench_eval.display.metered import MeteredDisplay
 
 SPEC = DisplaySpec(
     name="toy",

@@ -9,7 +9,7 @@ from skimage import data
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.imaging import Warp, fiducial, register
-from holobench_eval.imaging.grid_check import impostor
+from holobench_eval.imaging.grid_check import mismatch
 from holobench_eval.testing.grid_poses import corner_points, photograph, random_pose, speckle
 from holobench_eval.testing.registration_conformance import Outcome, accepted_impostors, conforms, errors, outcomes
 
@@ -84,9 +84,9 @@ def test_circles_that_go_on_and_circles_in_between_are_told_apart_from_the_grid_
         beside = np.array([[1, 0, spacings * grid.spacing], [0, 1, 0], [0, 0, 1]])
         return photograph(pose) + photograph(replace(pose, homography=pose.homography @ beside))
 
-    assert impostor(photograph(pose), warp, grid) is None
-    assert "go on beyond 8x8" in (impostor(with_another(1.0), warp, grid) or "")
-    assert "not this grid alone" in (impostor(with_another(0.5), warp, grid) or "")
+    assert mismatch(photograph(pose), warp, grid) is None
+    assert "go on beyond 8x8" in (mismatch(with_another(1.0), warp, grid) or "")
+    assert "not this grid alone" in (mismatch(with_another(0.5), warp, grid) or "")
 
 
 def test_conformance_wants_few_refusals_small_errors_and_no_silent_ones():

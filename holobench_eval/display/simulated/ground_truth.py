@@ -9,8 +9,7 @@ from ...optics.convolution import iris
 from ..estimates import MODES, Estimate, disc, estimate, focusing, reach, stroke, undiffracted, zernike_waves
 from .pipeline import SimulatedBench
 
-LEVELS = 17
-"""Gray levels, the two at the wrap left out, at which the stroke is read."""
+LEVELS = 17  # gray levels at which the stroke is read, the two at the wrap left out
 
 
 def truth(bench: SimulatedBench) -> list[Estimate]:
@@ -23,13 +22,11 @@ def truth(bench: SimulatedBench) -> list[Estimate]:
     Zernikes: aberration, and errors of distance and wavelength, over the iris, and the second order of the beam's
     phase as ``estimates.focusing`` has it.
     """
-    told = []
-    for colour in range(len(bench.channels)):
-        told += [*_panel(bench, colour), *_optics(bench, colour)]
-    return told
+    colours = range(len(bench.channels))
+    return [item for colour in colours for item in (*_panel_truth(bench, colour), *_optics_truth(bench, colour))]
 
 
-def _panel(bench: SimulatedBench, colour: int) -> list[Estimate]:
+def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     profile, maps = bench.profile, bench.channels[colour]
     gain = maps.lut_gain.double().mean().cpu() * bench.drift_gain
     levels = torch.arange(1, LEVELS - 1, dtype=torch.float64) / (LEVELS - 1)
@@ -52,7 +49,7 @@ def _passed(bench: SimulatedBench) -> float:
     return float(iris(fy, fx, panel.pitch, panel.pupil))
 
 
-def _optics(bench: SimulatedBench, colour: int) -> list[Estimate]:
+def _optics_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     panel, way, geometry = bench.profile.panel, bench.profile.propagation, bench.channels[colour].geometry
     edge = (panel.pupil or 1.0) / (2 * panel.pitch)
     fy, fx = (axis * edge for axis in disc())

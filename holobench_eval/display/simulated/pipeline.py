@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add, mul
 
 import torch
 from torch import Tensor
@@ -15,21 +17,22 @@ from ...optics.padding import padded_shape
 from ...optics.phase import blaze
 from ...optics.phasor import phasor, squared_modulus
 from ..api import Capture, DisplaySpec
+from .geometry import Geometry
 from .path import Dust, OpticalPath, panel_spectrum
 from .profile import Profile
-from .stages import Geometry, Relay
-from .stages.eye import eye_phase
+from .stages.panel import straight_through_level
 from .stages.propagation import sample_weights
-from .stages.quantise import straight_through_level
-from .stages.relay import box_filter, sample, sampling_grid
+from .stages.relay import sample, sampling_grid
+from .stages.sensor import IMAGE_SAMPLES
 
 
 @dataclass(frozen=True)
 class ChannelMaps:
-    """What is fixed for one colour channel: every random pattern drawn, every transfer function built.
+    """What is fixed for one line of the source: every random pattern drawn, every transfer function built.
 
     added: phase [rad] that the display adds to every hologram; lut_gain; amplitude and angle [rad] of the incident
-    light: ``(H, W)``; path: all that is linear in the light, and the light that no phase changes.
+    light: ``(H, W)``; path: all that is linear in the light, and the light that no phase changes; laser_power: of the
+    line, relative to what the camera's exposure was set for.
     """
 
     geometry: Geometry
@@ -55,9 +58,23 @@ class ChannelMaps:
 class SimulatedBench:
     """A display that behaves like hardware. Methods see it through ``session``; only the oracle sees inside.
 
-    profile: already scaled to its panel. Its name and seed draw every fixed pattern, so that another seed is another
-    bench of the same kind. device: where light is computed, from the phase to what falls on the sensor; what is fixed
-    is drawn and built on the CPU and moved there. The sensor counts on the CPU, and so a ``Capture`` is there.
+    Parameters
+    ----------
+    profile
+        Already scaled to its panel. Its name and seed draw every fixed pattern, so that another seed is another bench
+        of the same kind.
+    device
+        Where light is computed, from the phase to what falls on the sensor; what is fixed is drawn and built on the CPU
+        and moved there. The sensor counts on the CPU, and so a ``Capture`` is there.
+
+    Examples
+    --------
+    >>> from holobench_eval.display.simulated.profile import load_profile
+    >>> bench = SimulatedBench(load_profile("ideal").scaled((64, 64)))
+    >>> bench.intensity(torch.zeros(64, 64), channel=1).shape
+    torch.Size([64, 64])
+    >>> bench.session("example", exposure=(100.0,) * 3).capture(torch.zeros(3, 64, 64)).frame.dtype
+    torch.float32
     """
 
     def __init__(self, profile: Profile, device: torch.device = CPU) -> None:
@@ -66,7 +83,7 @@ class SimulatedBench:
         self.spec: DisplaySpec = profile.spec()
         panel = profile.panel
         self.samples = profile.sampling
-        self.image_samples = min(profile.sampling, 2)
+        self.image_samples = min(profile.sampling, IMAGE_SAMPLES)
         names = ("bench", profile.name, profile.seed)
         self.ramp = blaze(panel.shape, panel.blaze)
         self.weights = sample_weights(self._padded(), self.samples, panel.blaze, hold=profile.aperture is not None)
@@ -77,43 +94,45 @@ class SimulatedBench:
         grid = (self.samples, self.samples, 1, 1)
         self.modulated = (order.modulated * active).view(grid).to(device)
         self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid)
-        self.channels = tuple(
-            self._channel(
-                Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names)
-            ).to(device)
+        geometries = [
+            Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names)
             for index, wavelength in enumerate(panel.wavelengths)
-        )
-        geometry = self.channels[0].geometry
+        ]
+        geometry = geometries[0]
+        today = profile.drift.moved(profile, geometry)
+        lines = ((self._maps(today, *line).to(device) for line in self._lines(each)) for each in geometries)
+        self.lines = tuple(tuple(maps) for maps in lines)
+        self.channels = tuple(lines[0] for lines in self.lines)
         self.drift_gain = profile.drift.phase_gain(geometry)
-        self.points = self._pose(geometry).panel_points(
+        self.points = today.relay.panel_points(
             panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape
         )
         self.grid = sampling_grid(self.points, panel.shape).to(device)
         self.response = profile.sensor.response((self.points.shape[0], self.points.shape[1]), geometry)
 
-    def _channel(self, geometry: Geometry) -> ChannelMaps:
-        profile = self.profile
-        drift = profile.drift.added_tilt(geometry)
-        tilt = profile.illumination.tilt
-        light = replace(profile.illumination, tilt=(tilt[0] + drift[0], tilt[1] + drift[1]))
-        ramp = blaze(geometry.shape, profile.panel.blaze)
+    def _lines(self, geometry: Geometry) -> list[tuple[float, Geometry]]:
+        """Share of the power and geometry of every line of a channel's source."""
+        lines = [(1.0, geometry)]
+        for stage in self.profile.stages:
+            lines = [(part * share, line) for part, source in lines for share, line in stage.spectrum(source)]
+        return lines
+
+    def _maps(self, profile: Profile, share: float, geometry: Geometry) -> ChannelMaps:
+        stages, ramp, noise = profile.stages, self.ramp, profile.coherent_noise
         demodulation = torch.polar(torch.ones_like(ramp), -ramp)
-        incident = light.field(geometry) * profile.coherent_noise.panel(geometry) * demodulation
+        incident = reduce(mul, present(stage.panel(geometry) for stage in stages)) * demodulation
         if profile.drift.days:
-            incident = incident * profile.drift.dust(geometry, profile.coherent_noise).to(incident.dtype)
-        plane = profile.coherent_noise.plane(geometry)
-        turning = 1 - profile.coherent_noise.plane_distance if plane is not None else 1.0
-        padded, pupil, way = self._padded(), profile.panel.pupil, profile.propagation
-        transfer = way.transfer(geometry, padded, pupil, (0.0, turning))
-        last = None if plane is None else way.transfer(geometry, padded, pupil, (turning, 1.0))
-        if any(profile.eye.focus):
-            fy, fx = frequencies(padded, geometry.pitch)
-            phase = eye_phase(profile.eye.focus, fy, fx, geometry.wavelength, geometry.distance)
-            eye = torch.polar(torch.ones_like(phase), phase).to(transfer.dtype)
-            transfer, last = (transfer * eye, None) if last is None else (transfer, last * eye)
+            incident = incident * profile.drift.dust(geometry, noise).to(incident.dtype)
+        plane, padded = noise.plane(geometry), self._padded()
+        turning = 1.0 if plane is None else 1 - noise.plane_distance
+        ends = [(0.0, 1.0)] if plane is None else [(0.0, turning), (turning, 1.0)]
+        legs = [profile.propagation.transfer(geometry, padded, profile.panel.pupil, leg) for leg in ends]
+        fy, fx = frequencies(padded, geometry.pitch)
+        for factor in present(stage.transmission(fy, fx, geometry) for stage in stages):
+            legs[-1] = legs[-1] * factor.to(legs[-1].dtype)
         return ChannelMaps(
             geometry=geometry,
-            added=self.ramp + profile.lens.phase(geometry) if any(profile.lens.move) else self.ramp,
+            added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp),
             lut_gain=profile.lut.gain_map(geometry),
             amplitude=incident.abs(),
             angle=incident.angle(),
@@ -122,12 +141,12 @@ class SimulatedBench:
                 rows=self.weights[0],
                 columns=self.weights[1],
                 still=by_columns(panel_spectrum(self.unmodulated * incident, *self.weights)),
-                transfer=by_columns(transfer),
-                dust=None if plane is None else Dust.of(plane.to(transfer.dtype)),
-                last=None if last is None else by_columns(last),
+                transfer=by_columns(legs[0]),
+                dust=None if plane is None else Dust.of(plane.to(legs[0].dtype)),
+                last=None if plane is None else by_columns(legs[1]),
                 finer=self.image_samples,
             ),
-            laser_power=profile.drift.laser_power(geometry) * light.power,
+            laser_power=profile.drift.laser_power(geometry) * profile.illumination.power * share,
         )
 
     def _padded(self) -> tuple[int, int]:
@@ -135,35 +154,46 @@ class SimulatedBench:
         panel = self.profile.panel
         return padded_shape(panel.shape, panel.pitch, max(panel.wavelengths), panel.distance, panel.pupil, None)
 
-    def _pose(self, geometry: Geometry) -> Relay:
-        moved = self.profile.drift.added_shift(geometry)
-        shift = self.profile.relay.shift
-        return replace(self.profile.relay, shift=(shift[0] + moved[0], shift[1] + moved[1]))
-
-    def modulated_field(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
+    def _modulated_field(self, phase: Tensor, maps: ChannelMaps, flicker: float) -> Tensor:
         """Field ``(samples, samples, H, W)`` of the sub-samples' light that follows ``phase`` ``(H, W)`` [rad].
 
         The carrier is off. The light that follows no phase is in ``ChannelMaps.path``.
         """
-        profile, maps = self.profile, self.channels[channel]
+        profile, gain = self.profile, maps.lut_gain * (flicker * self.drift_gain)
         level = straight_through_level(phase + maps.added, profile.panel.bits)
-        shown = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * (flicker * self.drift_gain), channel)
-        fine = profile.crosstalk.apply(shown, self.crosstalk).view(self.samples, self.samples, *shown.shape)
+        driven = profile.lut.phase(level, profile.panel.bits, gain, maps.geometry.channel)
+        fine = profile.crosstalk.apply(driven, self.crosstalk).view(self.samples, self.samples, *driven.shape)
         return phasor(self.modulated * maps.amplitude, fine + maps.angle)
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
-        """Noise-free intensity at the image plane, ``image_samples`` a pixel; differentiable in ``phase`` ``(H, W)``.
+        """Noise-free intensity at the image plane.
 
-        Unit: the mean incident intensity on the panel.
+        Parameters
+        ----------
+        phase
+            ``(H, W)`` [rad]; the result is differentiable in it.
+        channel
+            Index of the colour.
+        flicker
+            Phase gain of the frame.
+
+        Returns
+        -------
+        Tensor
+            ``(n H, n W)`` for n = ``image_samples``; the mean incident intensity on the panel is 1.
         """
-        maps = self.channels[channel]
-        return squared_modulus(maps.path.image(self.modulated_field(phase, channel, flicker))) * maps.laser_power
+        lines = (
+            squared_modulus(maps.path.image(self._modulated_field(phase, maps, flicker))) * maps.laser_power
+            for maps in self.lines[channel]
+        )
+        return reduce(add, lines)
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
-        """Intensity as in ``intensity``, averaged over the area of a sensor pixel."""
-        profile = self.profile
-        sensor_pixel = profile.sensor.pitch / (profile.relay.magnification * profile.panel.pitch)
-        return box_filter(self.intensity(phase, channel, flicker), self.image_samples * sensor_pixel)
+        """``intensity`` as it falls on the sensor: after what spreads it, averaged over the area of a sensor pixel."""
+        light = self.intensity(phase, channel, flicker)
+        for stage in self.profile.stages:
+            light = stage.image(light, self.profile, self.channels[channel].geometry)
+        return light
 
     def image(self, phase: Tensor) -> Tensor:
         """``integrated`` of every channel at the panel's pixels, ``(C, H, W)``; differentiable."""
@@ -184,6 +214,11 @@ class SimulatedBench:
             frames.append(sensor.expose(light, exposure[channel], self.response, draw))
         gain = tuple(electrons * sensor.counts_per_electron for electrons in exposure)
         return Capture(torch.stack(frames), sensor.dark, sensor.white, gain[: len(frames)])
+
+
+def present(tensors: Iterable[Tensor | None]) -> Iterator[Tensor]:
+    """Those that are there."""
+    return (tensor for tensor in tensors if tensor is not None)
 
 
 @dataclass

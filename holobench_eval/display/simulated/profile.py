@@ -1,4 +1,4 @@
-"""Bench profiles: a named, versioned, seeded set of parameters, one YAML file each."""
+"""Bench profiles: a named, versioned, seeded set of parameters, one YAML file each; the list of stages."""
 
 from __future__ import annotations
 
@@ -6,23 +6,26 @@ import hashlib
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args, get_type_hints
 
 from annotated_types import Interval, MinLen
 
 from ...core.errors import UserError, suggest
 from ...core.schema import typed
 from ...core.yaml_source import load
-from ..api import DisplaySpec, Region
+from ..api import DisplaySpec
+from .stage import Effect, Stage
 from .stages import (
     AddedLens,
     CoherentNoise,
     Crosstalk,
     Drift,
+    DustPlane,
     Eye,
     Flicker,
     Illumination,
     LookUpTable,
+    Panel,
     PixelAperture,
     Propagation,
     Relay,
@@ -34,46 +37,31 @@ SMALLEST_PANEL, LARGEST_PANEL = 64, 8192
 
 
 @dataclass(frozen=True)
-class Panel:
-    """The nominal, public part of a profile.
-
-    shape (rows, columns) and distance [m] belong together: on a smaller panel the distance shrinks with the rows.
-    pitch [m]; wavelengths [m] of red, green, blue, or a single one; bits; pupil: diameter of the iris as a fraction of
-    the band (null: none); blaze: (vertical, horizontal) cycles per pixel that the display adds and re-centres;
-    region: side of the scored window as a fraction of the panel's.
-    """
-
-    shape: tuple[int, int]
-    pitch: Annotated[float, Interval(gt=0, lt=1e-3)]
-    wavelengths: tuple[float] | tuple[float, float, float]
-    distance: Annotated[float, Interval(gt=0, lt=10)]
-    bits: Annotated[int, Interval(ge=1, le=16)]
-    pupil: Annotated[float, Interval(gt=0, le=1)] | None = None
-    blaze: tuple[float, float] = (0.0, 0.0)
-    region: Annotated[float, Interval(gt=0.1, le=1)] = 1.0
-
-    def spec(self, name: str) -> DisplaySpec:
-        """The nominal optics of a display of that name."""
-        height, width = (max(1, round(self.region * size)) for size in self.shape)
-        return DisplaySpec(
-            name=name,
-            shape=self.shape,
-            pitch=self.pitch,
-            wavelengths=self.wavelengths,
-            distance=self.distance,
-            bits=self.bits,
-            pupil=self.pupil,
-            region=Region((self.shape[0] - height) // 2, (self.shape[1] - width) // 2, height, width),
-        )
-
-
-@dataclass(frozen=True)
 class Profile:
-    """A simulated bench: the nominal panel, then every stage that light meets, in order.
+    """A simulated bench: the nominal panel, then every stage, a field each, in the order in which light meets them.
 
-    sampling: sub-samples per pixel and axis at the panel (crosstalk and fill factor need at least 3);
-    residual_bound: largest registration residual [region px, rms] with which a study may run;
-    digest: sha256 of the file.
+    Parameters
+    ----------
+    name, version, seed, description
+        What the profile is called; name and seed draw every random pattern, and a change of any value is a new version.
+    panel
+        The nominal, public part.
+    sampling
+        Sub-samples per pixel and axis at the panel; crosstalk and fill factor need at least 3.
+    lens to drift
+        The stages. ``dust_plane`` has no keys of its own: its parameters are in ``coherent_noise``.
+    residual_bound
+        Largest registration residual with which a study may run [region px, rms].
+    digest
+        sha256 of the file.
+
+    Examples
+    --------
+    >>> profile = load_profile("leto-aged").scaled((256, 256))
+    >>> profile.panel.shape, profile.spec().bits
+    ((256, 256), 8)
+    >>> [effect.name for effect in load_profile("ideal").effects()]
+    ['quantisation']
     """
 
     name: Annotated[str, MinLen(1)]
@@ -92,16 +80,36 @@ class Profile:
     propagation: Propagation = field(default_factory=Propagation)
     eye: Eye = Eye()
     zero_order: ZeroOrder = ZeroOrder()
+    dust_plane: DustPlane = field(default=DustPlane(), metadata={"key": False})
     relay: Relay = Relay()
     sensor: Sensor = Sensor()
     drift: Drift = Drift()
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
     digest: str = field(default="", metadata={"key": False})
 
+    @property
+    def stages(self) -> list[Stage]:
+        """The stages, in the order in which light meets them."""
+        return [stage for name in STAGES if (stage := getattr(self, name)) is not None]
+
+    def effects(self) -> list[Effect]:
+        """Every effect, in the order in which light meets them; those that are switched off are left out."""
+        return [effect for stage in self.stages for effect in stage.effects(self)]
+
     def scaled(self, shape: tuple[int, int] | None) -> Profile:
-        """The profile on a panel of ``shape``: the pitch stays, the distance scales with the rows.
+        """The profile on another panel: the pitch stays, the distance scales with the rows.
 
         Light then spreads over the same fraction of the panel (K / N is constant).
+
+        Parameters
+        ----------
+        shape
+            Rows and columns, None for the profile's own.
+
+        Raises
+        ------
+        UserError
+            A side below 64 or above 8192 pixels.
         """
         if shape is None or tuple(shape) == self.panel.shape:
             return self
@@ -127,6 +135,15 @@ class Profile:
         )
 
 
+STAGES: dict[str, type[Stage]] = {
+    name: kind
+    for name, hint in get_type_hints(Profile).items()
+    for kind in (*get_args(hint), hint)
+    if isinstance(kind, type) and issubclass(kind, Stage)
+}
+"""Every stage by its key in a profile, in the order in which light meets them: the fields of ``Profile``."""
+
+
 def names() -> list[str]:
     """Names of the profiles that come with the package."""
     folder = files(__package__) / "profiles"
@@ -134,7 +151,20 @@ def names() -> list[str]:
 
 
 def load_profile(name: str, folder: Path | None = None) -> Profile:
-    """A profile by name, or from a YAML file (path relative to ``folder`` first); UserError with file:line:column."""
+    """A profile by name or from a file.
+
+    Parameters
+    ----------
+    name
+        One of ``names()``, or the path of a YAML file.
+    folder
+        Where a relative path is looked for first.
+
+    Raises
+    ------
+    UserError
+        There is no such profile, or its file has a fault, with file:line:column.
+    """
     if name.endswith((".yaml", ".yml")):
         candidates = [Path(name)] if folder is None else [folder / name, Path(name)]
         path = next((path for path in candidates if path.is_file()), None)

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from ...core.errors import UserError
 from ...datasets.charts import Charts
-from ...display import load_profile, open_bench
+from ...display import load_profile
 from ...display.calibrated import CalibratedBench
 from ...display.simulated.pipeline import SimulatedBench
 from ...display.simulated.stages import PixelAperture
@@ -23,6 +23,7 @@ from ...methods.wirtinger import Wirtinger
 from ...metrics import match, score
 from ...optics import srgb_encode
 from ...optics.convolution import iris
+from ...study.opening import open_bench
 
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1
@@ -130,7 +131,7 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
 def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     """Illumination, dirt, pupil with aberration, zero order, sensor response."""
     profile, maps = bench.profile, bench.channels[GREEN]
-    light = profile.illumination.field(maps.geometry)
+    light = profile.illumination.panel(maps.geometry)
     _picture(axes[0], light.abs(), "illumination amplitude, green", "relative amplitude")
     _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
     _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")

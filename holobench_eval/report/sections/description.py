@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ...display.simulated.profile import Panel, Profile, load_profile
+from ...display.simulated.profile import Profile, load_profile
+from ...display.simulated.stages import Panel
 from ...study.displays import displays as conditions
 from ...study.plan import REFERENCE
 from ..data.layout import TrainingSet

@@ -14,7 +14,7 @@ from ...core import plugins
 from ...core.device import moved
 from ...core.hashing import canonical
 from ...display import RectifiedCapture
-from ...display.calibrated import Exposure
+from ...display.api import Exposure
 from ...metrics import match
 from .. import cost, opening
 from ..displays import Condition

@@ -8,12 +8,13 @@ import torch
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.plugins import build
-from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes import KINDS, altered, checked
 from holobench_eval.display.simulated.changes.camera import SENSORS
 from holobench_eval.display.simulated.changes.vision import EYEPIECE, Prescription
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics import score
+from holobench_eval.study.opening import open_bench
 
 PANEL = (128, 128)
 EXAMPLES = {

@@ -5,9 +5,10 @@ from dataclasses import fields, replace
 import pytest
 import torch
 
-from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes.draws import PARAMETERS, STAGES, drawn, values
 from holobench_eval.display.simulated.profile import names
+from holobench_eval.study.opening import open_bench
 
 PANEL = (128, 128)
 DRAWS = range(1, 201)

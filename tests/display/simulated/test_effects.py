@@ -8,14 +8,13 @@ import pytest
 
 from holobench_eval.commands.show import effects as listed
 from holobench_eval.display import load_profile
-from holobench_eval.display.simulated.effects import effects
 from holobench_eval.display.simulated.profile import names
 from holobench_eval.display.simulated.stages import Flicker, LookUpTable
 from holobench_eval.methods.display_model import FORM
 
 
 def found(name: str) -> set[str]:
-    return {one.name for one in effects(load_profile(name))}
+    return {one.name for one in load_profile(name).effects()}
 
 
 def test_an_ideal_display_has_its_levels_alone() -> None:
@@ -24,11 +23,11 @@ def test_an_ideal_display_has_its_levels_alone() -> None:
 
 def test_an_effect_is_listed_when_it_is_switched_on() -> None:
     ideal = load_profile("ideal")
-    flickering = {one.name: one.text for one in effects(replace(ideal, flicker=Flicker(0.02)))}
+    flickering = {one.name: one.text for one in replace(ideal, flicker=Flicker(0.02)).effects()}
     assert flickering.keys() - {"quantisation"} == {"flicker"}
     assert "2 %" in flickering["flicker"]
     bent = replace(ideal, lut=LookUpTable(gamma=(1.0, 1.2, 1.0)))
-    assert "1/1.2/1" in next(one.text for one in effects(bent) if one.name == "look_up_table")
+    assert "1/1.2/1" in next(one.text for one in bent.effects() if one.name == "look_up_table")
 
 
 def test_a_form_names_only_effects_that_some_display_has_or_may_have() -> None:
@@ -38,7 +37,7 @@ def test_a_form_names_only_effects_that_some_display_has_or_may_have() -> None:
 
 @pytest.mark.parametrize("name", names())
 def test_no_effect_is_listed_twice(name: str) -> None:
-    told = [one.name for one in effects(load_profile(name))]
+    told = [one.name for one in load_profile(name).effects()]
     assert len(told) == len(set(told))
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from holobench_eval.display import load_profile, open_bench
+from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.profile import names
 from holobench_eval.display.simulated.stages import (
@@ -18,6 +18,7 @@ from holobench_eval.display.simulated.stages import (
     ZeroOrder,
 )
 from holobench_eval.optics import quantise
+from holobench_eval.study.opening import open_bench
 
 PANEL = (96, 128)
 
@@ -82,11 +83,16 @@ def test_blaze_leaves_the_image_where_it_was(with_stage, phase):
     assert float((a - b).norm() / a.norm()) < 0.02
 
 
-def test_light_is_not_made(phase):
-    for name in names():
-        profile = load_profile(name).scaled(PANEL)
-        image = SimulatedBench(profile).image(phase)
-        assert float(image.mean()) < 1.02
+@pytest.mark.parametrize("name", names())
+def test_light_is_neither_made_nor_lost(name, phase):
+    """Mean light in the panel's shadow; an iris beside the zero order passes least, and some light spreads further."""
+    least = {"ideal": 0.75, "plm-4bit": 0.75, "pluto-offaxis": 0.15}.get(name, 0.4)
+    assert least < float(SimulatedBench(load_profile(name).scaled(PANEL)).image(phase).mean()) < 1.02
+
+
+def test_an_ideal_panel_reflects_all_light(ideal):
+    image = SimulatedBench(ideal).image(torch.zeros(3, *PANEL))
+    assert image.mean((1, 2)).tolist() == pytest.approx([1, 1, 1], abs=0.05)  # edges diffract a little out of the frame
 
 
 def test_dust_plane_without_dust_is_no_plane(with_stage, phase):

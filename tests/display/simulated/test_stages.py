@@ -22,8 +22,9 @@ from holobench_eval.display.simulated.stages import (
     ZeroOrder,
 )
 from holobench_eval.display.simulated.stages.crosstalk import sample_positions
-from holobench_eval.display.simulated.stages.quantise import straight_through_level
-from holobench_eval.display.simulated.stages.relay import box_filter, sample, sampling_grid
+from holobench_eval.display.simulated.stages.panel import straight_through_level
+from holobench_eval.display.simulated.stages.relay import sample, sampling_grid
+from holobench_eval.display.simulated.stages.sensor import box_filter
 
 TAU = 2 * math.pi
 
@@ -108,14 +109,14 @@ def test_flicker_has_its_rms():
 
 
 def test_illumination_has_unit_mean_power_and_the_stated_phase(geometry):
-    light = Illumination(beam_sigma=0.8, fringes=0.08, phase_rms=0.25).field(geometry)
+    light = Illumination(beam_sigma=0.8, fringes=0.08, phase_rms=0.25).panel(geometry)
     assert float(light.abs().square().mean()) == pytest.approx(1, rel=1e-4)
     assert float(light.angle().square().mean().sqrt()) == pytest.approx(0.25, rel=1e-3)
-    assert torch.allclose(Illumination().field(geometry), torch.ones(geometry.shape, dtype=torch.complex64))
+    assert torch.allclose(Illumination().panel(geometry), torch.ones(geometry.shape, dtype=torch.complex64))
 
 
 def test_fringes_modulate_by_what_they_say(geometry):
-    amplitude = Illumination(fringes=0.08).field(geometry).abs()
+    amplitude = Illumination(fringes=0.08).panel(geometry).abs()
     assert 0.10 < float(amplitude.max() - amplitude.min()) <= 0.17
 
 

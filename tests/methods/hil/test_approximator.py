@@ -9,8 +9,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.display.api import DisplaySpec
-from holobench_eval.display.calibrated import white_irradiance
+from holobench_eval.display.api import DisplaySpec, white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.judge import Judge
 from holobench_eval.methods.hil.loop import Sample

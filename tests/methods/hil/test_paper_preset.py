@@ -17,7 +17,7 @@ resource.setrlimit(resource.RLIMIT_AS, (int(24e9), int(24e9)))
 import torch
 from tests.support.small_training import pictures
 from holobench_eval.display.api import DisplaySpec, Region
-from holobench_eval.display.calibrated import white_irradiance
+from holobench_eval.display.api import white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network

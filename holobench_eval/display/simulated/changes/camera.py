@@ -9,13 +9,12 @@ from ..profile import Profile
 from ..stages import Sensor
 
 STAGES = ("propagation", "relay", "sensor")
-FAR = 40.0
-"""mm; the paper's largest shift, at which the following are told. All are assumed: no optics of it are described."""
-PUPIL, COMA, ASTIGMATISM = 0.25, 0.05, 0.05
-"""Of the iris' radius, along the shift; rms waves, along the shift; rms waves, growing with its square."""
-PERSPECTIVE, REST, DARKER = 0.016, 0.02, 0.2
-"""Relative change of scale over a panel height (a picture of 0.1 m seen from 0.5 m); shift of the picture that is left
-after the camera is aimed anew [panel heights]; vignetting at the corner, growing with the square of the shift."""
+FAR = 40.0  # mm; the paper's largest shift, for which the figures below are. All are assumed: it describes no optics
+PUPIL = 0.25  # decentring of the iris along the shift, relative to its radius
+COMA, ASTIGMATISM = 0.05, 0.05  # waves rms; coma lies along the shift, astigmatism grows with its square
+PERSPECTIVE = 0.016  # relative change of scale over a panel height: a picture of 0.1 m seen from 0.5 m
+REST = 0.02  # shift of the picture that is left after the camera is aimed anew [panel heights]
+DARKER = 0.2  # vignetting at the corner, growing with the square of the shift
 MODEL = (
     f"assumed, at {FAR:g} mm: iris decentred by {PUPIL:g} of its radius, {COMA:g} waves rms of coma, {ASTIGMATISM:g} "
     f"of astigmatism, perspective of {PERSPECTIVE:g}, {100 * DARKER:.0f} % vignetting; the camera is aimed anew"

@@ -122,16 +122,15 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 def values(profile: Profile, index: int) -> dict[str, float]:
     """The parameters of a draw, by their names in ``PARAMETERS``; they depend on the profile's name and seed."""
-    drawn = torch.rand(
-        len(PARAMETERS), generator=generator("bench draw", profile.name, profile.seed, index), dtype=torch.float64
-    )
-    pairs = zip(PARAMETERS.items(), drawn.tolist(), strict=True)
-    return {name: one.low + (one.high - one.low) * share for (name, one), share in pairs}
+    draw = generator("bench draw", profile.name, profile.seed, index)
+    shares = torch.rand(len(PARAMETERS), generator=draw, dtype=torch.float64).tolist()
+    pairs = zip(PARAMETERS.items(), shares, strict=True)
+    return {name: drawn.low + (drawn.high - drawn.low) * share for (name, drawn), share in pairs}
 
 
 def drawn(profile: Profile, index: int) -> Profile:
     """The bench of a draw: ``values`` in the place of the profile's, and patterns of its own."""
-    made = replace(profile, seed=seed("patterns of a draw", profile.seed, index))
+    bench = replace(profile, seed=seed("patterns of a draw", profile.seed, index))
     for name, value in values(profile, index).items():
-        made = PARAMETERS[name].put(made, value)
-    return made
+        bench = PARAMETERS[name].put(bench, value)
+    return bench

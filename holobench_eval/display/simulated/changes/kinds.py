@@ -6,60 +6,21 @@ are marked "assumed" have no published source; lengths are those of the full pan
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 from ....core.errors import UserError, suggest
 from ..profile import Profile
 from ..stages import AddedLens, Eye
 from . import camera, draws, vision
+from .kind import Kind, Value, number
 
-Value = float | str
-"""How far a condition goes: a number, or the name of one of several."""
-
-USUAL_BITS = 8
-"""Of the panels of which fewer bits are asked."""
-GREEN = 517e-9
-"""Wavelength [m] at which a drift of the laser is told."""
+USUAL_BITS = 8  # of the panels that a bit-depth sweep starts from
+GREEN = 517e-9  # wavelength [m] that a drift of the lasers is given at
 CLEARING, OPERATING, HALLER = 373.0, 308.0, 0.2
 """Of the liquid crystal: clearing point and panel temperature [K], assumed for a usual mixture, and the exponent of
 Haller's law, birefringence ~ (1 - T / T_clearing)^0.2 (Haller, Progress in Solid State Chemistry 10, 103, 1975)."""
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of change.
-
-    words: what changes; unit: of the values, empty for a factor or a name; stages: the parameters of ``Profile`` that
-    may differ; apply: the profile after a change; nominal: the value that changes nothing (None: values are names, or
-    draws, and there is none); low, high: what a number may be; moves: whether the camera's view moves, so that it is
-    registered anew (else it stays as it was before the change); per: the loss is told for so much (0: not at all);
-    counted: whether values are whole numbers from 1 that name one of many; model: what is assumed, for reports.
-    """
-
-    words: str
-    unit: str
-    stages: tuple[str, ...]
-    apply: Callable[[Profile, Value], Profile]
-    model: str
-    nominal: float | None = 0.0
-    low: float = -math.inf
-    high: float = math.inf
-    moves: bool = False
-    per: float = 1.0
-    counted: bool = False
-
-    @property
-    def numeric(self) -> bool:
-        """Whether values are numbers on an axis."""
-        return self.nominal is not None
-
-
-def number(change: Callable[[Profile, float], Profile]) -> Callable[[Profile, Value], Profile]:
-    """A change by a number, which is not asked for names."""
-    return lambda profile, value: change(profile, float(value))
 
 
 def _drift(profile: Profile, days: float) -> Profile:
@@ -213,17 +174,17 @@ KINDS: Mapping[str, Kind] = {
         "eye that needs glasses", "", ("eye",), _eye,
         f"relaxed, behind an eyepiece of {1e3 * vision.EYEPIECE:g} mm (assumed); sphere / cylinder x axis in dioptres "
         "and degrees",
-        nominal=None,
+        nominal=None, read=vision.one_form,
     ),
     "corrected_eye": Kind(
         "the same eye, corrected by the hologram", "", ("eye", "lens"), _corrected_eye,
         "paper 4.2: a phase of the prescription's sphere and cylinder added to the same hologram",
-        nominal=None, moves=True,
+        nominal=None, read=vision.one_form, moves=True,
     ),
     "known_eye": Kind(
         "the same eye, known to the methods", "", ("eye",), _known_eye,
         "the eye is part of the nominal optics that holograms are computed for",
-        nominal=None,
+        nominal=None, read=vision.one_form,
     ),
     "draw": Kind(
         "random draw of the bench's parameters", "", draws.STAGES, _draw, draws.MODEL, nominal=None, moves=True,
@@ -237,18 +198,16 @@ def checked(kind: str, value: Value) -> Value:
     """A value as its kind has it: a number within its range, a name as text. UserError for anything else."""
     if kind not in KINDS:
         raise UserError(f"unknown condition '{kind}'; {suggest(kind, KINDS)}")
-    found = KINDS[kind]
-    if found.counted:
+    limits = KINDS[kind]
+    if limits.counted:
         text = f"{value:g}" if isinstance(value, float) else str(value)
         if not re.fullmatch(r"[1-9]\d{0,8}", text):
             raise UserError(f"{kind} is named by a whole number from 1, got {value!r}")
         return text
-    if kind.endswith("eye"):
-        return str(vision.Prescription.read(str(value)))
-    if not found.numeric:
-        return str(value)
-    if not isinstance(value, int | float) or isinstance(value, bool) or not found.low <= value <= found.high:
-        raise UserError(f"{kind} is a number from {found.low:g} to {found.high:g}, got {value!r}")
+    if not limits.numeric:
+        return limits.read(str(value))
+    if not isinstance(value, int | float) or isinstance(value, bool) or not limits.low <= value <= limits.high:
+        raise UserError(f"{kind} is a number from {limits.low:g} to {limits.high:g}, got {value!r}")
     return float(value)
 
 

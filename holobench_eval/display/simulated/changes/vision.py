@@ -7,13 +7,11 @@ import re
 from dataclasses import dataclass
 
 from ....core.errors import UserError
+from ....optics.phase import Matrix
 from ..profile import Profile
-from ..stages.lens import Matrix
 
-EYEPIECE = 0.05
-"""Focal length [m] of the eyepiece through which the image is seen; assumed, usual in near-eye displays."""
-STRONGEST = 10.0
-"""Dioptres, of a prescription's sphere and cylinder."""
+EYEPIECE = 0.05  # focal length [m] of the eyepiece through which the image is seen; assumed, usual in near-eye displays
+STRONGEST = 10.0  # dioptres, of a prescription's sphere and cylinder
 WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?)(?:\s*/\s*([+-]?\d+(?:\.\d+)?)\s*x\s*(\d+(?:\.\d+)?))?")
 
 
@@ -31,10 +29,10 @@ class Prescription:
     @classmethod
     def read(cls, text: str) -> Prescription:
         """``"-2"`` or ``"-2 / -1 x 30"``. UserError for anything else."""
-        found = WRITTEN.fullmatch(text.strip())
-        if found is None:
+        written = WRITTEN.fullmatch(text.strip())
+        if written is None:
             raise UserError(f"prescription '{text}': write 'sphere' or 'sphere / cylinder x axis', as '-2 / -1 x 30'")
-        sphere, cylinder, axis = (float(part or 0) for part in found.groups())
+        sphere, cylinder, axis = (float(part or 0) for part in written.groups())
         if max(abs(sphere), abs(cylinder)) > STRONGEST or axis > 180:
             raise UserError(f"prescription '{text}': at most {STRONGEST:g} dioptres, and an axis of 0 to 180 degrees")
         return cls(sphere, cylinder, axis)
@@ -66,3 +64,8 @@ def relative(profile: Profile, text: str) -> Matrix:
     if min(rows, columns) - abs(cross) <= -0.5 or max(rows, columns) + abs(cross) >= 0.5:
         raise UserError(f"prescription '{text}' moves the image by more than half of {profile.panel.distance:g} m")
     return rows, columns, cross
+
+
+def one_form(text: str) -> str:
+    """A prescription as ``Prescription`` writes it. UserError for one that cannot be read."""
+    return str(Prescription.read(text))

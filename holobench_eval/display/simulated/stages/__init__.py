@@ -1,30 +1,28 @@
-"""The simulated bench, one stage a file, in the order light meets them."""
+"""The stages of the simulated bench; ``Profile`` lists them in the order in which light meets them."""
 
-from .aperture import PixelAperture
-from .coherent_noise import CoherentNoise
+from .aperture import PixelAperture, ZeroOrder
+from .coherent_noise import CoherentNoise, DustPlane
 from .crosstalk import Crosstalk
 from .drift import Drift
-from .eye import Eye
-from .flicker import Flicker
-from .geometry import Geometry
 from .illumination import Illumination
-from .lens import AddedLens
-from .lut import LookUpTable
+from .lens import AddedLens, Eye
+from .lut import Flicker, LookUpTable
+from .panel import Panel
 from .propagation import Propagation
 from .relay import Relay
 from .sensor import Sensor
-from .zero_order import ZeroOrder
 
 __all__ = [
     "AddedLens",
     "CoherentNoise",
     "Crosstalk",
     "Drift",
+    "DustPlane",
     "Eye",
     "Flicker",
-    "Geometry",
     "Illumination",
     "LookUpTable",
+    "Panel",
     "PixelAperture",
     "Propagation",
     "Relay",

@@ -1,24 +1,40 @@
-"""Stage 4: a pixel is an aperture; its active area modulates, its dead area does not (paper Eq. 5)."""
+"""Light that a panel does not modulate: between its active areas (paper Eq. 5), and everywhere (paper Fig. 4)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ..stage import Effect, Stage, percent
 from .crosstalk import sample_positions
+
+if TYPE_CHECKING:
+    from ..profile import Profile
 
 
 @dataclass(frozen=True)
-class PixelAperture:
+class PixelAperture(Stage):
     """Square active area, ``fill`` of the pixel's area; the rest reflects ``dead_amplitude`` without modulation."""
+
+    title: ClassVar[str] = "pixel aperture"
+    model: ClassVar[str] = (
+        "active area modulates, dead area reflects as it is; each sub-sample is a small square (paper Eq. 5)"
+    )
 
     fill: Annotated[float, Interval(gt=0, le=1)] = 1.0
     dead_amplitude: Annotated[float, Interval(ge=0, le=1)] = 0.0
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """The dead area."""
+        if self.fill < 1:
+            dead = f"{percent(self.fill)} active area, the rest reflects an amplitude of {self.dead_amplitude:g}"
+            yield Effect("pixel_aperture", f"pixels of {dead}")
 
     def active_share(self, samples: int) -> Tensor:
         """Active share of the area of each sub-sample, ``(samples^2, 1, 1)``."""
@@ -33,3 +49,30 @@ class PixelAperture:
     def dead_share(self, samples: int) -> Tensor:
         """Amplitude that each sub-sample reflects without modulation, ``(samples^2, 1, 1)``."""
         return (1 - self.active_share(samples)) * self.dead_amplitude
+
+
+@dataclass(frozen=True)
+class ZeroOrder(Stage):
+    """``fraction`` of the incident power is reflected as it came, with ``phase`` [rad]; the iris may stop it later."""
+
+    title: ClassVar[str] = "zero order"
+    model: ClassVar[str] = "unmodulated light, coherent with the image (paper Fig. 4)"
+
+    fraction: Annotated[float, Interval(ge=0, lt=1)] = 0.0
+    phase: float = 0.0
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Its share of the light."""
+        if self.fraction:
+            yield Effect("zero_order", f"{percent(self.fraction)} of the light unmodulated")
+
+    @property
+    def modulated(self) -> float:
+        """Amplitude of the modulated light."""
+        return math.sqrt(1 - self.fraction)
+
+    @property
+    def unmodulated(self) -> complex:
+        """Complex amplitude of the unmodulated light."""
+        amplitude = math.sqrt(self.fraction)
+        return complex(amplitude * math.cos(self.phase), amplitude * math.sin(self.phase))

@@ -1,27 +1,35 @@
-"""Stage 7: dust, scratches and rough surfaces, at the panel and on a plane before the image (paper Eq. 9)."""
+"""Dust, scratches and rough surfaces, at the panel and on a plane before the image (paper Eq. 9)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
 import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
 from torch import Tensor
 
-from .geometry import Geometry
+from ..geometry import Geometry
+from ..stage import Effect, Stage, percent
+
+if TYPE_CHECKING:
+    from ..profile import Profile
 
 
 @dataclass(frozen=True)
-class CoherentNoise:
+class CoherentNoise(Stage):
     """Complex transmission of dirt. Sizes in panel heights.
 
     specks, scratches: how many at the panel; speck_radius: largest radius; roughness: rms phase [rad] of the
     panel's surface, correlated over ``roughness_pixels``; plane_specks: specks on a plane ``plane_distance``
     (fraction of the propagation distance) before the image, where they cast rings.
     """
+
+    title: ClassVar[str] = "coherent noise"
+    model: ClassVar[str] = "dust, scratches and roughness at the panel (paper Eq. 9)"
 
     specks: Annotated[int, Interval(ge=0, le=10000)] = 0
     scratches: Annotated[int, Interval(ge=0, le=1000)] = 0
@@ -30,6 +38,14 @@ class CoherentNoise:
     roughness_pixels: Annotated[float, Interval(gt=0, le=100)] = 3.0
     plane_specks: Annotated[int, Interval(ge=0, le=10000)] = 0
     plane_distance: Annotated[float, Interval(gt=0, lt=1)] = 0.15
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Dirt at the panel; that of the other plane is met later, see ``DustPlane``."""
+        if self.specks or self.scratches:
+            yield Effect("panel_dust", f"dust at the panel, {self.specks} specks and {self.scratches} scratches")
+        if self.roughness:
+            size = f"{self.roughness:g} rad rms over {self.roughness_pixels:g} px"
+            yield Effect("roughness", f"rough surface of the panel, {size}")
 
     def panel(self, geometry: Geometry) -> Tensor:
         """Complex transmission ``(H, W)`` at the panel."""
@@ -83,3 +99,18 @@ class CoherentNoise:
         padded = F.pad(white[None, None], (reach, reach, reach, reach), mode="reflect")
         smooth = F.conv2d(F.conv2d(padded, taps.view(1, 1, -1, 1)), taps.view(1, 1, 1, -1))[0, 0]
         return smooth / smooth.pow(2).mean().sqrt()
+
+
+@dataclass(frozen=True)
+class DustPlane(Stage):
+    """``CoherentNoise.plane``, where light meets it; its parameters are those of ``CoherentNoise``."""
+
+    title: ClassVar[str] = "dust plane"
+    model: ClassVar[str] = "dust on a plane before the image, which casts rings (paper Eq. 9)"
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """The specks and their plane."""
+        dirt = profile.coherent_noise
+        if dirt.plane_specks:
+            plane = f"{percent(dirt.plane_distance)} of the way before the image"
+            yield Effect("plane_dust", f"dust on an intermediate plane, {dirt.plane_specks} specks {plane}")

@@ -1,10 +1,11 @@
-"""Stage 3: fringing fields smooth the phase across pixels, so that a wrap edge becomes a ramp (paper 2.2)."""
+"""Fringing fields smooth the phase across pixels, so that a wrap edge becomes a ramp (paper 2.2)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
 import torch.nn.functional as F  # noqa: N812
@@ -12,6 +13,10 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ....imaging.shifts import correlate_each
+from ..stage import Effect, Stage
+
+if TYPE_CHECKING:
+    from ..profile import Profile
 
 
 def sample_positions(samples: int) -> list[float]:
@@ -20,10 +25,23 @@ def sample_positions(samples: int) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Crosstalk:
+class Crosstalk(Stage):
     """Convolution of the phase with a Gaussian of standard deviation ``width`` [pixels]."""
 
+    title: ClassVar[str] = "crosstalk"
+    model: ClassVar[str] = (
+        "Gaussian convolution of the phase on sub-samples, so that wrap edges become ramps (paper 2.2)"
+    )
+
     width: Annotated[float, Interval(ge=0, le=2)] = 0.0
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Its width, and the sub-samples that it acts on."""
+        if self.width:
+            yield Effect("crosstalk", f"crosstalk of {self.width:g} px")
+        if profile.sampling > 1:
+            grid = f"{profile.sampling} x {profile.sampling}"
+            yield Effect("sub_pixel_field", f"structure inside a pixel, {grid} samples, each where it is")
 
     def weights(self, samples: int) -> Tensor:
         """``(samples, k)``: the share of each neighbour along one axis in each sub-sample, exact for square pixels."""

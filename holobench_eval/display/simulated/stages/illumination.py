@@ -1,20 +1,28 @@
-"""Stage 6: the beam that meets the panel is not a plane wave of constant amplitude (paper Eq. 7)."""
+"""The beam that meets the panel is not a plane wave of constant amplitude (paper Eq. 7)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from .geometry import Geometry
+from ..geometry import Geometry
+from ..stage import Effect, Stage, percent
+
+if TYPE_CHECKING:
+    from ..profile import Profile
+
+FRINGES_AT = 532e-9  # wavelength [m] at which ``fringe_cycles`` is given
+COARSEST, SPAN = 0.6, 0.8  # frequency of a fringe system in units of it, and how far it may lie above
 
 
 @dataclass(frozen=True)
-class Illumination:
+class Illumination(Stage):
     """Gaussian beam, cover-glass fringes, smooth wavefront error and tilt; lengths in panel heights.
 
     beam_sigma: 1/e half width of the *amplitude* ``exp(-r^2 / (2 sigma^2))``, None for a uniform beam;
@@ -24,6 +32,9 @@ class Illumination:
     to what the camera's exposure was set for.
     """
 
+    title: ClassVar[str] = "illumination"
+    model: ClassVar[str] = "Gaussian beam, cover-glass fringes, smooth wavefront error, tilt (paper Eq. 7)"
+
     beam_sigma: Annotated[float, Interval(gt=0)] | None = None
     offset: Annotated[float, Interval(ge=0, le=1)] = 0.0
     fringes: Annotated[float, Interval(ge=0, le=0.5)] = 0.0
@@ -32,7 +43,19 @@ class Illumination:
     tilt: tuple[float, float] = (0.0, 0.0)
     power: Annotated[float, Interval(gt=0, le=100)] = 1.0
 
-    def field(self, geometry: Geometry) -> Tensor:
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Beam, fringes, wavefront and tilt."""
+        if self.beam_sigma is not None:
+            yield Effect("beam", f"Gaussian beam of {self.beam_sigma:g} panel heights")
+        if self.fringes:
+            finest = self.fringe_cycles * FRINGES_AT / min(profile.panel.wavelengths) * (COARSEST + SPAN)
+            yield Effect("fringes", f"fringes of {percent(self.fringes)}, up to {finest:.0f} cycles a panel height")
+        if self.phase_rms:
+            yield Effect("wavefront", f"smooth phase of the beam, {self.phase_rms:g} rad rms")
+        if any(self.tilt):
+            yield Effect("tilt", f"tilt of the beam, {math.hypot(*self.tilt):.2g} cycles a panel height")
+
+    def panel(self, geometry: Geometry) -> Tensor:
         """Complex incident field ``(H, W)`` of unit mean intensity, whatever the power."""
         y, x = geometry.coordinates()
         amplitude = torch.ones(geometry.shape, dtype=torch.float64)
@@ -52,12 +75,12 @@ class Illumination:
     def _fringes(self, geometry: Geometry) -> Tensor:
         """Two fringe systems in [-1, 1]; the finer the shorter the wavelength, as between two plane surfaces."""
         y, x = geometry.coordinates()
-        cycles = self.fringe_cycles * 532e-9 / geometry.wavelength
+        cycles = self.fringe_cycles * FRINGES_AT / geometry.wavelength
         total = torch.zeros(geometry.shape, dtype=torch.float64)
         for system, share in enumerate((0.6, 0.4)):
             turn, phase, ratio = torch.rand(3, generator=geometry.generator("fringes", system), dtype=torch.float64)
             angle = 2 * math.pi * turn
-            frequency = cycles * (0.6 + 0.8 * ratio)
+            frequency = cycles * (COARSEST + SPAN * ratio)
             total += share * torch.cos(
                 2 * math.pi * (frequency * (torch.cos(angle) * x + torch.sin(angle) * y) + phase)
             )

@@ -1,37 +1,65 @@
-"""Stage 1, before the panel: a lens that the display adds to every hologram (paper 7.1, and 4.2 for an eye)."""
+"""A lens that the display adds to every hologram, and the eye that may need it (paper 7.1 and 4.2)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
+import torch
 from torch import Tensor
 
-from .geometry import Geometry
-
-Matrix = tuple[float, float, float]
-"""A symmetric 2 x 2 matrix: along rows (vertical), along columns (horizontal), and between the two."""
+from ....optics.phase import Matrix, refocus
+from ..geometry import Geometry
+from ..stage import Stage
 
 
 @dataclass(frozen=True)
-class AddedLens:
+class AddedLens(Stage):
     """A quadratic phase that moves the image from the distance z to z (1 + ``move``).
 
     move: a matrix, since a cylinder moves the foci of vertical and horizontal lines differently. The image is
     stretched by 1 + move.
     """
 
+    title: ClassVar[str] = "added lens"
+    model: ClassVar[str] = "quadratic phase added to every hologram, which moves the image (paper 7.1, 4.2)"
+
     move: Matrix = (0.0, 0.0, 0.0)
 
-    def phase(self, geometry: Geometry) -> Tensor:
+    def hologram(self, geometry: Geometry) -> Tensor | None:
         """Phase ``(H, W)`` [rad]: that of a point at the new distance less that of one at the old one.
 
         A point at the distance Z asks for -pi x^T Z^-1 x / lambda (paraxial; Goodman, Introduction to Fourier Optics,
         Section 5.1), so the lens is -pi x^T (Z^-1 - z^-1) x / lambda.
         """
+        if not any(self.move):
+            return None
         rows, columns, cross = self.move
         determinant = (1 + rows) * (1 + columns) - cross**2
         inverse = ((1 + columns) / determinant - 1, (1 + rows) / determinant - 1, -cross / determinant)
         y, x = (axis * geometry.shape[0] * geometry.pitch for axis in geometry.coordinates())
         form = inverse[0] * y * y + inverse[1] * x * x + 2 * inverse[2] * y * x
         return (-math.pi / (geometry.wavelength * geometry.distance) * form).float()
+
+
+@dataclass(frozen=True)
+class Eye(Stage):
+    """A relaxed eye that sees the plane at z (1 + ``focus``) instead of the image's.
+
+    focus: a matrix; astigmatism gives each meridian a distance of its own. See ``changes.vision``. known: whether
+    methods know the eye, as they know the nominal optics.
+    """
+
+    title: ClassVar[str] = "eye"
+    model: ClassVar[str] = "in the place of the camera: relaxed at another distance, meridian by meridian (paper 4.2)"
+
+    focus: Matrix = (0.0, 0.0, 0.0)
+    known: bool = False
+
+    def transmission(self, fy: Tensor, fx: Tensor, geometry: Geometry) -> Tensor | None:
+        """See ``optics.phase.refocus``."""
+        if not any(self.focus):
+            return None
+        phase = refocus(self.focus, fy, fx, geometry.wavelength, geometry.distance)
+        return torch.polar(torch.ones_like(phase), phase)

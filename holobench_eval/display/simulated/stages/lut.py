@@ -1,33 +1,50 @@
-"""Stage 2: the look-up table turns a gray level into a phase, not quite the intended one (paper Eq. 6)."""
+"""The look-up table turns a gray level into a phase, not quite the intended one, and flickers (paper Eq. 6)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
 from annotated_types import Interval, Len
 from torch import Tensor
 
 from ....optics.phase import TAU
-from .geometry import Geometry
+from ..geometry import Geometry
+from ..stage import Effect, Stage, percent
+
+if TYPE_CHECKING:
+    from ..profile import Profile
 
 PerChannel = tuple[float, float, float]
-TI_PLM_PERCENT = (0, 1.07, 2.19, 4.50, 5.98, 7.75, 12.06, 18.5, 36.55, 39.55, 45.1, 52.44, 63.93, 71.16, 85.02, 100)
 
 
 @dataclass(frozen=True)
-class LookUpTable:
+class LookUpTable(Stage):
     """Phase of a gray level g of L: ``2 pi gain(x, y) (g / L)^gamma``, or a published table.
 
     gamma, gain: per channel (R, G, B); variation: relative rms of the gain over the panel (smooth);
     table: phase of each level in percent of the largest, which is ``(L - 1) / L 2 pi`` (then gamma must be 1).
     """
 
+    title: ClassVar[str] = "look-up table"
+    model: ClassVar[str] = "gain(x, y) (g / L)^gamma, or a published table (paper Eq. 6)"
+
     gamma: PerChannel = (1.0, 1.0, 1.0)
     gain: PerChannel = (1.0, 1.0, 1.0)
     variation: Annotated[float, Interval(ge=0, le=0.5)] = 0.0
     table: Annotated[tuple[float, ...], Len(0, 1024)] = ()
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Shape and stroke of the table, and how they vary over the panel."""
+        if self.table:
+            yield Effect("look_up_table", f"a measured look-up table of {len(self.table)} levels")
+        elif set(self.gamma + self.gain) != {1.0}:
+            powers, gains = ("/".join(f"{value:g}" for value in given) for given in (self.gamma, self.gain))
+            yield Effect("look_up_table", f"look-up table, exponent {powers}, stroke {gains} of a turn (R/G/B)")
+        if self.variation:
+            yield Effect("gain_map", f"stroke uneven over the panel, {percent(self.variation)} rms, smooth")
 
     def gain_map(self, geometry: Geometry) -> Tensor:
         """The gain ``(H, W)`` of the panel for a channel."""
@@ -54,3 +71,25 @@ class LookUpTable:
         """Phase [rad] of every gray level at the mean gain, for a plot."""
         level = torch.arange(2**bits, dtype=torch.float32)
         return self.phase(level, bits, torch.tensor(self.gain[channel]), channel)
+
+
+@dataclass(frozen=True)
+class Flicker(Stage):
+    """Relative phase gain noise of a frame; ``rms`` of the 2 pi stroke.
+
+    The liquid crystal relaxes between refreshes, so that each frame has a slightly other phase gain.
+    """
+
+    title: ClassVar[str] = "flicker"
+    model: ClassVar[str] = "phase gain noise, new in every frame"
+
+    rms: Annotated[float, Interval(ge=0, le=0.2)] = 0.0
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """The noise of the gain."""
+        if self.rms:
+            yield Effect("flicker", f"flicker, {percent(self.rms)} rms of the stroke from frame to frame")
+
+    def gain(self, draw: torch.Generator) -> float:
+        """The phase gain of one frame."""
+        return 1 + self.rms * float(torch.randn((), generator=draw))

@@ -1,11 +1,11 @@
-"""Stages 8 and 9: from the panel through the iris, with the true distance, wavelength and aberrations (paper Eq. 8)."""
+"""From the panel through the iris, with the true distance, wavelength and aberrations (paper Eq. 8)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
@@ -14,12 +14,16 @@ from torch import Tensor
 from ....optics.angular_spectrum import angular_spectrum_phase
 from ....optics.convolution import frequencies, iris
 from ....optics.zernike import wavefront
+from ..geometry import Geometry
+from ..stage import Effect, Stage, percent
 from .crosstalk import sample_positions
-from .geometry import Geometry
+
+if TYPE_CHECKING:
+    from ..profile import Profile
 
 
 @dataclass(frozen=True)
-class Propagation:
+class Propagation(Stage):
     """What separates the light's way from the nominal one.
 
     distance_error, wavelength_error: relative; aberration: rms waves at 517 nm over the iris (or over the band
@@ -27,11 +31,26 @@ class Propagation:
     radius of an opaque disc in its middle, both relative to its radius.
     """
 
+    title: ClassVar[str] = "propagation and iris"
+    model: ClassVar[str] = (
+        "true distance, wavelength and Zernike aberrations, and a soft circular iris around the first order, in one "
+        "transfer function (paper Eq. 8, Fig. 4)"
+    )
+
     distance_error: Annotated[float, Interval(ge=-0.5, le=0.5)] = 0.0
     wavelength_error: Annotated[float, Interval(ge=-0.1, le=0.1)] = 0.0
     aberration: Mapping[str, float] = field(default_factory=dict)
     pupil_shift: tuple[float, float] = (0.0, 0.0)
     obstruction: Annotated[float, Interval(ge=0, lt=1)] = 0.0
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Defocus and aberrations."""
+        if self.distance_error or self.wavelength_error:
+            wavelength = f"{percent(self.wavelength_error)} of the wavelength"
+            yield Effect("defocus", f"wrong by {percent(self.distance_error)} of the distance, {wavelength}")
+        for name, waves in self.aberration.items():
+            if waves:
+                yield Effect(name, f"aberration {name.replace('_', ' ')}, {waves:g} waves rms at 517 nm")
 
     def transfer(
         self, geometry: Geometry, padded: tuple[int, int], pupil: float | None, fraction: tuple[float, float]

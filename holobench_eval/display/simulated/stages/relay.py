@@ -1,32 +1,44 @@
-"""Stage 11: the relay carries the image to the sensor, magnified, turned and a little distorted (paper 5.1)."""
+"""The relay carries the image to the sensor, magnified, turned and a little distorted (paper 5.1)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
 import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
 from torch import Tensor
 
-from ....imaging.shifts import correlate
+from ..stage import Effect, Stage
+
+if TYPE_CHECKING:
+    from ..profile import Profile
 
 
 @dataclass(frozen=True)
-class Relay:
+class Relay(Stage):
     """Pose of the panel's image on the sensor.
 
     magnification; rotation [degrees]; shift (rows, columns) and perspective: relative to the panel's height;
     distortion: radial displacement at half a panel height, relative to it.
     """
 
+    title: ClassVar[str] = "relay"
+    model: ClassVar[str] = "magnification, rotation, shift, perspective, radial distortion (paper 5.1)"
+
     magnification: Annotated[float, Interval(gt=0, le=10)] = 1.0
     rotation: Annotated[float, Interval(ge=-180, le=180)] = 0.0
     shift: tuple[float, float] = (0.0, 0.0)
     perspective: tuple[float, float] = (0.0, 0.0)
     distortion: Annotated[float, Interval(ge=-0.2, le=0.2)] = 0.0
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """The pose."""
+        if self.rotation or any(self.shift) or any(self.perspective) or self.distortion:
+            yield Effect("pose", "pose of the camera, what registration leaves of it and its interpolation")
 
     def frame_shape(self, window: tuple[int, int], pitch: float, sensor_pitch: float) -> tuple[int, int]:
         """Sensor read-out (rows, columns) for a window of the panel [px], with a margin of 12 % for the pose."""
@@ -53,17 +65,6 @@ class Relay:
         row = y * stretch * shape[0] + (shape[0] - 1) / 2
         column = x * stretch * shape[0] + (shape[1] - 1) / 2
         return torch.stack([row, column], dim=-1)
-
-
-def box_filter(image: Tensor, width: float) -> Tensor:
-    """Mean over a square of ``width`` samples around each sample of ``(..., H, W)``; the sensor's pixel area."""
-    if width <= 1:
-        return image
-    reach = math.ceil((width - 1) / 2)
-    edge = (width - (2 * reach - 1)) / 2
-    taps = [share / width for share in (edge, *[1.0] * (2 * reach - 1), edge)]
-    flat = F.pad(image.reshape(-1, 1, *image.shape[-2:]), (reach, reach, reach, reach), mode="replicate")
-    return correlate(correlate(flat, taps, dim=-2), taps, dim=-1).reshape(image.shape)
 
 
 def sampling_grid(points: Tensor, shape: tuple[int, int]) -> Tensor:

@@ -1,19 +1,29 @@
-"""Stage 12: the camera integrates, adds its noise and counts (paper 5.1 and 7.2)."""
+"""The camera integrates, adds its noise and counts (paper 5.1 and 7.2)."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import torch
+import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
 from torch import Tensor
 
-from .geometry import Geometry
+from ....imaging.shifts import correlate
+from ..geometry import Geometry
+from ..stage import Effect, Stage, percent
+
+if TYPE_CHECKING:
+    from ..profile import Profile
+
+IMAGE_SAMPLES = 2  # at most, a pixel and axis of the image; a smaller sensor pixel averages nothing
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensor(Stage):
     """A camera sensor.
 
     pitch [m]; bits of the converter; dark level [DN]; full_well and read_noise [electrons]; prnu: rms of the
@@ -21,6 +31,11 @@ class Sensor:
     full scale; ambient: stray light on every pixel, relative to that of a perfectly reconstructed white one; headroom:
     how many times the light of such a pixel fills the well; noise: False for an ideal camera that counts in fractions.
     """
+
+    title: ClassVar[str] = "sensor"
+    model: ClassVar[str] = (
+        "pixel area, vignetting, fixed pattern, shot and read noise, non-linearity, saturation, ADC (paper 5.1, 7.2)"
+    )
 
     pitch: Annotated[float, Interval(gt=0, lt=1e-3)] = 3.72e-6
     bits: Annotated[int, Interval(ge=8, le=16)] = 14
@@ -33,6 +48,29 @@ class Sensor:
     ambient: Annotated[float, Interval(ge=0, le=10)] = 0.0
     headroom: Annotated[float, Interval(ge=1, le=1000)] = 8.0
     noise: bool = True
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Area and response of the pixels, and their noise."""
+        size = self.panel_pixels(profile)
+        if size * min(profile.sampling, IMAGE_SAMPLES) > 1:
+            yield Effect("sensor_area", f"sensor pixels that average over {size:.2g} px")
+        if self.vignetting:
+            yield Effect("vignetting", f"vignetting, {percent(self.vignetting)} at the corner")
+        if self.prnu:
+            yield Effect("fixed_pattern", f"fixed pattern of the sensor, {percent(self.prnu)} rms")
+        if self.nonlinearity:
+            yield Effect("sensor_response", f"non-linear sensor, {percent(self.nonlinearity)} less at full scale")
+        if self.noise:
+            yield Effect("noise", f"shot noise of {self.full_well:g} electrons, read noise of {self.read_noise:g}")
+
+    def image(self, light: Tensor, profile: Profile, geometry: Geometry) -> Tensor:
+        """The mean over the area of a sensor pixel around each sample."""
+        samples = light.shape[-2] // geometry.shape[0]
+        return box_filter(light, samples * self.panel_pixels(profile))
+
+    def panel_pixels(self, profile: Profile) -> float:
+        """Side of a sensor pixel in pixels of the panel."""
+        return self.pitch / (profile.relay.magnification * profile.panel.pitch)
 
     @property
     def white(self) -> float:
@@ -67,3 +105,14 @@ class Sensor:
         charge = torch.randn(charge.shape, generator=draw).mul_(deviation).add_(charge)
         charge = torch.addcmul(charge, charge, charge, value=-self.nonlinearity / self.full_well)
         return charge.mul_(self.counts_per_electron).add_(self.dark).round_().clamp_(0, self.white)
+
+
+def box_filter(image: Tensor, width: float) -> Tensor:
+    """Mean over a square of ``width`` samples around each sample of ``(..., H, W)``; the sensor's pixel area."""
+    if width <= 1:
+        return image
+    reach = math.ceil((width - 1) / 2)
+    edge = (width - (2 * reach - 1)) / 2
+    taps = [share / width for share in (edge, *[1.0] * (2 * reach - 1), edge)]
+    flat = F.pad(image.reshape(-1, 1, *image.shape[-2:]), (reach, reach, reach, reach), mode="replicate")
+    return correlate(correlate(flat, taps, dim=-2), taps, dim=-1).reshape(image.shape)

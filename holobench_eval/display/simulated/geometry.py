@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from ....core.seeds import generator
+from ...core.seeds import generator
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,213 @@
+"""What a method gets of a display: a handle that counts its captures and hides everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from ..core.errors import BudgetError, CellError
+from ..core.seeds import generator
+from .api import Camera, Capture, Display, DisplaySpec, Simulation, check_phase, white_irradiance
+
+
+class MeteredDisplay:
+    """All that a method may see of a display: nominal optics, a metered camera, what it learned, named random numbers.
+
+    Everything else is private to the harness, its account of captures included.
+
+    Parameters
+    ----------
+    display
+        What the handle stands for.
+    label
+        Name of the method in error messages.
+    target
+        ``(C, h, w)`` linear light in [0, 1]; its device is that of the method.
+    names
+        What the random numbers and the noise of the captures depend on.
+    method
+        Who gets the handle; its ``camera`` and ``privileged`` decide what it may use.
+    budget
+        Captures that may be taken, None for no limit.
+    learned
+        What the method's ``prepare`` returned, None for a method that was not trained.
+    """
+
+    def __init__(
+        self,
+        display: Display,
+        label: str,
+        target: Tensor,
+        names: tuple[object, ...],
+        method: object = None,
+        budget: int | None = None,
+        learned: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._display = display
+        self._label = label
+        self._target = target.clone()  # a method that writes to its target must not reach the scored one
+        self._names = names
+        self._camera = bool(getattr(method, "camera", False))
+        self._privileged = bool(getattr(method, "privileged", False))
+        self._budget = budget
+        self._learned = learned
+        self._captures = 0
+        self._kept: Tensor | None = None
+        self._over = ""
+
+    @property
+    def spec(self) -> DisplaySpec:
+        """Nominal optics, public."""
+        return self._display.spec
+
+    @property
+    def device(self) -> torch.device:
+        """Where the target is, and with it all that a method computes."""
+        return self._target.device
+
+    @property
+    def captures(self) -> int:
+        """Captures taken so far."""
+        return self._captures
+
+    @property
+    def budget(self) -> int | None:
+        """Captures that the display allows in all, None for no limit; a method can plan its schedule for it."""
+        return self._budget
+
+    @property
+    def kept(self) -> Tensor | None:
+        """The best hologram so far, ``(C, H, W)`` [rad]: what the display scores if the budget ends. See ``keep``."""
+        return self._kept
+
+    @property
+    def over(self) -> str:
+        """Why the display refused a capture, empty if it refused none."""
+        return self._over
+
+    @property
+    def learned(self) -> Mapping[str, Any]:
+        """What the method's ``prepare`` returned. CellError for a method that declares no training."""
+        if self._learned is None:
+            raise CellError(f"{self._label} was not trained; a method that learns declares trains = True")
+        return self._learned
+
+    @property
+    def light(self) -> Tensor:
+        """Light at a white pixel, ``(C,)``, if all of the panel's went into the target; incident light is 1."""
+        return white_irradiance(self._target, self.spec)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The bench itself, for privileged methods alone."""
+        if not self._privileged:
+            raise CellError(f"{self._label}: only a method that declares privileged = True may see the simulated bench")
+        return self._display.simulation
+
+    def generator(self, *names: object) -> torch.Generator:
+        """Random numbers that depend on study seed, target, repeat and ``names``."""
+        return generator("method", *self._names, *names)
+
+    @cached_property
+    def _opened_camera(self) -> Camera:
+        return self._display.session((*self._names, "solve"), self._target)
+
+    def capture(self, phase: Tensor) -> Capture:
+        """Show a phase and photograph it; counted.
+
+        Parameters
+        ----------
+        phase
+            ``(C, H, W)`` [rad], any range.
+
+        Returns
+        -------
+        Capture
+            The frame as the camera gives it; ``rectify`` brings it into the target's frame.
+
+        Raises
+        ------
+        CellError
+            The method declares no camera, or no display can show the phase.
+        BudgetError
+            No capture is left.
+        """
+        if not self._camera:
+            raise CellError(f"{self._label} took a capture, but declares no camera (camera = True)")
+        if self._budget is not None and self._captures >= self._budget:
+            self._over = f"{self._label} has used its {self._budget} captures"
+            raise BudgetError(self._over)
+        check_phase(phase, self.spec, self._label)
+        self._captures += 1
+        return self._opened_camera.capture(phase)
+
+    def announce(self, phases: Sequence[Tensor]) -> None:
+        """Tell the display which phases ``(C, H, W)`` [rad] are captured next, in that order, whatever they show.
+
+        A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
+        """
+        left = len(phases) if self._budget is None else max(0, self._budget - self._captures)
+        if self._camera:
+            self._opened_camera.announce(phases[:left])
+
+    def keep(self, phase: Tensor) -> None:
+        """Hand in the best hologram so far, in the place of an earlier one.
+
+        It is scored if ``capture`` then ends the solution with a BudgetError. A copy is kept.
+
+        Parameters
+        ----------
+        phase
+            ``(C, H, W)`` or ``(1, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            No display can show the phase.
+        """
+        hologram = phase[0] if phase.ndim == 4 and len(phase) == 1 else phase
+        check_phase(hologram, self.spec, self._label)
+        self._kept = hologram.detach().cpu().clone()
+
+    def rectify(self, capture: Capture) -> Tensor:
+        """A capture in the target's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency."""
+        return self._display.rectified(capture, self._target)
+
+
+class MethodHandles:
+    """What every display inherits: ``for_method``."""
+
+    is_real: ClassVar[bool] = False
+
+    def for_method(
+        self: Display,
+        method: object,
+        label: str,
+        target: Tensor,
+        item: str,
+        repeat: int,
+        budget: int | None = None,
+        learned: Mapping[str, Any] | None = None,
+    ) -> MeteredDisplay:
+        """The handle that a method gets to solve a target.
+
+        Parameters
+        ----------
+        method
+            The method; its ``camera`` and ``privileged`` decide what the handle allows.
+        label
+            Its name in error messages.
+        target
+            ``(C, h, w)`` linear light in [0, 1].
+        item, repeat
+            Name of the target and number of the repetition: random numbers depend on them and on the display's seed.
+        budget
+            Captures that may be taken, None for no limit.
+        learned
+            What the method's ``prepare`` returned.
+        """
+        return MeteredDisplay(self, label, target, (self.seed, item, repeat), method, budget, learned)

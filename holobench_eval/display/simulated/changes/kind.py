@@ -1,0 +1,48 @@
+"""What a kind of change is: which parameters of a profile differ, and which values it takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..profile import Profile
+
+Value = float | str
+"""How far a condition goes: a number, or the name of one of several."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of change.
+
+    words: what changes; unit: of the values, empty for a factor or a name; stages: the parameters of ``Profile`` that
+    may differ; apply: the profile after a change; model: what is assumed, for reports; nominal: the value that changes
+    nothing (None: values are names, or draws, and there is none); low, high: what a number may be; moves: whether the
+    camera's view moves, so that it is registered anew (else it stays as it was before the change); per: the loss is
+    stated for so much (0: not at all); counted: whether values are whole numbers from 1 that name one of many; read:
+    the one form of a name, UserError for one without a meaning.
+    """
+
+    words: str
+    unit: str
+    stages: tuple[str, ...]
+    apply: Callable[[Profile, Value], Profile]
+    model: str
+    nominal: float | None = 0.0
+    low: float = -math.inf
+    high: float = math.inf
+    moves: bool = False
+    per: float = 1.0
+    counted: bool = False
+    read: Callable[[str], str] = str
+
+    @property
+    def numeric(self) -> bool:
+        """Whether values are numbers on an axis."""
+        return self.nominal is not None
+
+
+def number(change: Callable[[Profile, float], Profile]) -> Callable[[Profile, Value], Profile]:
+    """A change by a number, which is not asked for names."""
+    return lambda profile, value: change(profile, float(value))
