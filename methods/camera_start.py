@@ -15,8 +15,8 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from .common import matched
 from .descent import Best
-from .hil.retrieval import matched
 from .wirtinger import Wirtinger
 
 if TYPE_CHECKING:

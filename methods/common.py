@@ -58,6 +58,11 @@ def intensity_scale(intensity: Tensor, target: Tensor) -> Tensor:
     return overlap / intensity.square().sum(dim=(-2, -1), keepdim=True).clamp_min(_TINY)
 
 
+def matched(image: Tensor, target: Tensor) -> Tensor:
+    """An image ``(..., h, w)`` at the brightness of its target, by the least-squares factor of each channel."""
+    return image * intensity_scale(image, target)
+
+
 def safe_amplitude(intensity: Tensor) -> Tensor:
     """Square root of an intensity; the gradient of a vanishing intensity is zero, not infinite."""
     return intensity.clamp_min(_TINY).sqrt()

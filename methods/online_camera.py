@@ -16,9 +16,8 @@ from torch import Tensor
 
 from ..metrics.base import gaussian_blur
 from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
-from .common import unit_field
+from .common import matched, unit_field
 from .descent import cosine_decay
-from .hil.retrieval import matched
 
 if TYPE_CHECKING:
     from ..display.api import DisplaySpec

@@ -17,10 +17,11 @@ from torch import Tensor, nn
 from ..metrics.base import gaussian_blur
 from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
 from .hil.approximator import NetworkApproximator
-from .hil.loop import Sample
+from .hil.approximator_loss import ApproximatorLoss
 from .hil.networks import Network
-from .hil.objective import Objective
-from .hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from .learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from .learned.samples import Sample
+from .learned.weights import start_at_zero
 
 if TYPE_CHECKING:
     from ..display.calibrated import MeteredDisplay
@@ -34,9 +35,7 @@ class FromIdentity(nn.Module):
 
     def __init__(self, network: nn.Module) -> None:
         super().__init__()
-        self.network = network
-        last = [one for one in network.modules() if isinstance(one, nn.Conv2d | nn.ConvTranspose2d)][-1]
-        nn.init.zeros_(last.weight)
+        self.network = start_at_zero(network)
 
     def forward(self, ideal: Tensor) -> Tensor:
         """``(B, C, h, w)`` linear light to the same."""
@@ -71,7 +70,7 @@ class OnlineCameraNetwork:
     perturbation: Annotated[float, Interval(gt=0, le=10)] = 0.1
     steps: Annotated[int, Interval(ge=1, le=1_000_000)] = 12
     network: Network = Network()
-    loss: Objective | None = Objective(perceptual=0, adversarial=0)
+    loss: ApproximatorLoss | None = ApproximatorLoss(perceptual=0, adversarial=0)
     retrieval: ShortRetrieval = ShortRetrieval()
     start: CameraStart = CameraStart()
     checks: Annotated[int, Interval(ge=1, le=100)] = 3
@@ -108,7 +107,7 @@ class OnlineCameraNetwork:
     def _fresh(self, bench: MeteredDisplay, draw: torch.Generator) -> NetworkApproximator:
         """An approximator that has seen nothing; D = Id."""
         seed = int(torch.randint(2**31, (), generator=draw))
-        approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_judge=False, seed=seed)
+        approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_critic=False, seed=seed)
         if self.network.name != "identity":
             approximator.trainer.generator = FromIdentity(approximator.trainer.generator)
         return approximator.to(bench.device)

@@ -13,12 +13,12 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...core import seeds
 from ...optics.phasor import squared_modulus
 from ..common import safe_amplitude, unit_field
-from ..hil.loop import Steps
+from ..learned.samples import Steps
+from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
-from .method import Calibrated, Schedule
+from .method import Calibrated, ShortSchedule
 from .networks import ColourByColour
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def parts(field: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True)
-class LongerSchedule(Schedule):
+class LongerSchedule(ShortSchedule):
     """More steps on more natural holograms than a model with few parameters needs."""
 
     images: Annotated[int, Interval(ge=1)] | None = 24
@@ -81,6 +81,5 @@ class CNNPropCNN(Calibrated):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """Networks that add nothing."""
-        with torch.random.fork_rng(devices=[]):
-            torch.set_rng_state(seeds.generator("cnn_prop_cnn", self.seed).get_state())
+        with seeded("cnn_prop_cnn", self.seed):
             return ModelApproximator(TwoNetworks(spec, self.width), None, self.RATES)

@@ -10,9 +10,9 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...core import seeds
 from ...optics.phasor import phasor
 from ..display_model import FORM, DisplayModel
+from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
 from .diagnosis import Diagnosed, diagnose
 from .method import Calibrated
@@ -65,8 +65,7 @@ class HybridModel(Diagnosed, Calibrated):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """A display as the nominal model says."""
-        with torch.random.fork_rng(devices=[]):
-            torch.set_rng_state(seeds.generator("hybrid_model", self.seed).get_state())
+        with seeded("hybrid_model", self.seed):
             residual = Residual(len(spec.wavelengths), self.width)
         return ModelApproximator(FinePanel(spec), residual, self.RATES)
 

@@ -13,9 +13,9 @@ from annotated_types import Interval
 from torch import Tensor, nn
 
 from ..common import unit_field
-from ..hil.loop import Steps
+from ..learned.samples import Steps
 from .approximator import ModelApproximator, Rates
-from .method import Calibrated, Schedule
+from .method import Calibrated, ShortSchedule
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
@@ -48,7 +48,7 @@ class Kernels(nn.Module):
 
 
 @dataclass(frozen=True)
-class OneRound(Schedule):
+class OneRound(ShortSchedule):
     """All captures before the training, as in the paper."""
 
     rounds: Annotated[int, Interval(ge=1, le=100)] = 1

@@ -7,7 +7,6 @@ tell look-up table, phase gain, crosstalk, unmodulated light and aberrations apa
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import torch
@@ -15,7 +14,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from ...display.training import TrainingImage
-from ..hil.loop import Sample, captured
+from ..learned.samples import Sample, captured
 
 if TYPE_CHECKING:
     from ...display.training import TrainingBench
@@ -31,12 +30,8 @@ def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
     gray = torch.full((len(bench.spec.wavelengths), *bench.spec.region.shape), GRAY, device=bench.device)
     images = [TrainingImage(f"pattern-{number:02d}", gray) for number in range(count)]
     phases = [_pattern(bench, number) for number in range(count)]
-    bench.announce((phase, image, ("pattern",)) for phase, image in zip(phases, images, strict=True))
-    samples = []
-    for number, (phase, image) in enumerate(zip(phases, images, strict=True)):
-        made = bench.kept(f"pattern {number}", partial(captured, bench, phase, image, "pattern"))
-        samples.append(Sample(phase, made["capture"], gray, bench.light(image)))
-    return samples
+    keys = [f"pattern {number}" for number in range(count)]
+    return list(captured(bench, keys, phases, images, "pattern"))
 
 
 def _pattern(bench: TrainingBench, number: int) -> Tensor:

@@ -18,8 +18,7 @@ from torch.nn import functional
 
 from ...core.errors import UserError
 from ...metrics.base import as_rgb, gaussian_blur
-from ...metrics.feature_distance import _opponent as opponent
-from ...metrics.feature_distance import _responses as oriented_responses
+from ...metrics.feature_distance import opponent_channels, oriented_responses
 
 WEIGHTS = (1.5, 1.0)  # v of relu1_2 and relu2_2, Section 4.3.1
 URL = "https://download.pytorch.org/models/vgg19-dcbb9e9d.pth"
@@ -94,7 +93,7 @@ class OrientedFilters(nn.Module):
         for scale, weight in enumerate(WEIGHTS):
             if scale:
                 difference = gaussian_blur(difference, 1.0)[:, :, ::2, ::2]
-            parts.append(weight * oriented_responses(opponent(difference, scale)).abs().mean())
+            parts.append(weight * oriented_responses(opponent_channels(difference, scale)).abs().mean())
         return torch.stack(parts).sum()
 
 

@@ -16,8 +16,8 @@ from holobench_eval.display.calibrated import white_irradiance
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import LookUpTable, ZeroOrder
 from holobench_eval.methods.display_model import KNOTS, MODES, DisplayModel
-from holobench_eval.methods.hil.loop import Sample
-from holobench_eval.methods.hil.plus import PlusApproximator
+from holobench_eval.methods.hil.plus import HILPlus
+from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.optics import AngularSpectrum
 
@@ -313,7 +313,7 @@ def measured(colours: int, count: int) -> tuple[DisplaySpec, list[Sample]]:
 def test_a_fit_finds_the_gamma_the_gain_and_the_unmodulated_light_of_a_display() -> None:
     """To a few percent, but for the levels next to the wrap: those are seen through crosstalk, which learns slowly."""
     spec, samples = measured(colours=2, count=10)
-    approximator = PlusApproximator(spec, None, seed=0)
+    approximator = HILPlus().approximator(spec)
     for step in range(STEPS):
         approximator.step(samples[step * 7 % len(samples)], step / STEPS)
     model = approximator.model

@@ -21,26 +21,39 @@ from ...metrics.lpips import available, lpips
 from ...metrics.ms_ssim import SMALLEST as SMALLEST_MS_SSIM
 from ...metrics.ms_ssim import FixedMsSsim
 from ...optics import srgb_encode
+from ..common import matched
 from ..descent import Best, cosine_decay
-from .judge import Judge
 
 Weight = Annotated[float, Interval(ge=0, le=1e6)]
 
 Image = Callable[[Tensor], Tensor]
 """Phase ``(C, H, W)`` [rad] to the predicted capture ``(C, h, w)``, differentiable."""
+Verdict = Callable[[Tensor], Tensor]
+"""A picture ``(1, C, h, w)`` to its adversarial loss."""
 
 
 @dataclass(frozen=True)
-class Retrieval:
-    """Adam on the phase for Eq. 22, from a start that the method chooses.
+class PhaseRetrieval:
+    """Adam on the phase for Eq. 22 of Chakravarthula et al. 2020, from a start that the method chooses.
 
-    perceptual: LPIPS where its weights are found, else the weight-free feature distance (``mofd``), of sRGB pictures;
-    the paper's weight is 1, and it gives none of the other three. ms_ssim, l2: of linear light. adversarial: the
-    verdict of ``judge.Judge``. A term of weight 0 is not computed.
-    iterations, step: the paper takes 300 of 0.001 rad; step is cosine-decayed to zero here. Twice this step lost
-    0.6 dB on captures of dead leaves: the network is to be believed near its start alone. No iteration leaves the
-    start as it is.
-    threshold: stop when the mean squared error of the predicted picture is below.
+    A term of weight 0 is not computed.
+
+    Parameters
+    ----------
+    iterations : int
+        0 leaves the start as it is; the paper takes 300.
+    step : float
+        Adam's step [rad], cosine-decayed to zero (not in the paper, whose step of 0.001 rad is constant). Twice this
+        step lost 0.6 dB on captures of dead leaves: the network is to be believed near its start alone.
+    perceptual : float
+        Weight of LPIPS where its weights are found, else of the weight-free feature distance (``mofd``, not in the
+        paper), of sRGB pictures; 1 in the paper, which gives none of the other three.
+    ms_ssim, l2 : float
+        Weights of MS-SSIM and of the squared error, in linear light.
+    adversarial : float
+        Weight of the verdict of a critic, where the method has one.
+    threshold : float
+        Stop when the mean squared error of the predicted picture is below.
     """
 
     iterations: Annotated[int, Interval(ge=0, le=100_000)] = 60
@@ -52,15 +65,9 @@ class Retrieval:
     threshold: Annotated[float, Interval(ge=0)] = 0.0
 
 
-def matched(image: Tensor, target: Tensor) -> Tensor:
-    """An image ``(C, h, w)`` at the brightness of its target, by the least-squares factor of each channel."""
-    overlap = (image * target).sum((-2, -1), keepdim=True)
-    return image * (overlap / image.square().sum((-2, -1), keepdim=True).clamp_min(1e-12))
-
-
 @dataclass(frozen=True)
-class SquaredErrorRetrieval(Retrieval):
-    """``Retrieval`` for the squared error alone, for methods without a judge."""
+class SquaredErrorRetrieval(PhaseRetrieval):
+    """`PhaseRetrieval` for the squared error alone, for methods without a critic."""
 
     perceptual: Weight = 0.0
     ms_ssim: Weight = 0.0
@@ -73,9 +80,9 @@ class PictureLoss:
     The perceptual distance is LPIPS if its weights are there, else the project's feature distance.
     """
 
-    def __init__(self, target: Tensor, settings: Retrieval, judge: Judge | None) -> None:
+    def __init__(self, target: Tensor, settings: PhaseRetrieval, verdict: Verdict | None) -> None:
         check_region((target.shape[-2], target.shape[-1]), settings)
-        self.target, self.settings, self.judge = target, settings, judge
+        self.target, self.settings, self.verdict = target, settings, verdict
         wanted = target[None]
         encoded = srgb_encode(wanted)
         self.structure = FixedMsSsim(wanted) if settings.ms_ssim else None
@@ -93,22 +100,24 @@ class PictureLoss:
             loss = loss + weights.perceptual * self.perceptual(srgb_encode(shown)).mean()
         if self.structure is not None:
             loss = loss + weights.ms_ssim * (1 - self.structure(shown).mean())
-        if weights.adversarial and self.judge is not None:
-            loss = loss + weights.adversarial * self.judge.verdict(picture[None])
+        if weights.adversarial and self.verdict is not None:
+            loss = loss + weights.adversarial * self.verdict(picture[None])
         return loss, error.detach()
 
 
-def check_region(shape: tuple[int, int], settings: Retrieval) -> None:
+def check_region(shape: tuple[int, int], settings: PhaseRetrieval) -> None:
     """UserError for a region that is too small for a term of the loss."""
     for name, smallest in (("perceptual", SMALLEST_PERCEPTUAL), ("ms_ssim", SMALLEST_MS_SSIM)):
         if getattr(settings, name) and min(shape) < smallest:
-            found = " x ".join(map(str, shape))
-            raise UserError(f"retrieval: {name} needs a region of {smallest} x {smallest} px, got {found}; set it to 0")
+            size = " x ".join(map(str, shape))
+            raise UserError(f"retrieval: {name} needs a region of {smallest} x {smallest} px, got {size}; set it to 0")
 
 
-def retrieve(image: Image, target: Tensor, start: Tensor, settings: Retrieval, judge: Judge | None = None) -> Tensor:
+def retrieve(
+    image: Image, target: Tensor, start: Tensor, settings: PhaseRetrieval, verdict: Verdict | None = None
+) -> Tensor:
     """The phase ``(C, H, W)`` [rad] near ``start`` whose predicted capture looks most like ``target`` ``(C, h, w)``."""
-    picture_loss = PictureLoss(target, settings, judge)
+    picture_loss = PictureLoss(target, settings, verdict)
     phase, best = start.detach().clone().requires_grad_(), Best(start[None])
     pixels = phase.shape[-2] * phase.shape[-1]
     optimiser = torch.optim.Adam([phase], lr=settings.step, betas=(0.9, 0.999))
