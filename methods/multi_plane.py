@@ -15,7 +15,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from .common import Bench, Offset, per_channel, with_offset
-from .descent import Best
+from .descent import adam
 from .initial_phase import InitialPhase, initial_phase
 from .losses import LOSSES, LossName
 from .wirtinger import Objective
@@ -55,15 +55,14 @@ class MultiPlane:
     def _retrieve(self, targets: Tensor, offsets: Sequence[float], bench: Bench, channel: int) -> Tensor:
         """Targets ``(P, B, h, w)`` of a colour to phases ``(B, H, W)``."""
         planes = [self._objective(*plane, bench, channel) for plane in zip(targets, offsets, strict=True)]
-        phase = initial_phase(self.initial_phase, targets[0], bench, channel)
-        best, pixels = Best(phase), phase.shape[-2] * phase.shape[-1]
-        optimiser = torch.optim.Adam([phase], lr=self.step, fused=True)
-        for _ in range(self.iterations):
+        start = initial_phase(self.initial_phase, targets[0], bench, channel)
+        pixels = start.shape[-2] * start.shape[-1]
+
+        def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
             losses, gradients = zip(*(plane.evaluate(phase) for plane in planes), strict=True)
-            best.update(torch.stack(losses).mean(0), phase)
-            phase.grad = torch.stack(gradients).mean(0) * pixels  # far above Adam's epsilon
-            optimiser.step()
-        return with_offset(best.phase, self.offset)
+            return torch.stack(losses).mean(0), torch.stack(gradients).mean(0) * pixels
+
+        return with_offset(adam(start, evaluate, self.iterations, self.step, fused=True), self.offset)
 
     def _objective(self, target: Tensor, offset: float, bench: Bench, channel: int) -> Objective:
         """The loss at one plane, through the nominal model at its distance."""

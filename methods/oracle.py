@@ -9,7 +9,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from .descent import Best, cosine_decay
+from .descent import adam, by_autograd
 from .losses import intensity_l2
 from .wirtinger import Wirtinger
 
@@ -43,14 +43,8 @@ class Oracle:
     def _refine(self, target: Tensor, start: Tensor, bench: MeteredDisplay) -> Tensor:
         """One image: target ``(C, h, w)``, start ``(C, H, W)``; the colours do not interact."""
         simulation = bench.simulation
-        phase, best = start.clone().requires_grad_(), Best(start)
-        pixels = phase.shape[-2] * phase.shape[-1]
-        optimiser = torch.optim.Adam([phase], lr=self.step)
-        for iteration in range(self.iterations):
-            loss = intensity_l2(simulation.image(phase), target)
-            best.update(loss, phase)
-            # the factor keeps the gradient far above Adam's epsilon
-            (phase.grad,) = torch.autograd.grad(pixels * loss.sum(), phase)
-            optimiser.param_groups[0]["lr"] = cosine_decay(self.step, iteration / self.iterations)
-            optimiser.step()
-        return best.phase
+
+        def loss(phase: Tensor) -> Tensor:
+            return intensity_l2(simulation.image(phase), target)
+
+        return adam(start, by_autograd(loss), self.iterations, self.step, decay=True)

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-import torch
 from annotated_types import Interval
 from torch import Tensor
 
 from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
-from .descent import Best
+from .descent import adam, by_autograd
 from .initial_phase import InitialPhase, initial_phase
 from .losses import amplitude_l2
 
@@ -42,15 +41,9 @@ class AmplitudeSGD:
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         model, region = nominal_model(bench, channel, target), bench.spec.region
-        phase = initial_phase(self.initial_phase, target, bench, channel).requires_grad_()
-        pixels = phase.shape[-2] * phase.shape[-1]
-        best = Best(phase)
-        optimiser = torch.optim.Adam([phase], lr=self.step)
-        for _ in range(self.iterations):
-            intensity = region.crop(model.forward(unit_field(phase))).abs().square()
-            loss = amplitude_l2(intensity, target)
-            best.update(loss, phase)
-            # the factor keeps the gradient far above Adam's epsilon
-            (phase.grad,) = torch.autograd.grad(pixels * loss.sum(), phase)
-            optimiser.step()
-        return with_offset(best.phase, self.offset)
+
+        def loss(phase: Tensor) -> Tensor:
+            return amplitude_l2(region.crop(model.forward(unit_field(phase))).abs().square(), target)
+
+        start = initial_phase(self.initial_phase, target, bench, channel)
+        return with_offset(adam(start, by_autograd(loss), self.iterations, self.step), self.offset)
