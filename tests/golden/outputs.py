@@ -27,7 +27,16 @@ from holobench_eval.imaging.align import align
 from holobench_eval.metrics import score
 from holobench_eval.study.versions import ALIGNMENT, HARNESS, method_version
 from tests.support import photographed
-from tests.support.small_training import Memory, pictures, small_spec, solving_bench, through_a_file, training_bench
+from tests.support.small_training import (
+    ROUNDS,
+    Memory,
+    pictures,
+    quick,
+    small_spec,
+    solving_bench,
+    through_a_file,
+    training_bench,
+)
 from tests.support.toy_camera import ToyDisplay, picture
 
 FILE = Path(__file__).with_name("outputs.json")
@@ -162,47 +171,14 @@ def _alignment() -> dict[str, Tensor]:
     return {"corners": corners, "correlation": torch.tensor(alignment.correlation)}
 
 
-# Few iterations: what rounding does to a phase grows with them, and so does the time. A phase of few iterations leaves
-# wide gaps in the histogram that ``with_offset`` takes the emptiest bin of, where rounding would decide.
-_EARLY = {"iterations": 5, "offset": "none"}
-_START = {"converged": {"iterations": 20, "offset": "none"}, "early": _EARLY}
-_ROUNDS = {"rounds": 2, "refine_images": 1, "steps": 5, "refine_steps": 3}
-_SMALL = {"levels": 2, "width": 4}
-_CALIBRATED = {"training": _ROUNDS, "search": {"iterations": 2}, "retrieval": {"iterations": 3}, "start": _EARLY}
-SETTINGS: dict[str, dict[str, Any]] = {
-    **{key: {"iterations": 6} for key in ("gerchberg_saxton", "hio")},
-    **dict.fromkeys(("wirtinger", "sgd", "multi_plane"), _EARLY),
-    "odak_sgd": {"iterations": 1},
-    "torchoptics_adam": {"iterations": 6},
-    "oracle": {"iterations": 4, "start_iterations": 40},
-    "online_camera": {"captures": 24, "start": _START},
-    "online_camera_network": {"captures": 24, "start": _START, "steps": 3, "network": _SMALL},
-    "hil": {
-        "network": _SMALL,
-        "training": _ROUNDS,
-        # a network of so few steps hides the phase, whose gradient would be rounding
-        "retrieval": {"iterations": 0, "perceptual": 0, "ms_ssim": 0},
-        "offsets": 2,
-        "start": {"offset": "none"},
-    },
-    "hil_nh3d": {
-        "network": {**_SMALL, "name": "unet"},
-        "training": _ROUNDS,
-        "retrieval": {"iterations": 3, "step": 0.05},
-        "start": _EARLY,
-    },
-    "hil_plus": {"network": _SMALL, **_CALIBRATED},
-    **{key: {**_CALIBRATED, "patterns": 2} for key in ("parametric_model", "learned_kernel")},
-    **{key: {**_CALIBRATED, "patterns": 2, "width": 4} for key in ("cnn_prop_cnn", "hybrid_model")},
-}
 # Retrieval with all terms of Eq. 22, through a network that shows what it is given.
-_RETRIEVAL = {"network": {"name": "identity"}, "training": _ROUNDS, "offsets": 1, "start": {"offset": "none"}}
+_RETRIEVAL = {"network": {"name": "identity"}, "training": ROUNDS, "offsets": 1, "start": {"offset": "none"}}
 _RETRIEVAL["retrieval"] = {"iterations": 3, "step": 0.05}
 
 
 def _method(name: str) -> dict[str, Tensor]:
     """Phases of a method; where it is trained, also what it learned and predicts."""
-    method = plugins.build("methods", name, SETTINGS.get(name, {}))
+    method = quick(name)
     if name == "hil":
         identity = _trained(plugins.build("methods", name, _RETRIEVAL), small_spec(192, 176))
         return _trained(method, small_spec(48, 40, 3)) | {f"retrieval {key}": identity[key] for key in ("cos", "sin")}
