@@ -64,8 +64,8 @@ class DisplayModel(nn.Module):
 
     def forward(self, phase: Tensor) -> Tensor:
         """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; its intensity is in the captures' unit."""
-        shown = self._blurred(self._driven(phase))
-        panel = phasor(shown.new_ones(()), shown).mean(1)
+        blurred = self._blurred(self._driven(phase))
+        panel = phasor(blurred.new_ones(()), blurred).mean(1)
         panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * self._illumination()
         region = [self.spec.region.crop(self._propagator(c).forward(field)) for c, field in enumerate(panel)]
         return self._aberrated(torch.stack(region)) * torch.exp(self.brightness / 2)[:, None, None]

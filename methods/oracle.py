@@ -23,9 +23,17 @@ class Oracle:
 
     It knows all that is fixed about the bench (look-up table, crosstalk, illumination, aberrations) but not the
     noise of a capture. It starts from ``start_iterations`` of Wirtinger, few on purpose: a converged nominal
-    phase is full of wraps, and where a panel blurs its wraps, descent does not get out of them again.
-    step: Adam's first step [rad], cosine-decayed to zero. The phase of the least loss that was seen is returned,
-    per colour.
+    phase is full of wraps, and where a panel blurs its wraps, descent does not get out of them again. The phase of the
+    least loss that was seen is returned, per colour. SI units throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        Evaluations of the loss (Chakravarthula et al. 2020, Eq. 12) and its gradient.
+    step : float
+        Adam's first step [rad], cosine-decayed to zero.
+    start_iterations : int
+        Of Wirtinger holography.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
@@ -36,7 +44,25 @@ class Oracle:
     privileged: ClassVar[bool] = True
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]. CellError without a simulated bench."""
+        """Phases of least loss in what the bench itself would capture without noise.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : MeteredDisplay
+            A simulated display that is open to this method.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            Without a simulated bench.
+        """
         start = Wirtinger(iterations=self.start_iterations).solve(target, bench)
         return torch.stack([self._refine(image, phase, bench) for image, phase in zip(target, start, strict=True)])
 

@@ -23,8 +23,18 @@ class AmplitudeSGD:
     """Adam on the phase for the squared error of amplitude in the region; light outside it is free.
 
     One departure from the paper: the scale between the amplitudes is the closed-form optimum of each iteration,
-    where the paper learns it by a gradient step of its own. step: Adam's step [rad], constant as published.
-    The phase of the least loss that was seen is returned.
+    where the paper learns it by a gradient step of its own. SI units throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        Evaluations of loss and gradient.
+    step : float
+        Adam's step [rad], constant as published.
+    initial_phase : str
+        See `initial_phase.initial_phase`.
+    offset : {"none", "centre"}
+        Global phase offset, see `common.with_offset`.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
@@ -36,7 +46,20 @@ class AmplitudeSGD:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """The phase of the least loss that was seen (Peng et al. 2020).
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+        """
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:

@@ -17,7 +17,7 @@ from ..learned.retrieval import Image
 from ..learned.samples import Sample
 from ..learned.weights import load_moments, refuse_other_weights
 
-BETAS = (0.9, 0.99)
+MODEL_BETAS = (0.9, 0.99)
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class ModelApproximator:
         """Itself, before the first step, on a device."""
         self._capture.to(device)
         groups = [{"params": list(module.parameters()), "lr": rate} for module, rate in self._learners]
-        self._optimiser = torch.optim.Adam(groups, betas=BETAS)
+        self._optimiser = torch.optim.Adam(groups, betas=MODEL_BETAS)
         return self
 
     def expose(self, samples: Sequence[Sample]) -> None:

@@ -46,7 +46,7 @@ class TwoNetworks(nn.Module):
         real, imaginary = (lit + self.panel(lit)).unbind(1)
         panel = torch.complex(real, imaginary)
         models = [self.spec.propagator(channel, device=panel.device) for channel in range(len(panel))]
-        propagated = [model.forward(one) for model, one in zip(models, panel, strict=True)]
+        propagated = [model.forward(field) for model, field in zip(models, panel, strict=True)]
         field = self.spec.region.crop(torch.stack(propagated))
         amplitude = safe_amplitude(squared_modulus(field)) + self.target(parts(field))[:, 0]
         return amplitude.square() * torch.exp(self.brightness)[:, None, None]
@@ -70,8 +70,13 @@ class CNNPropCNN(Calibrated):
     """Two networks around the ideal propagation, in a size for small panels and a CPU.
 
     As in the paper, a pair for each colour. Its networks are U-Nets and give the field itself; here, where a few dozen
-    captures have to do, they are three convolutions at full resolution, add to the field, and begin with nothing.
-    width: features of each.
+    captures have to do, they are three convolutions at full resolution, add to the field, and begin with nothing. The
+    other parameters are those of `Calibrated`. SI units throughout.
+
+    Parameters
+    ----------
+    width : int
+        Features of each network.
     """
 
     training: LongerSchedule = LongerSchedule()

@@ -55,7 +55,12 @@ class Residual(nn.Module):
 class HybridModel(Diagnosed, Calibrated):
     """``DisplayModel``, a map of the panel pixel by pixel and a residual network that learn from the same captures.
 
-    Map and network begin with nothing. width: features of the network.
+    Map and network begin with nothing. The other parameters are those of `Calibrated`. SI units throughout.
+
+    Parameters
+    ----------
+    width : int
+        Features of the network.
     """
 
     width: Annotated[int, Interval(ge=2, le=256)] = 16

@@ -27,13 +27,29 @@ SWITCHES = ("dropout", "full_resolution_stage", "plain_ends", "skip_after_activa
 class Network:
     """Generator and discriminator by name and size.
 
-    preset: "paper" is what is published; "small" has a quarter of the filters and fewer levels, for small panels and a
-    CPU. levels (halvings of the resolution) and width (filters of the first level, doubled from level to level) replace
-    the preset's: 8 and 64 or 5 and 16, and 4 levels for U-Net and Pix2PixHD in both. U-Net and Pix2PixHD have half the
-    filters of ``width``, as in Section 6.1 of the paper.
+    Chakravarthula et al. 2020, Sections 4.3.1 and 6.1.
 
-    For the proposed network only: conditional, the discriminator sees the ideal image too; and the four changes to
-    Pix2Pix (see ``Generator``), each of which can be undone. Raises UserError where one is set for another network.
+    Parameters
+    ----------
+    name : str
+        The proposed network or one of Table 1.
+    preset : {"small", "paper"}
+        "paper" is what is published; "small" (not in the paper) has a quarter of the filters and fewer levels, for
+        small panels and a CPU.
+    levels : int, optional
+        Halvings of the resolution; None: 5 or 8 by preset, and 4 for U-Net and Pix2PixHD.
+    width : int, optional
+        Filters of the first level, doubled from level to level; None: 16 or 64 by preset. U-Net and Pix2PixHD have half
+        of them, as in Section 6.1.
+    conditional : bool
+        The discriminator sees the ideal image too. For the proposed network only, as are the next four.
+    dropout, full_resolution_stage, plain_ends, skip_after_activation : bool
+        The four changes to Pix2Pix, each of which can be undone, see `Generator`.
+
+    Raises
+    ------
+    UserError
+        Where one of the last five is set for another network.
     """
 
     name: Name = "proposed"

@@ -32,14 +32,14 @@ def best_offset(bench: TrainingBench, start: Wirtinger, offsets: int) -> float:
     def search() -> dict[str, list[float]]:
         images = bench.images[:TRIED_IMAGES]
         phases = [start.solve(image.target[None], bench)[0] for image in images]
-        shown = [
+        candidates = [
             (phase + offset, image, ("offset", index))
             for image, phase in zip(images, phases, strict=True)
             for index, offset in enumerate(tried)
         ]
-        bench.announce(shown)
+        bench.announce(candidates)
         errors = [0.0] * offsets
-        for phase, image, (name, index) in shown:
+        for phase, image, (name, index) in candidates:
             capture = bench.photograph(phase, image, name, index)
             errors[index] += float(functional.mse_loss(matched(capture, image.target), image.target))
         return {"errors": errors}

@@ -44,7 +44,7 @@ class VGG19(nn.Module):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        state = _read(path)
+        state = _read_vgg19(path)
         self.convolutions = nn.ModuleDict()
         for number, (before, after) in CONVOLUTIONS.items():
             convolution = nn.Conv2d(before, after, 3, padding=1)
@@ -114,16 +114,16 @@ def find_weights(location: Path | None = None) -> Path | None:
     if location is not None and location.is_file():
         return location
     folder = Path(torch.hub.get_dir()) / "checkpoints" if location is None else location
-    found = max(folder.glob("vgg19-*.pth"), key=lambda path: path.stat().st_mtime, default=None)
-    if found is None and location is not None:
+    newest = max(folder.glob("vgg19-*.pth"), key=lambda path: path.stat().st_mtime, default=None)
+    if newest is None and location is not None:
         raise UserError(f"VGG weights: no vgg19-*.pth in {location}; put {URL} there")
-    return found
+    return newest
 
 
 _AGAIN = "download it again"
 
 
-def _read(path: Path) -> dict[str, Tensor]:
+def _read_vgg19(path: Path) -> dict[str, Tensor]:
     """A dictionary of tensors from a file, read without running anything in it.
 
     A name such as torchvision's ends in the first eight digits of the file's SHA-256, which are checked.

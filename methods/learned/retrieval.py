@@ -95,11 +95,11 @@ class PictureLoss:
         weights, picture = self.settings, matched(image, self.target)
         error = functional.mse_loss(picture, self.target)
         loss = weights.l2 * error
-        shown = picture.clamp(0, 1)[None]
+        clipped = picture.clamp(0, 1)[None]
         if self.perceptual is not None:
-            loss = loss + weights.perceptual * self.perceptual(srgb_encode(shown)).mean()
+            loss = loss + weights.perceptual * self.perceptual(srgb_encode(clipped)).mean()
         if self.structure is not None:
-            loss = loss + weights.ms_ssim * (1 - self.structure(shown).mean())
+            loss = loss + weights.ms_ssim * (1 - self.structure(clipped).mean())
         if weights.adversarial and self.verdict is not None:
             loss = loss + weights.adversarial * self.verdict(picture[None])
         return loss, error.detach()

@@ -48,7 +48,13 @@ class Schedule:
     keep_captures: bool = True
 
     def images_of(self, number: int, images: Sequence[TrainingImage]) -> list[TrainingImage]:
-        """The images of a round."""
+        """The images of a round.
+
+        Examples
+        --------
+        >>> [Schedule(refine_images=2).images_of(number, "abc") for number in (1, 2, 3)]
+        [['a', 'b', 'c'], ['a', 'b'], ['c', 'a']]
+        """
         used = images[: self.images]
         if number == 1 or self.refine_images is None or self.refine_images >= len(used):
             return list(used)
@@ -85,35 +91,27 @@ class Approximator(Protocol):
 
     def to(self, device: torch.device) -> Approximator:
         """Itself, before the first step, on a device."""
-        ...
 
     def expose(self, samples: Sequence[Sample]) -> None:
         """Choose, once, from the first captures, the unit in which captures are learned."""
-        ...
 
     def step(self, sample: Sample, progress: float) -> dict[str, float]:
         """One step of training, when the share ``progress`` of the round's steps is done; the losses by name."""
-        ...
 
     def image(self, light: Tensor) -> Image:
         """The display with the weights as they are now, held: phase to predicted capture."""
-        ...
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
-        ...
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on from a state."""
-        ...
 
     def learned(self) -> dict[str, Any]:
         """What phase retrieval needs."""
-        ...
 
     def load_learned(self, weights: Mapping[str, Any]) -> None:
         """Take over what was learned; UserError for the weights of another network."""
-        ...
 
 
 def captured(
