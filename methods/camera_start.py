@@ -22,8 +22,8 @@ from .wirtinger import Wirtinger
 if TYPE_CHECKING:
     from ..display.calibrated import MeteredDisplay
 
+# Neither the search for a start nor the decision at the end takes more than one capture in so many.
 LEAST_SHARE = 4
-"""Neither the search for a start nor the decision at the end takes more than one capture in so many."""
 
 
 def captured_error(capture: Tensor, target: Tensor) -> Tensor:

@@ -9,9 +9,9 @@ from dataclasses import InitVar, dataclass, field
 import torch
 from torch import Tensor
 
+# Phase (B, H, W) [rad] to the loss (B,) and its gradient (B, H, W) times the pixels of the panel: a factor that keeps
+# it far above Adam's epsilon, whatever the panel's size.
 Evaluate = Callable[[Tensor], tuple[Tensor, Tensor]]
-"""Phase ``(B, H, W)`` [rad] to the loss ``(B,)`` and its gradient ``(B, H, W)`` times the pixels of the panel: a factor
-that keeps it far above Adam's epsilon, whatever the panel's size."""
 
 
 @dataclass
@@ -57,7 +57,7 @@ def adam(
     >>> adam(torch.zeros(1, 2, 2), bowl, iterations=60, step=0.1, decay=True).mean().round(decimals=2)
     tensor(1.)
     """
-    phase, best = start.clone(), Best(start)
+    phase, best = start.detach().clone(), Best(start)
     optimiser = torch.optim.Adam([phase], lr=step, fused=fused)
     for iteration in range(iterations):
         loss, gradient = evaluate(phase)
@@ -77,7 +77,7 @@ def by_autograd(loss: Callable[[Tensor], Tensor]) -> Evaluate:
     def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
         phase = phase.detach().requires_grad_()
         losses = loss(phase)
-        (gradient,) = torch.autograd.grad(phase[0].numel() * losses.sum(), phase)
+        (gradient,) = torch.autograd.grad(phase.shape[-2] * phase.shape[-1] * losses.sum(), phase)
         return losses.detach(), gradient
 
     return evaluate

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from ..display.api import DisplaySpec
     from ..display.calibrated import MeteredDisplay
 
+# Adam's decay rates. Little momentum: the gradient is that of another display.
 MOMENTS = (0.6, 0.99)
-"""Adam's decay rates. Little momentum: the gradient is that of another display."""
 
 
 @dataclass(frozen=True)

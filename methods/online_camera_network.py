@@ -26,8 +26,8 @@ from .learned.weights import start_at_zero
 if TYPE_CHECKING:
     from ..display.calibrated import MeteredDisplay
 
+# Width [px] of the Gaussian that what the network misses of the captures is filtered with.
 SMOOTHING = 0.7
-"""Width [px] of the Gaussian that what the network misses of the captures is filtered with."""
 
 
 class FromIdentity(nn.Module):

@@ -19,10 +19,10 @@ from ..learned.samples import Sample, captured
 if TYPE_CHECKING:
     from ...display.training import TrainingBench
 
+# Correlation lengths [px] that the patterns go through in turn: wraps from everywhere to a few long edges.
 LENGTHS = (2.0, 4.0, 8.0, 16.0)
-"""Correlation lengths [px] that the patterns go through in turn: wraps from everywhere to a few long edges."""
+# Of the constant picture that the camera is exposed for; speckle peaks stay below its saturation.
 GRAY = 0.25
-"""Of the constant picture that the camera is exposed for; speckle peaks stay below its saturation."""
 
 
 def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:

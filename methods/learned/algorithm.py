@@ -20,8 +20,8 @@ from .samples import Approximator, Sample, Schedule
 if TYPE_CHECKING:
     from ...display.training import TrainingBench, TrainingImage
 
+# Display as it is approximated, target (C, h, w), start (C, H, W): the phase retrieved through it.
 Minimise = Callable[[Image, Tensor, Tensor], Tensor]
-"""Display as it is approximated, target ``(C, h, w)``, start ``(C, H, W)``: the phase retrieved through it."""
 
 
 def train(

@@ -22,14 +22,14 @@ from ...metrics.ms_ssim import SMALLEST as SMALLEST_MS_SSIM
 from ...metrics.ms_ssim import FixedMsSsim
 from ...optics import srgb_encode
 from ..common import matched
-from ..descent import Best, cosine_decay
+from ..descent import adam, by_autograd
 
 Weight = Annotated[float, Interval(ge=0, le=1e6)]
 
+# Phase (C, H, W) [rad] to the predicted capture (C, h, w), differentiable.
 Image = Callable[[Tensor], Tensor]
-"""Phase ``(C, H, W)`` [rad] to the predicted capture ``(C, h, w)``, differentiable."""
+# A picture (1, C, h, w) to its adversarial loss.
 Verdict = Callable[[Tensor], Tensor]
-"""A picture ``(1, C, h, w)`` to its adversarial loss."""
 
 
 @dataclass(frozen=True)
@@ -117,17 +117,14 @@ def retrieve(
     image: Image, target: Tensor, start: Tensor, settings: PhaseRetrieval, verdict: Verdict | None = None
 ) -> Tensor:
     """The phase ``(C, H, W)`` [rad] near ``start`` whose predicted capture looks most like ``target`` ``(C, h, w)``."""
-    picture_loss = PictureLoss(target, settings, verdict)
-    phase, best = start.detach().clone().requires_grad_(), Best(start[None])
-    pixels = phase.shape[-2] * phase.shape[-1]
-    optimiser = torch.optim.Adam([phase], lr=settings.step, betas=(0.9, 0.999))
-    for iteration in range(settings.iterations):
-        loss, error = picture_loss(image(phase))
-        best.update(loss.detach()[None], phase[None])
-        if float(error) < settings.threshold:
-            break
-        # the factor keeps the gradient far above Adam's epsilon
-        (phase.grad,) = torch.autograd.grad(pixels * loss, phase)
-        optimiser.param_groups[0]["lr"] = cosine_decay(settings.step, iteration / settings.iterations)
-        optimiser.step()
-    return best.phase[0]
+    picture_loss, error = PictureLoss(target, settings, verdict), torch.tensor(torch.inf)
+
+    def loss(phase: Tensor) -> Tensor:
+        nonlocal error
+        value, error = picture_loss(image(phase[0]))
+        return value[None]
+
+    def done(_: Tensor) -> bool:
+        return float(error) < settings.threshold
+
+    return adam(start[None], by_autograd(loss), settings.iterations, settings.step, decay=True, done=done)[0]
