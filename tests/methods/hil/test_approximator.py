@@ -1,4 +1,4 @@
-"""The approximator's input is the ideal image, its unit the targets', its frozen copies stay, its judge learns."""
+"""The approximator's input is the ideal image, its unit the targets', its frozen copies stay, its critic learns."""
 
 from __future__ import annotations
 
@@ -254,17 +254,17 @@ def test_seeds_draw_the_weights_and_leave_torchs_random_numbers_alone() -> None:
     assert torch.equal(torch.get_rng_state(), state)
 
 
-def test_the_judge_learns_to_tell_targets_from_noise() -> None:
-    judge, targets = Critic(3, Network(width=8), seed=0), pictures(SPEC, 6)
+def test_the_critic_learns_to_tell_targets_from_noise() -> None:
+    critic, targets = Critic(3, Network(width=8), seed=0), pictures(SPEC, 6)
     draw = torch.Generator().manual_seed(2)
     noises = torch.rand(targets.shape, generator=draw)
-    losses = [judge.step(noises[n % 4][None], targets[n % 4][None]) for n in range(40)]
+    losses = [critic.step(noises[n % 4][None], targets[n % 4][None]) for n in range(40)]
     assert sum(losses[-4:]) < 0.5 * sum(losses[:4])
     for target, noise in zip(targets[4:], noises[4:], strict=True):  # not seen in training
-        assert float(judge.verdict(target[None])) < float(judge.verdict(noise[None]))
+        assert float(critic.verdict(target[None])) < float(critic.verdict(noise[None]))
 
 
-def test_the_judge_is_shown_predictions_as_bright_as_their_targets(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_critic_is_shown_predictions_as_bright_as_their_targets(monkeypatch: pytest.MonkeyPatch) -> None:
     one, (sample,) = approximator(), samples(1)
     seen: list[tuple[Tensor, Tensor]] = []
     assert one.critic is not None

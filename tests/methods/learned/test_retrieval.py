@@ -250,7 +250,7 @@ def test_retrieval_does_not_depend_on_the_unit_of_the_prediction() -> None:
     assert torch.allclose(found_one, found_other, atol=1e-4)
 
 
-def test_the_judge_is_asked_where_it_has_a_weight() -> None:
+def test_the_critic_is_asked_where_it_has_a_weight() -> None:
     critic = Critic(1, Network(width=4), seed=0)
     target = pictures(small_spec(48, 40))[0]
     before = [value.clone() for value in critic.network.parameters()]
