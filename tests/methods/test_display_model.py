@@ -20,6 +20,7 @@ from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.optics import AngularSpectrum
+from holobench_eval.optics.phasor import squared_modulus
 
 TAU = 2 * math.pi
 NO_CROSSTALK = -20.0
