@@ -38,9 +38,9 @@ def residual_network(spec: DisplaySpec, network: Network, seed: int) -> nn.Modul
 
 @dataclass(frozen=True)
 class HILPlus(Diagnosed, ThroughModel):
-    """Hardware in the loop with the aberration field of Eq. 13 as a field; see this file's first lines.
+    """Hardware in the loop with the aberration field as a field; see this file's first lines.
 
-    Not in the paper. The other parameters are those of `ThroughModel`; `training` is Algorithm 1. SI units throughout.
+    The field is that of Eq. 13. The other parameters are those of `ThroughModel`; `training` is Algorithm 1. SI units throughout.
 
     Parameters
     ----------
