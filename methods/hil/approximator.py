@@ -22,11 +22,28 @@ if TYPE_CHECKING:
 
 
 class NetworkApproximator:
-    """D: ideal intensity to captured intensity, both in the region, all colours at once.
+    """D: ideal intensity to captured intensity, both in the region, all colours at once (Eq. 18-19).
 
-    with_critic: train the critic of Eq. 22 beside it. gain: ``(C,)``, the unit in which captures are learned, such that
-    the pictures of the first round are as bright as their targets; a camera would be exposed so. of_amplitude: the
-    network maps amplitudes, the square roots of both intensities, instead.
+    Parameters
+    ----------
+    spec : DisplaySpec
+        Nominal optics in SI units.
+    network : Network
+        The generator and, where the loss asks for one, the discriminator.
+    loss : ApproximatorLoss, optional
+        Eq. 20; None: the network's published loss.
+    with_critic : bool
+        Train the critic of Eq. 22 beside it.
+    seed : int
+        Of the first weights.
+    of_amplitude : bool
+        Not in the paper: the network maps amplitudes, the square roots of both intensities.
+
+    Attributes
+    ----------
+    gain : Tensor
+        Not in the paper: ``(C,)``, the unit in which captures are learned, such that the pictures of the first round
+        are as bright as their targets; a camera would be exposed so.
     """
 
     def __init__(

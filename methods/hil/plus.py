@@ -40,7 +40,8 @@ def residual_network(spec: DisplaySpec, network: Network, seed: int) -> nn.Modul
 class HILPlus(Diagnosed, ThroughModel):
     """Hardware in the loop with the aberration field as a field; see this file's first lines.
 
-    The field is that of Eq. 13. The other parameters are those of `ThroughModel`; `training` is Algorithm 1. SI units throughout.
+    The field is that of Eq. 13. The other parameters are those of `ThroughModel`; `training` is Algorithm 1. SI units
+    throughout.
 
     Parameters
     ----------

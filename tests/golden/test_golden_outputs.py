@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +18,7 @@ from holobench_eval.display.simulated.stages.sensor import Sensor
 from holobench_eval.display.training import TrainingBench
 from holobench_eval.imaging import align as aligning
 from holobench_eval.metrics import protocol
+from tests.golden import outputs
 from tests.golden.outputs import FILE, cases, complaint, recorded
 
 CASES = cases()
@@ -117,3 +120,16 @@ def test_numbers_that_are_not_finite_are_a_change() -> None:
     case, entry = CASES["method wirtinger"], recorded()["method wirtinger"]
     broken = {name: [float("nan")] * len(values) for name, values in entry["numbers"].items()}
     assert "changed" in str(complaint("method wirtinger", case, broken, entry))
+
+
+def test_the_file_is_rewritten_for_a_new_version_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name, file = "method double_phase", tmp_path / FILE.name
+    entry = recorded()[name]
+    stale = {**entry, "numbers": {part: [2.0] * len(values) for part, values in entry["numbers"].items()}}
+    file.write_text(json.dumps({name: stale}))
+    monkeypatch.setattr(outputs, "FILE", file)
+    for version, written in ((CASES[name].version, stale["numbers"]), ("DoublePhase 2", CASES[name].numbers())):
+        case = replace(CASES[name], version=version)
+        monkeypatch.setattr(outputs, "cases", lambda case=case: {name: case})
+        assert outputs.main() == (version == CASES[name].version)
+        assert json.loads(file.read_text())[name]["numbers"] == written
