@@ -27,16 +27,16 @@ GRAY = 0.25
 
 def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
     """``count`` patterns, captured, one capture each."""
-    gray = torch.full((len(bench.spec.wavelengths), *bench.spec.region.shape), GRAY, device=bench.device)
-    images = [TrainingImage(f"pattern-{number:02d}", gray) for number in range(count)]
-    phases = [_pattern(bench, number) for number in range(count)]
-    keys = [f"pattern {number}" for number in range(count)]
-    return list(captured(bench, keys, phases, images, "pattern"))
-
-
-def _pattern(bench: TrainingBench, number: int) -> Tensor:
-    length, draw = LENGTHS[number % len(LENGTHS)], bench.generator("pattern", number)
-    return random_phase(len(bench.spec.wavelengths), bench.spec.shape, length, draw).to(bench.device)
+    spec, numbers = bench.spec, range(count)
+    gray = torch.full((len(spec.wavelengths), *spec.region.shape), GRAY, device=bench.device)
+    images = [TrainingImage(f"pattern-{number:02d}", gray) for number in numbers]
+    lengths = [LENGTHS[number % len(LENGTHS)] for number in numbers]
+    draws = [bench.generator("pattern", number) for number in numbers]
+    phases = [
+        random_phase(len(spec.wavelengths), spec.shape, length, draw).to(bench.device)
+        for length, draw in zip(lengths, draws, strict=True)
+    ]
+    return list(captured(bench, [f"pattern {number}" for number in numbers], phases, images, "pattern"))
 
 
 def random_phase(colours: int, shape: tuple[int, int], length: float, draw: torch.Generator) -> Tensor:

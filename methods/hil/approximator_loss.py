@@ -6,18 +6,17 @@ Chakravarthula et al. 2020, Sections 4.3.1 and 5.2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
 import torch
-from annotated_types import Interval
 from torch import Tensor
 from torch.nn import functional
 
 from ...core.errors import UserError
+from ..learned.retrieval import Weight
 from .networks import Network
 from .perceptual import find_weights
 
-Weight = Annotated[float, Interval(ge=0, le=1e6)]
 Gan = Literal["cross_entropy", "least_squares"]
 
 LEARNING_RATE = 2e-4
