@@ -15,15 +15,15 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from .common import matched
 from .descent import Best
-from .hil.retrieval import matched
 from .wirtinger import Wirtinger
 
 if TYPE_CHECKING:
     from ..display.metered import MeteredDisplay
 
+# Neither the search for a start nor the decision at the end takes more than one capture in so many.
 LEAST_SHARE = 4
-"""Neither the search for a start nor the decision at the end takes more than one capture in so many."""
 
 
 def captured_error(capture: Tensor, target: Tensor) -> Tensor:
@@ -91,9 +91,17 @@ class Camera:
 class CameraStart:
     """Holograms that are tried on the display, of which the one with the least captured error goes on.
 
-    converged: Wirtinger holography. early: the same stopped early, with so many constant phases (``offsets``, evenly
-    over 2 pi) added: a panel blurs the wraps of a converged phase, and unmodulated light interferes with the image
+    Not in the paper. A panel blurs the wraps of a converged phase, and unmodulated light interferes with the image
     (Chakravarthula et al. 2020, Eq. 5 and 13), neither of which an ideal image depends on.
+
+    Parameters
+    ----------
+    converged : Wirtinger
+        Wirtinger holography.
+    early : Wirtinger
+        The same, stopped early.
+    offsets : int
+        Constant phases, evenly over 2 pi, that are added to the early one.
     """
 
     converged: Wirtinger = Wirtinger()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Offset = Literal["none", "centre"]
 
-_TINY = 1e-12
+TINY = 1e-12
 _HISTOGRAM_BINS = 256
 
 
@@ -27,11 +27,9 @@ class Bench(Protocol):
     @property
     def spec(self) -> DisplaySpec:
         """Nominal optics."""
-        ...
 
     def generator(self, *names: object) -> torch.Generator:
         """Named random numbers of this cell."""
-        ...
 
 
 def per_channel(target: Tensor, solve_channel: Callable[[Tensor, int], Tensor]) -> Tensor:
@@ -55,12 +53,24 @@ def intensity_scale(intensity: Tensor, target: Tensor) -> Tensor:
     The amplitudes have the same form. It is differentiable, and zero for a black target.
     """
     overlap = (intensity * target).sum(dim=(-2, -1), keepdim=True)
-    return overlap / intensity.square().sum(dim=(-2, -1), keepdim=True).clamp_min(_TINY)
+    return overlap / intensity.square().sum(dim=(-2, -1), keepdim=True).clamp_min(TINY)
+
+
+def matched(image: Tensor, target: Tensor) -> Tensor:
+    """An image ``(..., h, w)`` at the brightness of its target, by the least-squares factor of each channel.
+
+    Examples
+    --------
+    >>> target = torch.tensor([[[1.0, 0.5]]])
+    >>> matched(4 * target, target)
+    tensor([[[1.0000, 0.5000]]])
+    """
+    return image * intensity_scale(image, target)
 
 
 def safe_amplitude(intensity: Tensor) -> Tensor:
     """Square root of an intensity; the gradient of a vanishing intensity is zero, not infinite."""
-    return intensity.clamp_min(_TINY).sqrt()
+    return intensity.clamp_min(TINY).sqrt()
 
 
 def with_offset(phase: Tensor, policy: Offset) -> Tensor:

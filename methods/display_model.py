@@ -15,27 +15,27 @@ from torch.nn import functional
 
 from ..optics import AngularSpectrum
 from ..optics.phase import TAU, wrap
-from ..optics.phasor import phasor, squared_modulus
+from ..optics.phasor import phasor
 from ..optics.zernike import NAMES, zernike
 
 if TYPE_CHECKING:
     from ..display.api import DisplaySpec
 
+# Of the look-up table: levels where its deviation is learned; linear between them.
 KNOTS = 17
-"""Of the look-up table: levels where its deviation is learned; linear between them."""
+# Sub-samples of a pixel along an axis: the fewest that turn wrap edges into ramps.
 SAMPLES = 3
-"""Sub-samples of a pixel along an axis: the fewest that turn wrap edges into ramps."""
+# Neighbours to each side that crosstalk reaches, in pixels.
 REACH = 2
-"""Neighbours to each side that crosstalk reaches, in pixels."""
+# Points along an axis of the maps of phase gain and of illumination, interpolated between them.
 GAIN_GRID, SOURCE_GRID = 4, 24
-"""Points along an axis of the maps of phase gain and of illumination, interpolated between them."""
+# Zernike polynomials of the aberration, see optics.zernike.
 MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "spherical")
-"""Zernike polynomials of the aberration, see ``optics.zernike``."""
 FIRST_CROSSTALK = 0.3
+# Effects (Profile.effects) that the model has a term for. All others of a bench lie outside its form:
+# fringes, of which SOURCE_GRID follows the coarser ones alone, and the light from between the pixels as far as it is
+# not simply unmodulated, are among them.
 FORM = frozenset({"look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES})
-"""Effects (``Profile.effects``) that the model has a term for. All others of a bench lie outside its form:
-fringes, of which ``SOURCE_GRID`` follows the coarser ones alone, and the light from between the pixels as far as it is
-not simply unmodulated, are among them."""
 
 
 class DisplayModel(nn.Module):
@@ -64,15 +64,11 @@ class DisplayModel(nn.Module):
 
     def forward(self, phase: Tensor) -> Tensor:
         """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; its intensity is in the captures' unit."""
-        shown = self._blurred(self._driven(phase))
-        panel = phasor(shown.new_ones(()), shown).mean(1)
+        blurred = self._blurred(self._driven(phase))
+        panel = phasor(blurred.new_ones(()), blurred).mean(1)
         panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * self._illumination()
         region = [self.spec.region.crop(self._propagator(c).forward(field)) for c, field in enumerate(panel)]
         return self._aberrated(torch.stack(region)) * torch.exp(self.brightness / 2)[:, None, None]
-
-    def intensity(self, phase: Tensor) -> Tensor:
-        """``(C, h, w)`` linear light."""
-        return squared_modulus(self.forward(phase))
 
     def _propagator(self, channel: int) -> AngularSpectrum:
         return self.spec.propagator(channel, device=self.table.device)

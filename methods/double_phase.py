@@ -21,10 +21,15 @@ from .common import Bench, Offset, nominal_model, per_channel, with_offset
 class DoublePhase:
     """Double phase amplitude coding (Maimone et al. 2017).
 
-    The image plane holds the target amplitude with constant phase, and black outside the region.
-    quantile: the amplitude at the panel that is encoded as 1; larger ones are cut to 1. 1 is the maximum, as
-    published; a lower quantile gives a brighter image and more clipping.
-    offset: global phase offset, see ``common.with_offset``.
+    The image plane holds the target amplitude with constant phase, and black outside the region. SI units throughout.
+
+    Parameters
+    ----------
+    quantile : float
+        The amplitude at the panel that is encoded as 1; larger ones are cut to 1. 1 is the maximum, as published; a
+        lower quantile gives a brighter image and more clipping.
+    offset : {"none", "centre"}
+        Global phase offset, see `common.with_offset`.
     """
 
     quantile: Annotated[float, Interval(gt=0, le=1)] = 1.0
@@ -34,7 +39,20 @@ class DoublePhase:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """The complex field at the panel that gives the target, encoded without iteration.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+        """
         return per_channel(target, lambda image, channel: self.solve_channel(image, bench, channel))
 
     def solve_channel(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
@@ -55,8 +73,14 @@ class AntiAliasedDoublePhase(DoublePhase):
     """Anti-aliased double phase (Shi et al., "Towards real-time photorealistic 3D holography with deep neural
     networks", Nature 591, 234 (2021), Methods).
 
-    The complex field at the panel is blurred by a small Gaussian of ``sigma`` pixels before encoding, so that
-    neighbours in the checkerboard encode nearly the same value and fast phase changes do not alias.
+    The complex field at the panel is blurred by a small Gaussian before encoding, so that neighbours in the
+    checkerboard encode nearly the same value and fast phase changes do not alias. The other parameters are those of
+    `DoublePhase`.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation of the Gaussian [px].
     """
 
     sigma: Annotated[float, Interval(gt=0, le=5)] = 0.5
@@ -74,8 +98,16 @@ class BandLimitedDoublePhase(DoublePhase):
     complex modulated computer-generated holograms", Opt. Express 29, 2597 (2021)).
 
     The checkerboard of the encoding repeats the spectrum around the corners of the band (half a cycle per pixel
-    in both directions). The field is limited to ``band``, a diameter as a fraction of the panel's band 1/pitch,
-    before encoding, so that those copies keep clear of it: at most 1/sqrt(2) for a round limit, 1/2 for a square.
+    in both directions). The field is limited to a band before encoding, so that those copies keep clear of it. The
+    other parameters are those of `DoublePhase`.
+
+    Parameters
+    ----------
+    band : float
+        Diameter of the limit as a fraction of the panel's band 1/pitch: at most 1/sqrt(2) for a round one, 1/2 for a
+        square.
+    shape : {"round", "square"}
+        Form of the limit.
     """
 
     band: Annotated[float, Interval(gt=0, le=1)] = 0.7
@@ -92,7 +124,23 @@ class BandLimitedDoublePhase(DoublePhase):
 def encode(field: Tensor, quantile: float = 1.0) -> Tensor:
     """Two phases ``phi +- arccos(a)`` in a checkerboard, whose mean is ``a exp(i phi)`` (Maimone et al. 2017).
 
-    field: ``(..., H, W)`` complex. a is its amplitude over its maximum in the panel (or a lower quantile).
+    Parameters
+    ----------
+    field : Tensor
+        ``(..., H, W)``, complex; a is its amplitude over its maximum in the panel.
+    quantile : float
+        Of the amplitude, in the place of its maximum.
+
+    Returns
+    -------
+    Tensor
+        Phase ``(..., H, W)`` [rad].
+
+    Examples
+    --------
+    >>> encode(torch.tensor([[1 + 0j, 0j], [0.5j, 1j]]))
+    tensor([[ 0.0000, -1.5708],
+            [ 0.5236,  1.5708]])
     """
     amplitude, phase = field.abs(), field.angle()
     if quantile == 1:

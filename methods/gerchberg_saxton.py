@@ -26,7 +26,16 @@ class GerchbergSaxton:
 
     Light outside the region is free: whatever falls there is kept. The target's brightness is set once, so that
     it holds the light which the initial phase sends into the region; were it fitted again in each iteration,
-    the error would shrink by moving the light out of the picture.
+    the error would shrink by moving the light out of the picture. SI units throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        One forward and one adjoint propagation each.
+    initial_phase : str
+        See `initial_phase.initial_phase`.
+    offset : {"none", "centre"}
+        Global phase offset, see `common.with_offset`.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
@@ -37,7 +46,20 @@ class GerchbergSaxton:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """The phase after the last iteration, whose error is the least (Gerchberg & Saxton 1972).
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+        """
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
@@ -63,7 +85,7 @@ def step(phase: Tensor, amplitude: Tensor, model: AngularSpectrum, region: Regio
     stops at the iris and so is not in the image; with it the error can not rise (Fienup, Appl. Opt. 21, 2758 (1982)).
     """
     field = unit_field(phase)
-    found = region.crop(model.forward(field))
-    correction = amplitude * unit_field(found.angle()) - found
+    image = region.crop(model.forward(field))
+    correction = amplitude * unit_field(image.angle()) - image
     returned = model.adjoint(region.embed(correction, model.shape))
     return (field + returned).angle(), correction.abs().square().sum(dim=(-2, -1))

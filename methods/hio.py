@@ -25,7 +25,19 @@ class HybridInputOutput:
     Fienup's two planes map as follows. The Fourier modulus, which is known exactly, is the unit amplitude of
     the panel. The object constraint is the target amplitude in the region. Where the output violates it
     (inside the region) the next input is the last input plus ``beta`` times the change wanted; where nothing is
-    wanted (outside) the next input is the output. The error is not monotone, so the best phase is returned.
+    wanted (outside) the next input is the output. The error is not monotone, so the best phase is returned. SI units
+    throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        One forward and one adjoint propagation each.
+    beta : float
+        Gain of the feedback (Fienup 1982).
+    initial_phase : str
+        See `initial_phase.initial_phase`.
+    offset : {"none", "centre"}
+        Global phase offset, see `common.with_offset`.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
@@ -37,7 +49,20 @@ class HybridInputOutput:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """The phase of the least error of amplitude that was seen (Fienup 1982).
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+        """
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:

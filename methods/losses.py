@@ -16,18 +16,15 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..core.errors import UserError
-from ..metrics.ms_ssim import SMALLEST_MS_SSIM as SMALLEST
-from ..metrics.ms_ssim import ms_ssim
-from .common import intensity_scale, safe_amplitude
+from ..metrics.ms_ssim import SMALLEST_MS_SSIM, ms_ssim
+from .common import TINY, intensity_scale, safe_amplitude
 
 LossName = Literal["intensity_l2", "amplitude_l2", "intensity_l1", "huber", "ms_ssim"]
 Loss = Callable[[Tensor, Tensor], Tensor]
 
-_TINY = 1e-12
-
 
 def _relative(error: Tensor, size: Tensor) -> Tensor:
-    return error.sum(dim=(-2, -1)) / size.sum(dim=(-2, -1)).clamp_min(_TINY)
+    return error.sum(dim=(-2, -1)) / size.sum(dim=(-2, -1)).clamp_min(TINY)
 
 
 class _LeastSquares(torch.autograd.Function):
@@ -38,8 +35,8 @@ class _LeastSquares(torch.autograd.Function):
 
     @staticmethod
     def forward(context: Any, intensity: Tensor, target: Tensor) -> Tensor:
-        scale = _dot(intensity, target) / _dot(intensity, intensity).clamp_min(_TINY)
-        size = _dot(target, target).clamp_min(_TINY)
+        scale = _dot(intensity, target) / _dot(intensity, intensity).clamp_min(TINY)
+        size = _dot(target, target).clamp_min(TINY)
         error = torch.mul(intensity, scale[:, None, None]).sub_(target)
         context.save_for_backward(error, 2 * scale / size)
         return _dot(error, error) / size
@@ -87,9 +84,11 @@ def ms_ssim_l1(intensity: Tensor, target: Tensor) -> Tensor:
     MS-SSIM is that of clipped intensity, as it is scored; L1 sees what is clipped. Raises UserError for a region
     that is too small for five scales.
     """
-    if min(target.shape[-2:]) < SMALLEST:
-        found = " x ".join(str(side) for side in target.shape[-2:])
-        raise UserError(f"loss 'ms_ssim' needs a region of at least {SMALLEST} x {SMALLEST} px, got {found}")
+    if min(target.shape[-2:]) < SMALLEST_MS_SSIM:
+        size = " x ".join(str(side) for side in target.shape[-2:])
+        raise UserError(
+            f"loss 'ms_ssim' needs a region of at least {SMALLEST_MS_SSIM} x {SMALLEST_MS_SSIM} px, got {size}"
+        )
     scaled = intensity_scale(intensity, target) * intensity
     structure = ms_ssim(scaled.clamp(0, 1)[:, None], target[:, None])
     return 0.84 * (1 - structure) + 0.16 * intensity_l1(intensity, target)

@@ -15,7 +15,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from .common import Bench, Offset, per_channel, with_offset
-from .descent import Best
+from .descent import adam
 from .initial_phase import InitialPhase, initial_phase
 from .losses import LOSSES, LossName
 from .wirtinger import Objective
@@ -25,9 +25,21 @@ from .wirtinger import Objective
 class MultiPlane:
     """Adam on one phase for the mean loss of the intensities at all planes, by Wirtinger's gradient at each.
 
-    Each plane is compared after an intensity scale of its own, as it is scored. iterations: evaluations of the loss,
-    with one forward and one adjoint propagation a plane. loss: see ``losses``; step: Adam's step [rad];
-    initial_phase: see ``initial_phase``, of the first plane. The phase of the least loss that was seen is returned.
+    Each plane is compared after an intensity scale of its own, as it is scored. The phase of the least loss that was
+    seen is returned. Chakravarthula et al. 2020, Section 7.1; SI units throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        Evaluations of the loss, with one forward and one adjoint propagation a plane.
+    loss : str
+        See `losses`.
+    step : float
+        Adam's step [rad].
+    initial_phase : str
+        See `initial_phase.initial_phase`, of the first plane.
+    offset : {"none", "centre"}
+        Global phase offset, see `common.with_offset`.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
@@ -45,9 +57,21 @@ class MultiPlane:
         return per_channel(target, lambda image, channel: self._retrieve(image[None], [0.0], bench, channel))
 
     def solve_planes(self, targets: Tensor, offsets: Sequence[float], bench: Bench) -> Tensor:
-        """Linear intensities ``(P, C, h, w)`` at ``offsets`` [m] from the display's plane to phase ``(C, H, W)`` [rad].
+        """One hologram for several planes.
 
-        Positive offsets are farther from the panel.
+        Parameters
+        ----------
+        targets : Tensor
+            Linear intensities ``(P, C, h, w)`` in [0, 1].
+        offsets : sequence of float
+            Distances of the planes from that of the display [m]; positive ones are farther from the panel.
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(C, H, W)`` [rad].
         """
         colours = range(targets.shape[1])
         return torch.cat([self._retrieve(targets[:, None, colour], offsets, bench, colour) for colour in colours])
@@ -55,15 +79,14 @@ class MultiPlane:
     def _retrieve(self, targets: Tensor, offsets: Sequence[float], bench: Bench, channel: int) -> Tensor:
         """Targets ``(P, B, h, w)`` of a colour to phases ``(B, H, W)``."""
         planes = [self._objective(*plane, bench, channel) for plane in zip(targets, offsets, strict=True)]
-        phase = initial_phase(self.initial_phase, targets[0], bench, channel)
-        best, pixels = Best(phase), phase.shape[-2] * phase.shape[-1]
-        optimiser = torch.optim.Adam([phase], lr=self.step, fused=True)
-        for _ in range(self.iterations):
+        start = initial_phase(self.initial_phase, targets[0], bench, channel)
+        pixels = start.shape[-2] * start.shape[-1]
+
+        def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
             losses, gradients = zip(*(plane.evaluate(phase) for plane in planes), strict=True)
-            best.update(torch.stack(losses).mean(0), phase)
-            phase.grad = torch.stack(gradients).mean(0) * pixels  # far above Adam's epsilon
-            optimiser.step()
-        return with_offset(best.phase, self.offset)
+            return torch.stack(losses).mean(0), torch.stack(gradients).mean(0) * pixels
+
+        return with_offset(adam(start, evaluate, self.iterations, self.step, fused=True), self.offset)
 
     def _objective(self, target: Tensor, offset: float, bench: Bench, channel: int) -> Objective:
         """The loss at one plane, through the nominal model at its distance."""

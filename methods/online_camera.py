@@ -16,29 +16,40 @@ from torch import Tensor
 
 from ..metrics.base import gaussian_blur
 from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
-from .common import unit_field
+from .common import matched, unit_field
 from .descent import cosine_decay
-from .hil.retrieval import matched
 
 if TYPE_CHECKING:
     from ..display.api import DisplaySpec
     from ..display.metered import MeteredDisplay
 
+# Adam's decay rates. Little momentum: the gradient is that of another display.
 MOMENTS = (0.6, 0.99)
-"""Adam's decay rates. Little momentum: the gradient is that of another display."""
 
 
 @dataclass(frozen=True)
 class OnlineCamera:
     """Adam on the phase for the captured intensity in the region, all colours in one capture.
 
-    captures: in all, for the search of a start (see ``CameraStart``), one or more (``frames``, averaged) for each
-    step, and the decision at the end, which is between the converged Wirtinger hologram, the least captured error and
-    the last phase, with ``checks`` new captures of each. step: Adam's first step [rad], cosine-decayed to zero over
-    the captures, so that camera noise is averaged out. smoothing: width [px] of the Gaussian that the captured error
-    is filtered with: the ideal model knows least about the finest detail.
+    On an ideal display, and without smoothing, this is Wirtinger holography with more iterations. Chakravarthula et al.
+    2020, Section 4.5; SI units throughout.
 
-    On an ideal display, and without smoothing, this is Wirtinger holography with more iterations.
+    Parameters
+    ----------
+    captures : int
+        In all, for the search of a start, the steps and the decision at the end.
+    frames : int
+        Captures that are averaged for each step.
+    step : float
+        Adam's first step [rad], cosine-decayed to zero over the captures, so that camera noise is averaged out.
+    smoothing : float
+        Width [px] of the Gaussian that the captured error is filtered with: the ideal model knows least about the
+        finest detail.
+    start : CameraStart
+        Not in the paper: the holograms that are tried first.
+    checks : int
+        Not in the paper: new captures in the end of each of the converged Wirtinger hologram, the one of the least
+        captured error and the last, between which they decide.
     """
 
     captures: Annotated[int, Interval(ge=1, le=100_000)] = 200
@@ -52,7 +63,25 @@ class OnlineCamera:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """Phases of least captured error.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : MeteredDisplay
+            Nominal optics in SI units, and a metered camera.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            Without a camera.
+        """
         return torch.stack([self._optimise(image, bench, len(target)) for image in target])
 
     def _optimise(self, target: Tensor, bench: MeteredDisplay, images: int) -> Tensor:
@@ -81,8 +110,8 @@ class OnlineCamera:
             error = gaussian_blur(error[None], self.smoothing)[0]
         slope = error * image.clamp_min(0).sqrt()
         gradients = []
-        for colour, one in enumerate(phase):
-            model, at_panel = spec.propagator(colour, device=one.device), unit_field(one)
+        for colour, panel in enumerate(phase):
+            model, at_panel = spec.propagator(colour, device=panel.device), unit_field(panel)
             direction = torch.sgn(spec.region.crop(model.forward(at_panel)))
             returned = model.adjoint(spec.region.embed(slope[colour] * direction, model.shape))
             gradients.append((at_panel.conj() * returned).imag)

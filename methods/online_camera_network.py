@@ -17,16 +17,17 @@ from torch import Tensor, nn
 from ..metrics.base import gaussian_blur
 from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
 from .hil.approximator import NetworkApproximator
-from .hil.loop import Sample
+from .hil.approximator_loss import ApproximatorLoss
 from .hil.networks import Network
-from .hil.objective import Objective
-from .hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from .learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from .learned.samples import Sample
+from .learned.weights import start_at_zero
 
 if TYPE_CHECKING:
     from ..display.metered import MeteredDisplay
 
+# Width [px] of the Gaussian that what the network misses of the captures is filtered with.
 SMOOTHING = 0.7
-"""Width [px] of the Gaussian that what the network misses of the captures is filtered with."""
 
 
 class FromIdentity(nn.Module):
@@ -34,9 +35,7 @@ class FromIdentity(nn.Module):
 
     def __init__(self, network: nn.Module) -> None:
         super().__init__()
-        self.network = network
-        last = [one for one in network.modules() if isinstance(one, nn.Conv2d | nn.ConvTranspose2d)][-1]
-        nn.init.zeros_(last.weight)
+        self.network = start_at_zero(network)
 
     def forward(self, ideal: Tensor) -> Tensor:
         """``(B, C, h, w)`` linear light to the same."""
@@ -56,14 +55,31 @@ class ShortRetrieval(SquaredErrorRetrieval):
 class OnlineCameraNetwork:
     """Rounds of captures, refinement of the image's own network with all of them, and retrieval through it, held.
 
-    captures: in all, as in ``OnlineCamera``, whose start, ``checks`` and decision at the end these are too; there are
-    as many rounds as they are enough for. neighbours: how many holograms near the present one are captured with it in
-    every round, so that the network sees how captures change; they differ from it by normal noise of ``perturbation``
-    [rad] rms. steps: of the network's training in a round. network, loss: fresh weights for every image; of Eq. 20 the
-    L1 term alone is worth its time in so few steps. retrieval: Eq. 22, of which the squared error alone is used.
+    Chakravarthula et al. 2020, Section 4.5; SI units throughout. Not in the paper: what the network still misses of a
+    round's captures is added to its predictions, so that the retrieval starts from what the camera saw, and only
+    changes are left to the network.
 
-    What the network still misses of a round's captures is added to its predictions, so that the retrieval starts from
-    what the camera saw, and only changes are left to the network.
+    Parameters
+    ----------
+    captures : int
+        In all; there are as many rounds as they are enough for.
+    neighbours : int
+        Not in the paper: how many holograms near the present one are captured with it in every round, so that the
+        network sees how captures change.
+    perturbation : float
+        Not in the paper: by how much these differ from it, normal noise [rad rms].
+    steps : int
+        Of the network's training in a round.
+    network : Network
+        D, with fresh weights for every image.
+    loss : ApproximatorLoss, optional
+        Eq. 20, of which the L1 term alone is worth its time in so few steps; None: the network's published loss.
+    retrieval : ShortRetrieval
+        Eq. 22, of which the squared error alone is used.
+    start : CameraStart
+        See `OnlineCamera`.
+    checks : int
+        See `OnlineCamera`.
     """
 
     captures: Annotated[int, Interval(ge=1, le=100_000)] = 100
@@ -71,7 +87,7 @@ class OnlineCameraNetwork:
     perturbation: Annotated[float, Interval(gt=0, le=10)] = 0.1
     steps: Annotated[int, Interval(ge=1, le=1_000_000)] = 12
     network: Network = Network()
-    loss: Objective | None = Objective(perceptual=0, adversarial=0)
+    loss: ApproximatorLoss | None = ApproximatorLoss(perceptual=0, adversarial=0)
     retrieval: ShortRetrieval = ShortRetrieval()
     start: CameraStart = CameraStart()
     checks: Annotated[int, Interval(ge=1, le=100)] = 3
@@ -80,7 +96,25 @@ class OnlineCameraNetwork:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """Phases of least captured error.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : MeteredDisplay
+            Nominal optics in SI units, and a metered camera.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            Without a camera.
+        """
         check_region(bench.spec.region.shape, self.retrieval)
         pairs = enumerate(target)
         return torch.stack([self._optimise(image, bench, len(target), index) for index, image in pairs])
@@ -108,7 +142,7 @@ class OnlineCameraNetwork:
     def _fresh(self, bench: MeteredDisplay, draw: torch.Generator) -> NetworkApproximator:
         """An approximator that has seen nothing; D = Id."""
         seed = int(torch.randint(2**31, (), generator=draw))
-        approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_judge=False, seed=seed)
+        approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_critic=False, seed=seed)
         if self.network.name != "identity":
             approximator.trainer.generator = FromIdentity(approximator.trainer.generator)
         return approximator.to(bench.device)

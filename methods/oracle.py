@@ -9,7 +9,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from .descent import Best, cosine_decay
+from .descent import adam, by_autograd
 from .losses import intensity_l2
 from .wirtinger import Wirtinger
 
@@ -23,9 +23,17 @@ class Oracle:
 
     It knows all that is fixed about the bench (look-up table, crosstalk, illumination, aberrations) but not the
     noise of a capture. It starts from ``start_iterations`` of Wirtinger, few on purpose: a converged nominal
-    phase is full of wraps, and where a panel blurs its wraps, descent does not get out of them again.
-    step: Adam's first step [rad], cosine-decayed to zero. The phase of the least loss that was seen is returned,
-    per colour.
+    phase is full of wraps, and where a panel blurs its wraps, descent does not get out of them again. The phase of the
+    least loss that was seen is returned, per colour. SI units throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        Evaluations of the loss (Chakravarthula et al. 2020, Eq. 12) and its gradient.
+    step : float
+        Adam's first step [rad], cosine-decayed to zero.
+    start_iterations : int
+        Of Wirtinger holography.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
@@ -36,21 +44,33 @@ class Oracle:
     privileged: ClassVar[bool] = True
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]. CellError without a simulated bench."""
+        """Phases of least loss in what the bench itself would capture without noise.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : MeteredDisplay
+            A simulated display that is open to this method.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            Without a simulated bench.
+        """
         start = Wirtinger(iterations=self.start_iterations).solve(target, bench)
         return torch.stack([self._refine(image, phase, bench) for image, phase in zip(target, start, strict=True)])
 
     def _refine(self, target: Tensor, start: Tensor, bench: MeteredDisplay) -> Tensor:
         """One image: target ``(C, h, w)``, start ``(C, H, W)``; the colours do not interact."""
         simulation = bench.simulation
-        phase, best = start.clone().requires_grad_(), Best(start)
-        pixels = phase.shape[-2] * phase.shape[-1]
-        optimiser = torch.optim.Adam([phase], lr=self.step)
-        for iteration in range(self.iterations):
-            loss = intensity_l2(simulation.image(phase), target)
-            best.update(loss, phase)
-            # the factor keeps the gradient far above Adam's epsilon
-            (phase.grad,) = torch.autograd.grad(pixels * loss.sum(), phase)
-            optimiser.param_groups[0]["lr"] = cosine_decay(self.step, iteration / self.iterations)
-            optimiser.step()
-        return best.phase
+
+        def loss(phase: Tensor) -> Tensor:
+            return intensity_l2(simulation.image(phase), target)
+
+        return adam(start, by_autograd(loss), self.iterations, self.step, decay=True)

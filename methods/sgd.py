@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-import torch
 from annotated_types import Interval
 from torch import Tensor
 
 from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
-from .descent import Best
+from .descent import adam, by_autograd
 from .initial_phase import InitialPhase, initial_phase
 from .losses import amplitude_l2
 
@@ -24,8 +23,18 @@ class AmplitudeSGD:
     """Adam on the phase for the squared error of amplitude in the region; light outside it is free.
 
     One departure from the paper: the scale between the amplitudes is the closed-form optimum of each iteration,
-    where the paper learns it by a gradient step of its own. step: Adam's step [rad], constant as published.
-    The phase of the least loss that was seen is returned.
+    where the paper learns it by a gradient step of its own. SI units throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        Evaluations of loss and gradient.
+    step : float
+        Adam's step [rad], constant as published.
+    initial_phase : str
+        See `initial_phase.initial_phase`.
+    offset : {"none", "centre"}
+        Global phase offset, see `common.with_offset`.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
@@ -37,20 +46,27 @@ class AmplitudeSGD:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """The phase of the least loss that was seen (Peng et al. 2020).
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+        """
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         model, region = nominal_model(bench, channel, target), bench.spec.region
-        phase = initial_phase(self.initial_phase, target, bench, channel).requires_grad_()
-        pixels = phase.shape[-2] * phase.shape[-1]
-        best = Best(phase)
-        optimiser = torch.optim.Adam([phase], lr=self.step)
-        for _ in range(self.iterations):
-            intensity = region.crop(model.forward(unit_field(phase))).abs().square()
-            loss = amplitude_l2(intensity, target)
-            best.update(loss, phase)
-            # the factor keeps the gradient far above Adam's epsilon
-            (phase.grad,) = torch.autograd.grad(pixels * loss.sum(), phase)
-            optimiser.step()
-        return with_offset(best.phase, self.offset)
+
+        def loss(phase: Tensor) -> Tensor:
+            return amplitude_l2(region.crop(model.forward(unit_field(phase))).abs().square(), target)
+
+        start = initial_phase(self.initial_phase, target, bench, channel)
+        return with_offset(adam(start, by_autograd(loss), self.iterations, self.step), self.offset)

@@ -1,12 +1,12 @@
 """Wirtinger holography: gradient descent on the phase with the gradient written out.
 
 Chakravarthula, Peng, Kollin, Fuchs & Heide, "Wirtinger holography for near-eye displays", ACM Trans. Graph. 38(6),
-213 (2019).
+213 (2019); Eq. 11 and 12 of Chakravarthula et al. 2020 are its forward model and its objective.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import torch
@@ -14,26 +14,66 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..optics import AngularSpectrum
-from ..optics.convolution import convolve
 from .common import Bench, Offset, nominal_model, per_channel, with_offset
-from .descent import Best, cosine_decay
+from .descent import Best, adam
 from .initial_phase import InitialPhase, initial_phase
 from .losses import LOSSES, Loss, LossName
+from .phase_propagation import PhasePropagation
 
 if TYPE_CHECKING:
     from ..display.api import Region
 
 
 @dataclass(frozen=True)
+class Objective:
+    """A loss of the intensity in the region as a function of the phase; model, target ``(B, h, w)``, loss fixed.
+
+    All have the model's precision.
+    """
+
+    model: AngularSpectrum
+    region: Region
+    target: Tensor
+    loss: Loss
+
+    def evaluate(self, phase: Tensor) -> tuple[Tensor, Tensor]:
+        """Loss ``(B,)`` and gradient ``(B, H, W)`` at a phase ``(B, H, W)`` [rad].
+
+        For E = P(exp(i phi)) and I = |E|^2, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
+        and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)). dL/dI alone is left to autograd.
+        """
+        light = PhasePropagation(self.model, self.region, phase)  # E
+        intensity = light.intensity().requires_grad_()  # I
+        loss = self.loss(intensity, self.target)  # L
+        (slope,) = torch.autograd.grad(2 * loss.sum(), intensity)  # 2 dL/dI
+        light.field.mul_(slope)
+        del slope, intensity  # the adjoint takes the most memory
+        return loss.detach(), light.phase_gradient()
+
+
+@dataclass(frozen=True)
 class Wirtinger:
     """First-order phase retrieval in the region; light outside it is free.
 
-    iterations: evaluations of loss and gradient, one forward and one adjoint propagation each (the last line search
-    of L-BFGS may end a few later).
-    loss: see ``losses``. optimiser: Adam, or L-BFGS with a strong Wolfe line search (image by image).
-    step: Adam's step [rad], ``constant`` or ``cosine``-decayed to zero (L-BFGS finds its own).
-    initial_phase: see ``initial_phase``. offset: global phase offset, see ``common.with_offset``.
-    The phase of the least loss that was seen is returned.
+    The phase of the least loss that was seen is returned. SI units throughout.
+
+    Parameters
+    ----------
+    iterations : int
+        Evaluations of loss and gradient, one forward and one adjoint propagation each (the last line search of L-BFGS
+        may end a few later).
+    loss : str
+        See `losses`; "intensity_l2" is Eq. 12.
+    optimiser : {"adam", "lbfgs"}
+        Adam, or L-BFGS with a strong Wolfe line search (image by image).
+    step : float
+        Adam's step [rad]; L-BFGS finds its own.
+    schedule : {"constant", "cosine"}
+        Of Adam's step; "cosine" decays to zero.
+    initial_phase : str
+        See `initial_phase.initial_phase`.
+    offset : {"none", "centre"}
+        Global phase offset, see `common.with_offset`.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
@@ -48,38 +88,48 @@ class Wirtinger:
     privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """Phases of least loss in the image of the nominal model (Chakravarthula et al. 2020, Eq. 12).
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        UserError
+            For a region that is too small for the loss.
+        """
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         model, region = nominal_model(bench, channel, target), bench.spec.region
         start = initial_phase(self.initial_phase, target, bench, channel)
-        loss = LOSSES[self.loss]
+        objective = Objective(model, region, target, LOSSES[self.loss])
         if self.optimiser == "adam":
-            phase = self._adam(start, Objective(model, region, target, loss))
+            phase = self._adam(start, objective)
         else:
             # a line search that is shared would let one image decide the steps of another
-            each = [
-                self._lbfgs(start[i : i + 1], Objective(model, region, target[i : i + 1], loss))
-                for i in range(len(target))
-            ]
-            phase = torch.cat(each)
+            pairs = zip(start.split(1), target.split(1), strict=True)
+            phase = torch.cat([self._lbfgs(begin, replace(objective, target=image)) for begin, image in pairs])
         return with_offset(phase, self.offset)
 
     def _adam(self, start: Tensor, objective: Objective) -> Tensor:
-        phase, best = start.clone(), Best(start)
-        pixels = phase.shape[-2] * phase.shape[-1]
-        optimiser = torch.optim.Adam([phase], lr=self.step, fused=True)
-        for iteration in range(self.iterations):
+        pixels = start.shape[-2] * start.shape[-1]
+
+        def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
             loss, gradient = objective.evaluate(phase)
-            best.update(loss, phase)
-            if self._done(loss):
-                break
-            phase.grad = gradient * pixels  # far above Adam's epsilon, whatever the size of the panel
-            if self.schedule == "cosine":
-                optimiser.param_groups[0]["lr"] = cosine_decay(self.step, iteration / self.iterations)
-            optimiser.step()
-        return best.phase
+            return loss, gradient * pixels
+
+        decay = self.schedule == "cosine"
+        return adam(start, evaluate, self.iterations, self.step, decay=decay, done=self._done, fused=True)
 
     def _done(self, loss: Tensor) -> bool:
         """Whether losses ``(B,)`` are small enough to stop; here never."""
@@ -104,43 +154,3 @@ class Wirtinger:
 
         optimiser.step(closure)
         return best.phase
-
-
-@dataclass(frozen=True)
-class Objective:
-    """A loss of the intensity in the region as a function of the phase; model, target ``(B, h, w)``, loss fixed.
-
-    All have the model's precision.
-    """
-
-    model: AngularSpectrum
-    region: Region
-    target: Tensor
-    loss: Loss
-
-    def evaluate(self, phase: Tensor) -> tuple[Tensor, Tensor]:
-        """Loss ``(B,)`` and gradient ``(B, H, W)`` at a phase ``(B, H, W)`` [rad].
-
-        For E = P(exp(i phi)) and I = |E|^2, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
-        and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)). dL/dI alone is left to autograd.
-        """
-        height, width = self.model.shape
-        if tuple(phase.shape[-2:]) != (height, width):
-            raise ValueError(f"phase is {tuple(phase.shape[-2:])}, the propagator was made for {self.model.shape}")
-        field = self.model.blank(*phase.shape[:-2])  # padded from the start, if it has to be padded at all
-        at_panel = field[..., :height, :width]
-        torch.complex(phase.cos(), phase.sin(), out=at_panel)
-        image = convolve(field, self.model.transfer)
-        at_image = self.region.crop(image)
-        loss, slope = self._slope(at_image)
-        at_image.mul_(slope)  # in the place of the field: a new array costs as much as the product
-        del slope  # the adjoint takes the most memory
-        returned = convolve(self.region.clear_around(image), self.model.conjugate)[..., :height, :width]
-        return loss, (at_panel.real * returned.imag).addcmul_(at_panel.imag, returned.real, value=-1)
-
-    def _slope(self, at_image: Tensor) -> tuple[Tensor, Tensor]:
-        """Loss ``(B,)`` of the field in the region, and 2 dL/dI ``(B, h, w)``."""
-        intensity = torch.square(at_image.real).addcmul_(at_image.imag, at_image.imag).requires_grad_()
-        loss = self.loss(intensity, self.target)
-        (slope,) = torch.autograd.grad(2 * loss.sum(), intensity)
-        return loss.detach(), slope

@@ -51,14 +51,14 @@ def _bank(dtype: torch.dtype, device: torch.device) -> Tensor:
     return torch.stack(kernels)[:, None].to(device, dtype)
 
 
-def _opponent(image: Tensor, scale: int) -> Tensor:
+def opponent_channels(image: Tensor, scale: int) -> Tensor:
     """What is filtered at a scale: luma, and from the second scale of a colour image on the opponent colours too."""
     if image.shape[1] == 1:
         return image
     return mix(image, OPPONENT if scale else OPPONENT[:1])
 
 
-def _responses(opponent: Tensor) -> Tensor:
+def oriented_responses(opponent: Tensor) -> Tensor:
     """Responses of (B, K, H, W) to the bank, (B, 8 K, H, W)."""
     batch, _, height, width = opponent.shape
     padded = mirrored(opponent.reshape(-1, 1, height, width), RADIUS)
@@ -103,7 +103,7 @@ class _Scale:
         Features are the responses' positive and negative parts; where two responses r and s have opposite signs the
         squared difference is r^2 + s^2, else (r - s)^2.
         """
-        responses = _responses(opponent)
+        responses = oriented_responses(opponent)
         opposed = torch.relu(responses * self.negative).sum(1)
         difference = (responses + self.negative).square().sum(1) - 2 * opposed
         pooled = gaussian_blur(torch.stack([difference, responses.square().sum(1)]), POOLING_SIGMA)
@@ -120,7 +120,7 @@ class FixedMofd:
         _, side = paired(target, target, smallest=SMALLEST_MOFD)
         self._scales = []
         for scale in range(SCALES):
-            responses = _responses(_opponent(side, scale))
+            responses = oriented_responses(opponent_channels(side, scale))
             energy = gaussian_blur(responses.square().sum(1)[None], POOLING_SIGMA)[0]
             self._scales.append(_Scale(-responses, energy))
             side = _halved(side)
@@ -131,7 +131,7 @@ class FixedMofd:
         x, _ = paired(image, self.target, smallest=SMALLEST_MOFD)
         parts = []
         for scale, fixed in enumerate(self._scales):
-            parts.append(fixed.distance(_opponent(x, scale)))
+            parts.append(fixed.distance(opponent_channels(x, scale)))
             x = _halved(x)
         colour = (x - self._low_pass).square().mean(1)
         parts.append((colour / (colour + COLOUR_THRESHOLD**2)).mean(dim=(1, 2)))

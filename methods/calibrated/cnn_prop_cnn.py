@@ -13,12 +13,12 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...core import seeds
 from ...optics.phasor import squared_modulus
 from ..common import safe_amplitude, unit_field
-from ..hil.loop import Steps
+from ..learned.samples import Steps
+from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
-from .method import Calibrated, Schedule
+from .method import Calibrated, ShortSchedule
 from .networks import ColourByColour
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class TwoNetworks(nn.Module):
         real, imaginary = (lit + self.panel(lit)).unbind(1)
         panel = torch.complex(real, imaginary)
         models = [self.spec.propagator(channel, device=panel.device) for channel in range(len(panel))]
-        propagated = [model.forward(one) for model, one in zip(models, panel, strict=True)]
+        propagated = [model.forward(field) for model, field in zip(models, panel, strict=True)]
         field = self.spec.region.crop(torch.stack(propagated))
         amplitude = safe_amplitude(squared_modulus(field)) + self.target(parts(field))[:, 0]
         return amplitude.square() * torch.exp(self.brightness)[:, None, None]
@@ -58,7 +58,7 @@ def parts(field: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True)
-class LongerSchedule(Schedule):
+class LongerSchedule(ShortSchedule):
     """More steps on more natural holograms than a model with few parameters needs."""
 
     images: Annotated[int, Interval(ge=1)] | None = 24
@@ -70,8 +70,13 @@ class CNNPropCNN(Calibrated):
     """Two networks around the ideal propagation, in a size for small panels and a CPU.
 
     As in the paper, a pair for each colour. Its networks are U-Nets and give the field itself; here, where a few dozen
-    captures have to do, they are three convolutions at full resolution, add to the field, and begin with nothing.
-    width: features of each.
+    captures have to do, they are three convolutions at full resolution, add to the field, and begin with nothing. The
+    other parameters are those of `Calibrated`. SI units throughout.
+
+    Parameters
+    ----------
+    width : int
+        Features of each network.
     """
 
     training: LongerSchedule = LongerSchedule()
@@ -81,6 +86,5 @@ class CNNPropCNN(Calibrated):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """Networks that add nothing."""
-        with torch.random.fork_rng(devices=[]):
-            torch.set_rng_state(seeds.generator("cnn_prop_cnn", self.seed).get_state())
+        with seeded("cnn_prop_cnn", self.seed):
             return ModelApproximator(TwoNetworks(spec, self.width), None, self.RATES)

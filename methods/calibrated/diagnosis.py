@@ -43,10 +43,14 @@ def diagnose(state: Mapping[str, Tensor], spec: DisplaySpec) -> list[Estimate]:
     """
     model = DisplayModel(spec)
     model.load_state_dict(dict(state))
-    return [one for colour in range(len(spec.wavelengths)) for one in (*_panel(model, colour), *_optics(model, colour))]
+    return [
+        value
+        for colour in range(len(spec.wavelengths))
+        for value in (*_panel_estimates(model, colour), *_optics_estimates(model, colour))
+    ]
 
 
-def _panel(model: DisplayModel, colour: int) -> list[Estimate]:
+def _panel_estimates(model: DisplayModel, colour: int) -> list[Estimate]:
     levels = torch.arange(1, KNOTS - 1, dtype=torch.float64) / (KNOTS - 1)
     gain = torch.exp(enlarged(model.gain, model.spec.shape)[colour]).double().mean()
     law = stroke(levels, (TAU * levels + model.table[colour, 1:-1]) * gain)
@@ -63,7 +67,7 @@ def _panel(model: DisplayModel, colour: int) -> list[Estimate]:
     ]
 
 
-def _optics(model: DisplayModel, colour: int) -> list[Estimate]:
+def _optics_estimates(model: DisplayModel, colour: int) -> list[Estimate]:
     spec, (y, x) = model.spec, disc()
     modes = torch.stack([zernike(NAMES[name], y, x) for name in MODES])
     lens = focusing(

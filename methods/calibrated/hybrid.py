@@ -10,9 +10,9 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...core import seeds
 from ...optics.phasor import phasor
 from ..display_model import FORM, DisplayModel
+from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
 from .diagnosis import Diagnosed, diagnose
 from .method import Calibrated
@@ -55,7 +55,12 @@ class Residual(nn.Module):
 class HybridModel(Diagnosed, Calibrated):
     """``DisplayModel``, a map of the panel pixel by pixel and a residual network that learn from the same captures.
 
-    Map and network begin with nothing. width: features of the network.
+    Map and network begin with nothing. The other parameters are those of `Calibrated`. SI units throughout.
+
+    Parameters
+    ----------
+    width : int
+        Features of the network.
     """
 
     width: Annotated[int, Interval(ge=2, le=256)] = 16
@@ -65,8 +70,7 @@ class HybridModel(Diagnosed, Calibrated):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """A display as the nominal model says."""
-        with torch.random.fork_rng(devices=[]):
-            torch.set_rng_state(seeds.generator("hybrid_model", self.seed).get_state())
+        with seeded("hybrid_model", self.seed):
             residual = Residual(len(spec.wavelengths), self.width)
         return ModelApproximator(FinePanel(spec), residual, self.RATES)
 

@@ -13,9 +13,9 @@ from annotated_types import Interval
 from torch import Tensor, nn
 
 from ..common import unit_field
-from ..hil.loop import Steps
+from ..learned.samples import Steps
 from .approximator import ModelApproximator, Rates
-from .method import Calibrated, Schedule
+from .method import Calibrated, ShortSchedule
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
@@ -33,22 +33,22 @@ class Kernels(nn.Module):
         self.spec = spec
         ideal = [spec.propagator(channel).transfer for channel in range(len(spec.wavelengths))]
         self.transfer = nn.ParameterList(
-            torch.view_as_real(one).clone(memory_format=torch.contiguous_format) for one in ideal
+            torch.view_as_real(transfer).clone(memory_format=torch.contiguous_format) for transfer in ideal
         )
         self.brightness = nn.Parameter(torch.zeros(len(ideal)))
 
     def forward(self, phase: Tensor) -> Tensor:
         """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]."""
         fields = []
-        for one, transfer in zip(phase, self.transfer, strict=True):
+        for panel, transfer in zip(phase, self.transfer, strict=True):
             learned = torch.view_as_complex(transfer)
-            spectrum = torch.fft.fft2(unit_field(one), s=learned.shape)
+            spectrum = torch.fft.fft2(unit_field(panel), s=learned.shape)
             fields.append(self.spec.region.crop(torch.fft.ifft2(spectrum * learned)))
         return torch.stack(fields) * torch.exp(self.brightness / 2)[:, None, None]
 
 
 @dataclass(frozen=True)
-class OneRound(Schedule):
+class OneRound(ShortSchedule):
     """All captures before the training, as in the paper."""
 
     rounds: Annotated[int, Interval(ge=1, le=100)] = 1
@@ -61,7 +61,8 @@ class LearnedKernel(Calibrated):
     """A complex convolution kernel a colour, learned from captures of holograms of the ideal model.
 
     As in the paper, captures are of natural holograms alone, and only of those of the ideal model. The paper learns the
-    kernel's values; here they are those of its Fourier transform, which is the same family of kernels.
+    kernel's values; here they are those of its Fourier transform, which is the same family of kernels. The parameters
+    are those of `Calibrated`. SI units throughout.
     """
 
     training: OneRound = OneRound()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -12,8 +12,11 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ..hil.loop import Rounds, Sample, Steps, captured, matched_psnr, train_in_the_loop
-from ..hil.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from ..learned.algorithm import train
+from ..learned.fidelity import matched_psnr
+from ..learned.method import frozen, hologram, predicted
+from ..learned.retrieval import SquaredErrorRetrieval, check_region, retrieve
+from ..learned.samples import Sample, Schedule, Steps, captured
 from ..wirtinger import Wirtinger
 from .patterns import pattern_samples
 
@@ -33,7 +36,7 @@ class LargeSteps(SquaredErrorRetrieval):
 
 
 @dataclass(frozen=True)
-class Search(LargeSteps):
+class SearchRetrieval(LargeSteps):
     """Retrieval while training: its captures need to be near the final ones only."""
 
     iterations: Annotated[int, Interval(ge=0, le=100_000)] = 40
@@ -41,21 +44,32 @@ class Search(LargeSteps):
 
 @dataclass(frozen=True)
 class ThroughModel(ABC):
-    """Algorithm 1 of Chakravarthula et al. 2020 around a model of the display that a subclass gives.
+    """Algorithm 1 of Chakravarthula et al. 2020 around a model of the display that a subclass gives; SI units.
 
-    training: the rounds. retrieval: Eq. 22, of which the squared error alone is used. search: retrieval in the rounds.
-    start: Wirtinger holography, stopped while its phase is still smooth: a converged phase is full of wraps that
-    descent does not get out of.
-    seed: of the model's first weights, where it has any.
+    Parameters
+    ----------
+    training : Schedule
+        Algorithm 1.
+    retrieval : LargeSteps
+        Eq. 22, of which the squared error alone is used.
+    search : SearchRetrieval
+        Retrieval in the rounds.
+    start : Wirtinger
+        Wirtinger holography, stopped while its phase is still smooth: a converged phase is full of wraps that descent
+        does not get out of.
+    seed : int
+        Of the model's first weights, where it has any.
 
-    In the end, the holograms of the held-out images by ``retrieval`` through the model and by ``NOMINAL`` are captured.
-    Where the latter's captures are closer to the targets, ``nominal`` is kept as 1 and ``solve`` gives them: of a
-    display that is as the nominal model says, a calibration learns noise.
+    Notes
+    -----
+    Not in the paper: in the end, the holograms of the held-out images by `retrieval` through the model and by
+    ``NOMINAL`` are captured. Where the latter's captures are closer to the targets, ``nominal`` is kept as 1 and
+    `solve` gives them: of a display that is as the nominal model says, a calibration learns noise.
     """
 
-    training: Rounds = Rounds()
+    training: Schedule = Schedule()
     retrieval: LargeSteps = LargeSteps()
-    search: Search = Search()
+    search: SearchRetrieval = SearchRetrieval()
     start: Wirtinger = Wirtinger(iterations=5)
     seed: int = 0
 
@@ -71,75 +85,86 @@ class ThroughModel(ABC):
         """The model, untrained."""
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
-        """Learn the display from captures; what ``solve`` and ``predict`` need of it."""
-        approximator = self._learned(bench)
-        return {**approximator.learned(), "nominal": int(self._is_nominal(bench, approximator))}
+        """Learn the display from captures.
 
-    def _before(self, _: TrainingBench) -> Sequence[Sample]:
-        """Samples that every round learns from, beside its own."""
-        return ()
+        Parameters
+        ----------
+        bench : TrainingBench
+            The display, the training images, and a memory that survives a kill.
 
-    def _learned(self, bench: TrainingBench) -> ModelApproximator:
-        """The trained model."""
+        Returns
+        -------
+        mapping
+            What `solve` and `predict` need: the parameters of the model, and whether it is of no use (``nominal``).
+
+        Raises
+        ------
+        BudgetError
+            When no capture is left.
+        """
         check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec).to(bench.device)
+        start, search = partial(hologram, self.start, bench=bench), partial(retrieve, settings=self.search)
+        train(bench, approximator, start, search, self.training, self._earlier(bench))
+        return {**approximator.learned(), "nominal": int(self._is_nominal(bench, approximator))}
 
-        def begin(image: TrainingImage) -> Tensor:
-            return self.start.solve(image.target[None], bench)[0]
-
-        def search(display: Image, target: Tensor, phase: Tensor) -> Tensor:
-            return retrieve(display, target, phase, self.search)
-
-        train_in_the_loop(bench, approximator, begin, search, self.training, self._before(bench))
-        return approximator
+    def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
+        """Samples that every round learns from, beside its own."""
+        return ()
 
     def _is_nominal(self, bench: TrainingBench, approximator: ModelApproximator) -> bool:
         """Whether, on the held-out images, plain Wirtinger holography is captured closer to the targets."""
 
-        def learned(image: TrainingImage) -> Tensor:
-            start = self.start.solve(image.target[None], bench)[0]
+        def corrected(image: TrainingImage) -> Tensor:
+            start = hologram(self.start, image, bench)
             return retrieve(approximator.image(bench.light(image)), image.target, start, self.retrieval)
 
-        def nominal(image: TrainingImage) -> Tensor:
-            return self.NOMINAL.solve(image.target[None], bench)[0]
-
-        def quality(name: str, solve: Callable[[TrainingImage], Tensor]) -> list[float]:
+        def quality(name: str, phases: Sequence[Tensor]) -> list[float]:
             """PSNR [dB] of every held-out image."""
-            phases = [solve(image) for image in bench.held_out]
-            pairs = list(zip(phases, bench.held_out, strict=True))
-            bench.announce((phase, image, (name,)) for phase, image in pairs)
-            shown = [
-                bench.kept(f"{name} {image.item}", partial(captured, bench, phase, image, name))["capture"]
-                for phase, image in pairs
-            ]
-            return [matched_psnr(one, image.target) for one, image in zip(shown, bench.held_out, strict=True)]
+            keys = [f"{name} {image.item}" for image in bench.held_out]
+            samples = captured(bench, keys, phases, bench.held_out, name)
+            return [matched_psnr(sample.capture, sample.target) for sample in samples]
 
-        pairs = zip(quality("learned", learned), quality("nominal", nominal), strict=True)
-        gains = [ours - plain for ours, plain in pairs]
-        return sum(gains) < 0
+        learned = quality("learned", [corrected(image) for image in bench.held_out])
+        nominal = quality("nominal", [hologram(self.NOMINAL, image, bench) for image in bench.held_out])
+        return sum(ours - plain for ours, plain in zip(learned, nominal, strict=True)) < 0
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        """Phases of least squared error in the captures that the model predicts.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : MeteredDisplay
+            Nominal optics in SI units, and what `prepare` returned.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            Where the method was not trained.
+        UserError
+            Where what was learned belongs to another model.
+        """
         if bench.learned["nominal"]:
             return self.NOMINAL.solve(target, bench)
-        display, start = self._display(bench), self.start.solve(target, bench)
+        display = frozen(self.approximator(bench.spec), bench).image(bench.light)
+        start = self.start.solve(target, bench)
         pairs = zip(target, start, strict=True)
         return torch.stack([retrieve(display, image, phase, self.retrieval) for image, phase in pairs])
 
-    @torch.no_grad()
     def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)`` that was learned to follow."""
-        display = self._display(bench)
-        return torch.stack([display(one) for one in phase])
-
-    def _display(self, bench: MeteredDisplay) -> Image:
-        approximator = self.approximator(bench.spec).to(bench.device)
-        approximator.load_learned(bench.learned)
-        return approximator.image(bench.light)
+        return predicted(frozen(self.approximator(bench.spec), bench).image(bench.light), phase)
 
 
 @dataclass(frozen=True)
-class Schedule(Rounds):
+class ShortSchedule(Schedule):
     """Few captures and few steps: the first round on natural holograms, later ones on those that the model made."""
 
     rounds: Annotated[int, Interval(ge=1, le=100)] = 2
@@ -151,10 +176,16 @@ class Schedule(Rounds):
 
 @dataclass(frozen=True)
 class Calibrated(ThroughModel):
-    """``ThroughModel`` from few captures. patterns: speckle-like, captured before and learned from in all rounds."""
+    """`ThroughModel` from few captures.
 
-    training: Schedule = Schedule()
+    Parameters
+    ----------
+    patterns : int
+        Speckle-like patterns, captured before and learned from in all rounds.
+    """
+
+    training: ShortSchedule = ShortSchedule()
     patterns: Annotated[int, Interval(ge=0, le=1000)] = 12
 
-    def _before(self, bench: TrainingBench) -> Sequence[Sample]:
+    def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
         return pattern_samples(bench, self.patterns)

@@ -7,8 +7,7 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
-from ..hil.networks import draw_weights
-from .approximator import start_at_zero
+from ..learned.weights import draw_weights, start_at_zero
 
 
 class ColourByColour(nn.Module):

@@ -7,7 +7,6 @@ tell look-up table, phase gain, crosstalk, unmodulated light and aberrations apa
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import torch
@@ -15,33 +14,29 @@ from torch import Tensor
 from torch.nn import functional
 
 from ...display.training import TrainingImage
-from ..hil.loop import Sample, captured
+from ..learned.samples import Sample, captured
 
 if TYPE_CHECKING:
     from ...display.training import TrainingBench
 
+# Correlation lengths [px] that the patterns go through in turn: wraps from everywhere to a few long edges.
 LENGTHS = (2.0, 4.0, 8.0, 16.0)
-"""Correlation lengths [px] that the patterns go through in turn: wraps from everywhere to a few long edges."""
+# Of the constant picture that the camera is exposed for; speckle peaks stay below its saturation.
 GRAY = 0.25
-"""Of the constant picture that the camera is exposed for; speckle peaks stay below its saturation."""
 
 
 def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
     """``count`` patterns, captured, one capture each."""
-    gray = torch.full((len(bench.spec.wavelengths), *bench.spec.region.shape), GRAY, device=bench.device)
-    images = [TrainingImage(f"pattern-{number:02d}", gray) for number in range(count)]
-    phases = [_pattern(bench, number) for number in range(count)]
-    bench.announce((phase, image, ("pattern",)) for phase, image in zip(phases, images, strict=True))
-    samples = []
-    for number, (phase, image) in enumerate(zip(phases, images, strict=True)):
-        made = bench.kept(f"pattern {number}", partial(captured, bench, phase, image, "pattern"))
-        samples.append(Sample(phase, made["capture"], gray, bench.light(image)))
-    return samples
-
-
-def _pattern(bench: TrainingBench, number: int) -> Tensor:
-    length, draw = LENGTHS[number % len(LENGTHS)], bench.generator("pattern", number)
-    return random_phase(len(bench.spec.wavelengths), bench.spec.shape, length, draw).to(bench.device)
+    spec, numbers = bench.spec, range(count)
+    gray = torch.full((len(spec.wavelengths), *spec.region.shape), GRAY, device=bench.device)
+    images = [TrainingImage(f"pattern-{number:02d}", gray) for number in numbers]
+    lengths = [LENGTHS[number % len(LENGTHS)] for number in numbers]
+    draws = [bench.generator("pattern", number) for number in numbers]
+    phases = [
+        random_phase(len(spec.wavelengths), spec.shape, length, draw).to(bench.device)
+        for length, draw in zip(lengths, draws, strict=True)
+    ]
+    return list(captured(bench, [f"pattern {number}" for number in numbers], phases, images, "pattern"))
 
 
 def random_phase(colours: int, shape: tuple[int, int], length: float, draw: torch.Generator) -> Tensor:

@@ -8,32 +8,50 @@ from typing import TYPE_CHECKING, Any, Self
 import torch
 from torch import Tensor
 
-from ...core.errors import UserError
-from ..common import unit_field
-from .judge import Judge
-from .loop import Sample
+from ..common import matched, unit_field
+from ..learned.retrieval import Image, Verdict
+from ..learned.samples import Sample
+from ..learned.weights import refuse_other_weights
+from .approximator_loss import ApproximatorLoss
+from .critic import Critic
 from .networks import Network
-from .objective import Objective, trainer
-from .retrieval import Image, matched
+from .trainer import trainer
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
 
 
 class NetworkApproximator:
-    """D: ideal intensity to captured intensity, both in the region, all colours at once.
+    """D: ideal intensity to captured intensity, both in the region, all colours at once (Eq. 18-19).
 
-    with_judge: train the judge of Eq. 22 beside it. gain: ``(C,)``, the unit in which captures are learned, such that
-    the pictures of the first round are as bright as their targets; a camera would be exposed so. of_amplitude: the
-    network maps amplitudes, the square roots of both intensities, instead.
+    Parameters
+    ----------
+    spec : DisplaySpec
+        Nominal optics in SI units.
+    network : Network
+        The generator and, where the loss asks for one, the discriminator.
+    loss : ApproximatorLoss, optional
+        Eq. 20; None: the network's published loss.
+    with_critic : bool
+        Train the critic of Eq. 22 beside it.
+    seed : int
+        Of the first weights.
+    of_amplitude : bool
+        Not in the paper: the network maps amplitudes, the square roots of both intensities.
+
+    Attributes
+    ----------
+    gain : Tensor
+        Not in the paper: ``(C,)``, the unit in which captures are learned, such that the pictures of the first round
+        are as bright as their targets; a camera would be exposed so.
     """
 
     def __init__(
         self,
         spec: DisplaySpec,
         network: Network,
-        loss: Objective | None,
-        with_judge: bool,
+        loss: ApproximatorLoss | None,
+        with_critic: bool,
         seed: int,
         of_amplitude: bool = False,
     ) -> None:
@@ -42,28 +60,33 @@ class NetworkApproximator:
         self.trainer = trainer(network, loss, channels, channels, seed)
         self.gain = torch.ones(channels)
         self.of_amplitude = of_amplitude
-        self.judge = Judge(channels, network, seed) if with_judge else None
+        self.critic = Critic(channels, network, seed) if with_critic else None
 
     def to(self, device: torch.device) -> Self:
         """Itself, before the first step, on a device; its weights were drawn on the CPU, the same for all devices."""
         self.trainer.to(device)
         self.gain = self.gain.to(device)
-        if self.judge is not None:
-            self.judge.to(device)
+        if self.critic is not None:
+            self.critic.to(device)
         return self
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The adversarial loss of Eq. 22, where there is a critic."""
+        return None if self.critic is None else self.critic.verdict
 
     def expose(self, samples: Sequence[Sample]) -> None:
         """Set the gain from the first captures."""
-        overlap = torch.stack([(one.capture * one.target).sum((-2, -1)) for one in samples]).sum(0)
-        power = torch.stack([one.capture.square().sum((-2, -1)) for one in samples]).sum(0)
+        overlap = torch.stack([(sample.capture * sample.target).sum((-2, -1)) for sample in samples]).sum(0)
+        power = torch.stack([sample.capture.square().sum((-2, -1)) for sample in samples]).sum(0)
         self.gain = overlap / power.clamp_min(1e-12)
 
     def ideal(self, phase: Tensor, light: Tensor) -> Tensor:
         """|P(exp(i phase))|^2 in the region, ``(1, C, h, w)``, in the unit of the target."""
         channels = []
-        for channel, one in enumerate(phase):
-            model = self.spec.propagator(channel, device=one.device)
-            field = self.spec.region.crop(model.forward(unit_field(one)))
+        for channel, panel in enumerate(phase):
+            model = self.spec.propagator(channel, device=panel.device)
+            field = self.spec.region.crop(model.forward(unit_field(panel)))
             channels.append((field.real.square() + field.imag.square()) / light[channel])
         return torch.stack(channels)[None]
 
@@ -71,14 +94,14 @@ class NetworkApproximator:
         return intensity.clamp_min(1e-12).sqrt() if self.of_amplitude else intensity
 
     def step(self, sample: Sample, progress: float) -> dict[str, float]:
-        """One step on a capture of the trainer (Eq. 20), and of the judge (Eq. 22); their rates are constant."""
+        """One step on a capture of the trainer (Eq. 20), and of the critic (Eq. 22); their rates are constant."""
         with torch.no_grad():
             ideal = self._encoded(self.ideal(sample.phase, sample.light))
         losses = self.trainer.step(ideal, self._encoded((self.gain.view(-1, 1, 1) * sample.capture)[None]))
-        if self.judge is not None:
+        if self.critic is not None:
             with torch.no_grad():
                 predicted = self.trainer.generator(ideal)[0]
-            losses["judge"] = self.judge.step(matched(predicted, sample.target)[None], sample.target[None])
+            losses["judge"] = self.critic.step(matched(predicted, sample.target)[None], sample.target[None])
         return losses
 
     def image(self, light: Tensor) -> Image:
@@ -93,31 +116,28 @@ class NetworkApproximator:
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
-        judge = None if self.judge is None else self.judge.state_dict()
-        return {"trainer": self.trainer.state_dict(), "gain": self.gain, "judge": judge}
+        critic = None if self.critic is None else self.critic.state_dict()
+        return {"trainer": self.trainer.state_dict(), "gain": self.gain, "judge": critic}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on from a state."""
         self.trainer.load_state_dict(state["trainer"])
         self.gain = state["gain"].to(self.gain.device)
-        if self.judge is not None:
-            self.judge.load_state_dict(state["judge"])
+        if self.critic is not None:
+            self.critic.load_state_dict(state["judge"])
 
     def learned(self) -> dict[str, Any]:
         """What phase retrieval needs, and which features the perceptual loss compared."""
         weights: dict[str, Any] = {"generator": self.trainer.generator.state_dict(), "gain": self.gain}
         weights["perceptual"] = None if self.trainer.perceptual is None else self.trainer.perceptual.name
-        if self.judge is not None:
-            weights["judge"] = self.judge.network.state_dict()
+        if self.critic is not None:
+            weights["judge"] = self.critic.network.state_dict()
         return weights
 
     def load_learned(self, weights: Mapping[str, Any]) -> None:
         """UserError for the weights of another network."""
-        try:
+        with refuse_other_weights():
             self.trainer.generator.load_state_dict(weights["generator"])
             self.gain = weights["gain"].to(self.gain.device)
-            if self.judge is not None:
-                self.judge.network.load_state_dict(weights["judge"])
-        except (KeyError, TypeError, AttributeError, RuntimeError) as error:
-            reason = " ".join(str(error).split())[:160]
-            raise UserError(f"these are not the weights of this network ({reason}); train it anew") from error
+            if self.critic is not None:
+                self.critic.network.load_state_dict(weights["judge"])

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
-import torch
 from annotated_types import Interval
 from torch import nn
 
 from ...core.errors import UserError
+from ..learned.weights import draw_weights
 from .baselines import Identity, Pix2Pix, Pix2PixHD, UNet
 from .discriminator import MultiScaleDiscriminator, PatchDiscriminator
 from .generator import Generator
@@ -18,25 +17,39 @@ from .generator import Generator
 Name = Literal["proposed", "unet", "pix2pix", "pix2pixhd", "identity"]
 Discriminator = PatchDiscriminator | MultiScaleDiscriminator
 
-Module = TypeVar("Module", bound=nn.Module)
-
 PIX2PIX_DEVIATION = 0.02  # of the first weights (Isola et al., appendix)
 HALVED = ("unet", "pix2pixhd")  # have half the filters, Section 6.1
 PUBLISHED_HALVINGS = 4  # of the resolution in these two
-SWITCHES = ("conditional", "dropout", "full_resolution_stage", "plain_ends", "skip_after_activation")
+SWITCHES = ("dropout", "full_resolution_stage", "plain_ends", "skip_after_activation")  # of the generator
 
 
 @dataclass(frozen=True)
 class Network:
     """Generator and discriminator by name and size.
 
-    preset: "paper" is what is published; "small" has a quarter of the filters and fewer levels, for small panels and a
-    CPU. levels (halvings of the resolution) and width (filters of the first level, doubled from level to level) replace
-    the preset's: 8 and 64 or 5 and 16, and 4 levels for U-Net and Pix2PixHD in both. U-Net and Pix2PixHD have half the
-    filters of ``width``, as in Section 6.1 of the paper.
+    Chakravarthula et al. 2020, Sections 4.3.1 and 6.1.
 
-    For the proposed network only: conditional, the discriminator sees the ideal image too; and the four changes to
-    Pix2Pix (see ``Generator``), each of which can be undone. Raises UserError where one is set for another network.
+    Parameters
+    ----------
+    name : str
+        The proposed network or one of Table 1.
+    preset : {"small", "paper"}
+        "paper" is what is published; "small" (not in the paper) has a quarter of the filters and fewer levels, for
+        small panels and a CPU.
+    levels : int, optional
+        Halvings of the resolution; None: 5 or 8 by preset, and 4 for U-Net and Pix2PixHD.
+    width : int, optional
+        Filters of the first level, doubled from level to level; None: 16 or 64 by preset. U-Net and Pix2PixHD have half
+        of them, as in Section 6.1.
+    conditional : bool
+        The discriminator sees the ideal image too. For the proposed network only, as are the next four.
+    dropout, full_resolution_stage, plain_ends, skip_after_activation : bool
+        The four changes to Pix2Pix, each of which can be undone, see `Generator`.
+
+    Raises
+    ------
+    UserError
+        Where one of the last five is set for another network.
     """
 
     name: Name = "proposed"
@@ -51,7 +64,11 @@ class Network:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            if self.name != "proposed" and field.name in SWITCHES and getattr(self, field.name) != field.default:
+            if (
+                self.name != "proposed"
+                and field.name in ("conditional", *SWITCHES)
+                and getattr(self, field.name) != field.default
+            ):
                 raise UserError(f"network '{self.name}' has no '{field.name}'; it is for the network 'proposed'")
 
     def generator(self, inputs: int, outputs: int) -> nn.Module:
@@ -67,17 +84,8 @@ class Network:
             return draw_weights(Pix2Pix(inputs, outputs, levels, width), PIX2PIX_DEVIATION)
         if self.name == "pix2pixhd":
             return draw_weights(Pix2PixHD(inputs, outputs, levels, width), PIX2PIX_DEVIATION)
-        proposed = Generator(
-            inputs,
-            outputs,
-            levels,
-            width,
-            dropout=self.dropout,
-            full_resolution_stage=self.full_resolution_stage,
-            plain_ends=self.plain_ends,
-            skip_after_activation=self.skip_after_activation,
-        )
-        return draw_weights(proposed, PIX2PIX_DEVIATION)
+        switches = {name: getattr(self, name) for name in SWITCHES}
+        return draw_weights(Generator(inputs, outputs, levels, width, **switches), PIX2PIX_DEVIATION)
 
     def discriminator(self, channels: int, condition: int | None = None) -> Discriminator | None:
         """The discriminator of images with so many channels; None for networks that are published without.
@@ -104,19 +112,3 @@ class Network:
         """Filters of the first level of generator and discriminator."""
         width = self.width or {"small": 16, "paper": 64}[self.preset]
         return width // 2 if self.name in HALVED else width
-
-
-def draw_weights(module: Module, deviation: float | None) -> Module:
-    """The module with fresh normal weights and zero offsets, laid out channels last, which a CPU convolves faster.
-
-    deviation: of the weights; None takes sqrt(2 / inputs of a neuron), as U-Net's publication does.
-    """
-    for layer in module.modules():
-        if isinstance(layer, nn.Conv2d | nn.ConvTranspose2d):
-            taps = math.prod(layer.kernel_size)
-            if isinstance(layer, nn.ConvTranspose2d):
-                taps //= math.prod(layer.stride)  # the zeros between the pixels are no inputs
-            nn.init.normal_(layer.weight, std=deviation or math.sqrt(2 / (layer.in_channels * taps)))
-            if layer.bias is not None:
-                nn.init.zeros_(layer.bias)
-    return module.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

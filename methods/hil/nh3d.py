@@ -9,31 +9,46 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import torch
 from torch import Tensor
 
+from ..learned.algorithm import train
+from ..learned.method import frozen, hologram, predicted
+from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
-from .loop import Rounds, train_in_the_loop
 from .networks import Network
-from .retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
     from ...display.metered import MeteredDisplay
-    from ...display.training import TrainingBench, TrainingImage
+    from ...display.training import TrainingBench
 
 
 @dataclass(frozen=True)
 class HILNH3D:
-    """Ideal amplitude to captured amplitude by a U-Net, L1; one round of captures of Wirtinger holograms; retrieval for
-    the squared error of amplitude. seed: of the weights, besides the study's.
+    """Ideal amplitude to captured amplitude by a U-Net, as Choi et al. 2021 compare with; SI units throughout.
+
+    Parameters
+    ----------
+    network : Network
+        The approximator, trained with an L1 loss of amplitudes.
+    training : Schedule
+        One round of captures of Wirtinger holograms.
+    retrieval : SquaredErrorRetrieval
+        Retrieval for the squared error of amplitude.
+    start : Wirtinger
+        Where every retrieval begins.
+    seed : int
+        Of the weights, besides the study's.
     """
 
     network: Network = Network(name="unet")
-    training: Rounds = Rounds(rounds=1)
+    training: Schedule = Schedule(rounds=1)
     retrieval: SquaredErrorRetrieval = SquaredErrorRetrieval()
     start: Wirtinger = Wirtinger(iterations=50)
     seed: int = 0
@@ -43,38 +58,29 @@ class HILNH3D:
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 1
 
+    def approximator(self, spec: DisplaySpec) -> NetworkApproximator:
+        """The network, untrained."""
+        return NetworkApproximator(spec, self.network, None, with_critic=False, seed=self.seed, of_amplitude=True)
+
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
-        """Train the network on captures of the display; what ``solve`` and ``predict`` need of it."""
+        """Train the network on captures of the display; parameters, result and errors as in `HIL.prepare`."""
         check_region(bench.spec.region.shape, self.retrieval)
-        approximator = self._approximator(bench.spec).to(bench.device)
-
-        def begin(image: TrainingImage) -> Tensor:
-            return self.start.solve(image.target[None], bench)[0]
-
-        train_in_the_loop(bench, approximator, begin, self._search, self.training)
+        approximator = self.approximator(bench.spec).to(bench.device)
+        train(bench, approximator, partial(hologram, self.start, bench=bench), self._retrieve, self.training)
         return approximator.learned()
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
-        display, start = self._display(bench), self.start.solve(target, bench)
-        return torch.stack([self._search(display, image, phase) for image, phase in zip(target, start, strict=True)])
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]; errors as in `HIL.solve`."""
+        display = frozen(self.approximator(bench.spec), bench).image(bench.light)
+        start = self.start.solve(target, bench)
+        return torch.stack([self._retrieve(display, *pair) for pair in zip(target, start, strict=True)])
 
-    @torch.no_grad()
     def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light, that the network expects."""
-        display = self._display(bench)
-        return torch.stack([display(one) for one in phase])
+        return predicted(frozen(self.approximator(bench.spec), bench).image(bench.light), phase)
 
-    def _search(self, display: Image, target: Tensor, phase: Tensor) -> Tensor:
-        def amplitude(shown: Tensor) -> Tensor:
-            return display(shown).clamp_min(1e-12).sqrt()
+    def _retrieve(self, display: Image, target: Tensor, start: Tensor) -> Tensor:
+        def amplitude(phase: Tensor) -> Tensor:
+            return display(phase).clamp_min(1e-12).sqrt()
 
-        return retrieve(amplitude, target.sqrt(), phase, self.retrieval)
-
-    def _approximator(self, spec: DisplaySpec) -> NetworkApproximator:
-        return NetworkApproximator(spec, self.network, None, with_judge=False, seed=self.seed, of_amplitude=True)
-
-    def _display(self, bench: MeteredDisplay) -> Image:
-        approximator = self._approximator(bench.spec).to(bench.device)
-        approximator.load_learned(bench.learned)
-        return approximator.image(bench.light)
+        return retrieve(amplitude, target.sqrt(), start, self.retrieval)

@@ -1,4 +1,4 @@
-"""The constant phase of a hologram, found with captures.
+"""The constant phase of a hologram, searched with captures. Not in the paper.
 
 It does not change an ideal image. On a display it decides where the phase wraps and how the image interferes with the
 light that the panel does not modulate (Chakravarthula et al. 2020, Eq. 5 and 13).
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from torch.nn import functional
 
+from ..common import matched
 from ..wirtinger import Wirtinger
-from .retrieval import matched
 
 if TYPE_CHECKING:
     from ...display.training import TrainingBench
@@ -21,7 +21,7 @@ TRIED_IMAGES = 4
 
 
 def best_offset(bench: TrainingBench, start: Wirtinger, offsets: int) -> float:
-    """The one of so many constants [rad], evenly over 2 pi, whose captures are closest to the first training images.
+    """That of so many constants [rad], evenly over 2 pi, whose captures are closest to the first training images.
 
     Zero without a capture if there is one alone.
     """
@@ -32,14 +32,14 @@ def best_offset(bench: TrainingBench, start: Wirtinger, offsets: int) -> float:
     def search() -> dict[str, list[float]]:
         images = bench.images[:TRIED_IMAGES]
         phases = [start.solve(image.target[None], bench)[0] for image in images]
-        shown = [
+        candidates = [
             (phase + offset, image, ("offset", index))
             for image, phase in zip(images, phases, strict=True)
             for index, offset in enumerate(tried)
         ]
-        bench.announce(shown)
+        bench.announce(candidates)
         errors = [0.0] * offsets
-        for phase, image, (name, index) in shown:
+        for phase, image, (name, index) in candidates:
             capture = bench.photograph(phase, image, name, index)
             errors[index] += float(functional.mse_loss(matched(capture, image.target), image.target))
         return {"errors": errors}

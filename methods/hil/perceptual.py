@@ -18,8 +18,7 @@ from torch.nn import functional
 
 from ...core.errors import UserError
 from ...metrics.base import as_rgb, gaussian_blur
-from ...metrics.feature_distance import _opponent as opponent
-from ...metrics.feature_distance import _responses as oriented_responses
+from ...metrics.feature_distance import opponent_channels, oriented_responses
 
 WEIGHTS = (1.5, 1.0)  # v of relu1_2 and relu2_2, Section 4.3.1
 URL = "https://download.pytorch.org/models/vgg19-dcbb9e9d.pth"
@@ -45,7 +44,7 @@ class VGG19(nn.Module):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        state = _read(path)
+        state = _read_vgg19(path)
         self.convolutions = nn.ModuleDict()
         for number, (before, after) in CONVOLUTIONS.items():
             convolution = nn.Conv2d(before, after, 3, padding=1)
@@ -94,7 +93,7 @@ class OrientedFilters(nn.Module):
         for scale, weight in enumerate(WEIGHTS):
             if scale:
                 difference = gaussian_blur(difference, 1.0)[:, :, ::2, ::2]
-            parts.append(weight * oriented_responses(opponent(difference, scale)).abs().mean())
+            parts.append(weight * oriented_responses(opponent_channels(difference, scale)).abs().mean())
         return torch.stack(parts).sum()
 
 
@@ -115,16 +114,16 @@ def find_weights(location: Path | None = None) -> Path | None:
     if location is not None and location.is_file():
         return location
     folder = Path(torch.hub.get_dir()) / "checkpoints" if location is None else location
-    found = max(folder.glob("vgg19-*.pth"), key=lambda path: path.stat().st_mtime, default=None)
-    if found is None and location is not None:
+    newest = max(folder.glob("vgg19-*.pth"), key=lambda path: path.stat().st_mtime, default=None)
+    if newest is None and location is not None:
         raise UserError(f"VGG weights: no vgg19-*.pth in {location}; put {URL} there")
-    return found
+    return newest
 
 
 _AGAIN = "download it again"
 
 
-def _read(path: Path) -> dict[str, Tensor]:
+def _read_vgg19(path: Path) -> dict[str, Tensor]:
     """A dictionary of tensors from a file, read without running anything in it.
 
     A name such as torchvision's ends in the first eight digits of the file's SHA-256, which are checked.

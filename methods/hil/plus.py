@@ -10,15 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-import torch
 from torch import nn
 
-from ...core import seeds
 from ...core.errors import UserError
-from ..calibrated.approximator import ModelApproximator, Rates, start_at_zero
+from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.diagnosis import Diagnosed
 from ..calibrated.method import ThroughModel
 from ..display_model import DisplayModel
+from ..learned.weights import seeded, start_at_zero
 from .networks import Network
 
 if TYPE_CHECKING:
@@ -27,26 +26,13 @@ if TYPE_CHECKING:
 RATES = Rates(model=1e-2, network=3e-4)
 
 
-class PlusApproximator(ModelApproximator):
-    """|field of the display model|^2 and, if there is a network, what it adds; both learn from the same captures.
+def residual_network(spec: DisplaySpec, network: Network, seed: int) -> nn.Module:
+    """A generator that adds to the prediction of a display model and starts at zero.
 
-    The network's last layer starts at zero, so the physics is learned first and the network learns what it leaves.
+    The physics is learned first, and the network learns what it leaves.
     """
-
-    def __init__(self, spec: DisplaySpec, network: Network | None, seed: int) -> None:
-        if network is not None and (network.dropout or network.name == "pix2pix"):
-            raise UserError(
-                "hil_plus: a residual network has no dropout, whose random numbers a resumed training lacks"
-            )
-        super().__init__(DisplayModel(spec), _residual(spec, network, seed), RATES)
-
-
-def _residual(spec: DisplaySpec, network: Network | None, seed: int) -> nn.Module | None:
-    if network is None:
-        return None
     channels = len(spec.wavelengths)
-    with torch.random.fork_rng(devices=[]):
-        torch.set_rng_state(seeds.generator("residual network", seed).get_state())
+    with seeded("residual network", seed):
         return start_at_zero(network.generator(3 * channels, channels))
 
 
@@ -54,14 +40,26 @@ def _residual(spec: DisplaySpec, network: Network | None, seed: int) -> nn.Modul
 class HILPlus(Diagnosed, ThroughModel):
     """Hardware in the loop with the aberration field as a field; see this file's first lines.
 
-    network: a generator that adds to what the display model predicts; none by default, since it gained nothing on
-    held-out images (22.09 dB without, 21.90 dB with it after a first round of 64 captures). training: Algorithm 1.
+    The field is that of Eq. 13. The other parameters are those of `ThroughModel`; `training` is Algorithm 1. SI units
+    throughout.
+
+    Parameters
+    ----------
+    network : Network, optional
+        A generator that adds to what the display model predicts; none by default, since it gained nothing on held-out
+        images (22.09 dB without, 21.90 dB with it after a first round of 64 captures).
     """
 
     network: Network | None = None
 
     version: ClassVar[int] = 3
 
-    def approximator(self, spec: DisplaySpec) -> PlusApproximator:
-        """The display model, untrained, with a network if there is one."""
-        return PlusApproximator(spec, self.network, self.seed)
+    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
+        """The display model, untrained, with a network if there is one; UserError for a network with dropout."""
+        if self.network is None:
+            return ModelApproximator(DisplayModel(spec), None, RATES)
+        if self.network.dropout or self.network.name == "pix2pix":
+            raise UserError(
+                "hil_plus: a residual network has no dropout, whose random numbers a resumed training lacks"
+            )
+        return ModelApproximator(DisplayModel(spec), residual_network(spec, self.network, self.seed), RATES)

@@ -24,7 +24,12 @@ class SmoothStart(Wirtinger):
     what is left there is light where none should be. Hence a tolerance, as in the discrepancy principle of iterative
     regularisation (Morozov 1966), in place of a number of iterations.
 
-    tolerance: squared error of the intensity over the target's squared intensity; 0: all iterations are made.
+    Not in the paper. The other parameters are those of `Wirtinger`.
+
+    Parameters
+    ----------
+    tolerance : float
+        Squared error of the intensity over the target's squared intensity; 0: all iterations are made.
     """
 
     tolerance: Annotated[float, Interval(ge=0, le=1)] = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -19,3 +20,12 @@ def load(module: str) -> Any:
         raise UserError(f"{package} is not installed; pip install 'holobench_eval[peers]'") from error
     except Exception as error:  # whatever a package does when it meets another version of what it needs
         raise UserError(f"{package} cannot be imported: {error}") from error
+
+
+def unavailable(load_peer: Callable[[], Any]) -> str | None:
+    """Why a peer cannot be loaded here, in one line; None if it can."""
+    try:
+        load_peer()
+    except UserError as error:
+        return str(error)
+    return None

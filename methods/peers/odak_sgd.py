@@ -17,16 +17,13 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ...core.errors import UserError
 from ..common import Bench, per_channel
-from .loading import load
+from .loading import load, unavailable
 
 
 @dataclass(frozen=True)
 class OdakSGD:
     """odak: Adam on the phase through odak's own propagation (needs the extra 'peers').
-
-    iterations: odak's default is 100. learning_rate: Adam's step [rad]; odak's default.
 
     odak compares the intensity of a panel lit with 1 with the image in [0, 1] as it is, without a factor between
     them, and starts from a normally distributed phase; both are kept, as is its band-limited angular spectrum on twice
@@ -36,6 +33,13 @@ class OdakSGD:
     ``wavelength * distance / (4 * side)`` metres aside on each axis, otherwise for each colour (side: that of the
     panel); and the light between the pixels of a picture with a random start is speckle. On a GPU torch draws
     its start there, so that it is another one than on the CPU.
+
+    Parameters
+    ----------
+    iterations : int
+        odak's default is 100.
+    learning_rate : float
+        Adam's step [rad]; odak's default.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
@@ -46,17 +50,32 @@ class OdakSGD:
 
     def available(self) -> str | None:
         """Why the method cannot run here, in one line; None if it can."""
-        try:
-            _odak()
-        except UserError as error:
-            return str(error)
-        return None
+        return unavailable(_odak)
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]. UserError where odak is not installed."""
+        """The phase of odak's last iteration.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        UserError
+            Where odak is not installed.
+        """
         wave = _odak()
         return per_channel(
-            target, lambda images, channel: torch.stack([self._retrieve(wave, one, bench, channel) for one in images])
+            target,
+            lambda images, channel: torch.stack([self._retrieve(wave, image, bench, channel) for image in images]),
         )
 
     def _retrieve(self, wave: Any, target: Tensor, bench: Bench, channel: int) -> Tensor:

@@ -13,12 +13,11 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ...core.errors import UserError
 from ..common import Bench, per_channel
 from ..descent import Best
 from ..initial_phase import InitialPhase, initial_phase
 from ..losses import LOSSES, LossName
-from .loading import load
+from .loading import load, unavailable
 
 if TYPE_CHECKING:
     from ...display.api import DisplaySpec
@@ -29,10 +28,18 @@ class TorchOpticsAdam:
     """torchoptics: Adam on the phase through torchoptics' propagation (needs the extra 'peers').
 
     With the defaults it is ``wirtinger`` with another model of the light: the same loss in the region, start and
-    step, and the phase of the least loss, but a gradient by autograd in double precision, torchoptics' default.
-    propagation: a method of torchoptics; its angular spectrum has neither a band limit nor an iris. padding: samples
-    added to each side of the panel for the angular spectrum, in panels. torchoptics' own default of 2 computes on 25
-    times the panel's area; 0.5 keeps light from coming round where it spreads less than a panel.
+    step, and the phase of the least loss, but a gradient by autograd in double precision, torchoptics' default. SI
+    units throughout.
+
+    Parameters
+    ----------
+    iterations, loss, step, initial_phase
+        See `Wirtinger`.
+    propagation : str
+        A method of torchoptics; its angular spectrum has neither a band limit nor an iris.
+    padding : float
+        Samples added to each side of the panel for the angular spectrum, in panels. torchoptics' own default of 2
+        computes on 25 times the panel's area; 0.5 keeps light from coming round where it spreads less than a panel.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
@@ -47,14 +54,28 @@ class TorchOpticsAdam:
 
     def available(self) -> str | None:
         """Why the method cannot run here, in one line; None if it can."""
-        try:
-            load("torchoptics")
-        except UserError as error:
-            return str(error)
-        return None
+        return unavailable(lambda: load("torchoptics"))
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]. UserError: torchoptics is missing."""
+        """The phase of the least loss that was seen.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        UserError
+            Where torchoptics is not installed.
+        """
         return per_channel(target, lambda images, channel: self._solve_channel(images, bench, channel))
 
     def _solve_channel(self, target: Tensor, bench: Bench, channel: int) -> Tensor:

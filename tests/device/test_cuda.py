@@ -14,9 +14,9 @@ from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU, repeatable
 from holobench_eval.display import CalibratedBench, load_profile
 from holobench_eval.methods.hil.approximator import NetworkApproximator
-from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
-from holobench_eval.methods.hil.retrieval import Retrieval, retrieve
+from holobench_eval.methods.learned.retrieval import PhaseRetrieval, retrieve
+from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.optics import AngularSpectrum
 from holobench_eval.study import cost
 from holobench_eval.study.opening import open_bench
@@ -102,13 +102,14 @@ def test_steps_of_hil_and_a_retrieval_through_it() -> None:
     for device in DEVICES:
         with repeatable(1, device):
             network = Network(levels=4, width=8, dropout=True)
-            approximator = NetworkApproximator(spec, network, None, with_judge=True, seed=0).to(device)
+            approximator = NetworkApproximator(spec, network, None, with_critic=True, seed=0).to(device)
             place = (phase, 0.5 * target, target, torch.ones(3))
             sample = Sample(*(one.to(device) for one in place))
             approximator.expose([sample])
             losses.append([approximator.step(sample, 0.0)["total"] for _ in range(3)])
             display = approximator.image(sample.light)
-            phases.append(retrieve(display, sample.target, sample.phase, Retrieval(iterations=3), approximator.judge))
+            settings = PhaseRetrieval(iterations=3)
+            phases.append(retrieve(display, sample.target, sample.phase, settings, approximator.verdict))
     assert losses[1] == pytest.approx(losses[0], rel=1e-2)
     assert float((phases[1].cpu() - phases[0]).square().mean().sqrt()) < 1e-2  # rad
 

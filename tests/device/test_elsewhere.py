@@ -21,8 +21,8 @@ from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.methods.calibrated.method import ThroughModel
 from holobench_eval.methods.fiducials import fiducial_phases
 from holobench_eval.methods.hil.approximator import NetworkApproximator
-from holobench_eval.methods.hil.loop import Sample
 from holobench_eval.methods.hil.networks import Network
+from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
 from holobench_eval.optics import AngularSpectrum
@@ -201,7 +201,7 @@ def test_a_method_learns_resumes_and_solves_where_its_images_are(
 def test_pix2pixhd_and_the_default_loss_take_a_step() -> None:
     spec = load_profile("ideal").spec(PANEL)
     network = Network("pix2pixhd", levels=2, width=4)
-    approximator = NetworkApproximator(spec, network, None, with_judge=True, seed=0).to(ELSEWHERE)
+    approximator = NetworkApproximator(spec, network, None, with_critic=True, seed=0).to(ELSEWHERE)
     with Elsewhere():
         target = torch.rand(3, *spec.region.shape, device=ELSEWHERE)
         sample = Sample(torch.zeros(3, *PANEL, device=ELSEWHERE), target, target, torch.ones(3, device=ELSEWHERE))

@@ -1,4 +1,4 @@
-"""A display of a few pixels, its trainings, and a way to kill them at any moment."""
+"""Short settings of all methods, a display of a few pixels, its trainings, and a way to kill them at any moment."""
 
 from __future__ import annotations
 
@@ -13,11 +13,50 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from holobench_eval.core import seeds
+from holobench_eval.core import plugins, seeds
 from holobench_eval.display.api import Capture, DisplaySpec, Region, white_irradiance
 from holobench_eval.display.calibrated import CalibratedBench
 from holobench_eval.display.metered import MeteredDisplay
 from holobench_eval.display.training import TrainingBench, TrainingImage
+
+# Few iterations: what rounding does to a phase grows with them, and so does the time. A phase of few iterations leaves
+# wide gaps in the histogram that ``with_offset`` takes the emptiest bin of, where rounding would decide.
+_EARLY = {"iterations": 5, "offset": "none"}
+_START = {"converged": {"iterations": 20, "offset": "none"}, "early": _EARLY}
+ROUNDS = {"rounds": 2, "refine_images": 1, "steps": 5, "refine_steps": 3}
+_SMALL = {"levels": 2, "width": 4}
+_CALIBRATED = {"training": ROUNDS, "search": {"iterations": 2}, "retrieval": {"iterations": 3}, "start": _EARLY}
+QUICK: dict[str, dict[str, Any]] = {
+    **{key: {"iterations": 6} for key in ("gerchberg_saxton", "hio")},
+    **dict.fromkeys(("wirtinger", "sgd", "multi_plane"), _EARLY),
+    "odak_sgd": {"iterations": 1},
+    "torchoptics_adam": {"iterations": 6},
+    "oracle": {"iterations": 4, "start_iterations": 40},
+    "online_camera": {"captures": 24, "start": _START},
+    "online_camera_network": {"captures": 24, "start": _START, "steps": 3, "network": _SMALL},
+    "hil": {
+        "network": _SMALL,
+        "training": ROUNDS,
+        # a network of so few steps hides the phase, whose gradient would be rounding
+        "retrieval": {"iterations": 0, "perceptual": 0, "ms_ssim": 0},
+        "offsets": 2,
+        "start": {"offset": "none"},
+    },
+    "hil_nh3d": {
+        "network": {**_SMALL, "name": "unet"},
+        "training": ROUNDS,
+        "retrieval": {"iterations": 3, "step": 0.05},
+        "start": _EARLY,
+    },
+    "hil_plus": {"network": _SMALL, **_CALIBRATED},
+    **{key: {**_CALIBRATED, "patterns": 2} for key in ("parametric_model", "learned_kernel")},
+    **{key: {**_CALIBRATED, "patterns": 2, "width": 4} for key in ("cnn_prop_cnn", "hybrid_model")},
+}
+
+
+def quick(name: str) -> Any:
+    """A shipped method with short settings."""
+    return plugins.build("methods", name, QUICK.get(name, {}))
 
 
 class Killed(BaseException):

@@ -39,6 +39,11 @@ class ToyDisplay:
     frames: int = 0
     spec: DisplaySpec = SPEC
 
+    @property
+    def simulation(self) -> ToyDisplay:
+        """What a privileged method may differentiate: the display without its noise."""
+        return self
+
     def image(self, phase: Tensor) -> Tensor:
         """What the camera sees without noise, ``(C, h, w)``; incident light is 1."""
         bends = torch.randn(1, len(phase), 5, 5, generator=torch.Generator().manual_seed(3))

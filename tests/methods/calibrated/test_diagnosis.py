@@ -19,8 +19,8 @@ from holobench_eval.display.simulated.stages import Crosstalk, LookUpTable, Prop
 from holobench_eval.methods.calibrated.diagnosis import diagnose
 from holobench_eval.methods.calibrated.patterns import random_phase
 from holobench_eval.methods.display_model import KNOTS, MODES, SOURCE_GRID, DisplayModel
-from holobench_eval.methods.hil.loop import Sample
-from holobench_eval.methods.hil.plus import PlusApproximator
+from holobench_eval.methods.hil.plus import HILPlus
+from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.optics.phase import TAU
 
 COLOUR = 1
@@ -123,7 +123,7 @@ def test_a_model_that_learned_from_speckle_patterns_tells_its_display_within_the
     )
     bench = SimulatedBench(profile.scaled((64, 64)))
     samples = seen(bench, 8)
-    approximator, steps = PlusApproximator(bench.spec, None, seed=0), 240
+    approximator, steps = HILPlus().approximator(bench.spec), 240
     for step in range(steps):
         approximator.step(samples[step % len(samples)], step / steps)
     rows = joined(diagnose(approximator.model.state_dict(), bench.spec), truth(bench))

@@ -19,10 +19,10 @@ from holobench_eval.methods.calibrated import method as shared
 from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
 from holobench_eval.methods.calibrated.hybrid import HybridModel
 from holobench_eval.methods.calibrated.kernel import LearnedKernel
-from holobench_eval.methods.calibrated.method import Calibrated, LargeSteps, Search
+from holobench_eval.methods.calibrated.method import Calibrated, LargeSteps, SearchRetrieval
 from holobench_eval.methods.calibrated.parametric import ParametricModel
-from holobench_eval.methods.hil.loop import Rounds
-from holobench_eval.methods.hil.retrieval import Image
+from holobench_eval.methods.learned.retrieval import Image
+from holobench_eval.methods.learned.samples import Schedule
 from holobench_eval.methods.wirtinger import Wirtinger
 from tests.support.small_training import (
     BentDisplay,
@@ -39,9 +39,9 @@ from tests.support.small_training import (
 
 SPEC = small_spec(32, 24, colours=3)
 SHORT: dict[str, Any] = {
-    "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
+    "training": Schedule(2, refine_images=1, steps=4, refine_steps=2),
     "retrieval": LargeSteps(iterations=3),
-    "search": Search(iterations=2),
+    "search": SearchRetrieval(iterations=2),
     "start": Wirtinger(iterations=2),
     "patterns": 2,
 }
@@ -198,9 +198,9 @@ class PlainDisplay(BentDisplay):
 
 ONE = small_spec(48, 36)
 LEARNS: dict[str, Any] = {
-    "training": Rounds(1, steps=60),
+    "training": Schedule(1, steps=60),
     "retrieval": LargeSteps(iterations=60),
-    "search": Search(iterations=5),
+    "search": SearchRetrieval(iterations=5),
     "patterns": 4,
 }
 
@@ -224,7 +224,7 @@ def test_a_display_without_faults_is_left_to_wirtinger_holography(
 
 def test_a_display_with_faults_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Calibrated, "NOMINAL", Wirtinger())
-    method = ParametricModel(**LEARNS | {"training": Rounds(1, steps=120)})
+    method = ParametricModel(**LEARNS | {"training": Schedule(1, steps=120)})
     learned = calibrated_on(BentDisplay(ONE), method)
     assert learned["nominal"] == 0
     (target,) = pictures(ONE, first=30)

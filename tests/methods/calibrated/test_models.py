@@ -17,7 +17,7 @@ from holobench_eval.methods.calibrated.kernel import LearnedKernel
 from holobench_eval.methods.calibrated.networks import ColourByColour
 from holobench_eval.methods.calibrated.parametric import ParametricModel
 from holobench_eval.methods.calibrated.patterns import random_phase
-from holobench_eval.methods.hil.loop import Sample
+from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.optics import AngularSpectrum
 from tests.support.small_training import BentDisplay, pictures, small_spec
 

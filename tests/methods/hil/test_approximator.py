@@ -1,4 +1,4 @@
-"""The approximator's input is the ideal image, its unit the targets', its frozen copies stay, its judge learns."""
+"""The approximator's input is the ideal image, its unit the targets', its frozen copies stay, its critic learns."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from torch import Tensor
 from holobench_eval.core.errors import UserError
 from holobench_eval.display.api import DisplaySpec, white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
-from holobench_eval.methods.hil.judge import Judge
-from holobench_eval.methods.hil.loop import Sample
+from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss
+from holobench_eval.methods.hil.critic import Critic
 from holobench_eval.methods.hil.networks import Network
-from holobench_eval.methods.hil.objective import Objective
-from holobench_eval.methods.hil.plus import PlusApproximator
-from holobench_eval.methods.hil.retrieval import matched
+from holobench_eval.methods.hil.plus import HILPlus
+from holobench_eval.methods.learned.retrieval import matched
+from holobench_eval.methods.learned.samples import Sample
 from tests.support.small_training import pictures, same, small_spec, through_a_file
 
 SPEC = small_spec(48, 40, colours=3)
 SMALL = Network(levels=2, width=4)
-PLAIN = Objective(perceptual=0.0)
+PLAIN = ApproximatorLoss(perceptual=0.0)
 
 
 def approximator(
     network: Network = SMALL,
     spec: DisplaySpec = SPEC,
-    with_judge: bool = True,
+    with_critic: bool = True,
     of_amplitude: bool = False,
     seed: int = 0,
 ) -> NetworkApproximator:
     loss = PLAIN if network.name == "proposed" else None
-    return NetworkApproximator(spec, network, loss, with_judge, seed, of_amplitude)
+    return NetworkApproximator(spec, network, loss, with_critic, seed, of_amplitude)
 
 
 def phases(count: int = 1, spec: DisplaySpec = SPEC) -> list[Tensor]:
@@ -84,7 +84,7 @@ def test_the_gain_makes_the_first_captures_as_bright_as_their_targets() -> None:
 
 @pytest.mark.parametrize("of_amplitude", [False, True])
 def test_the_identity_predicts_the_ideal_image_in_the_unit_of_captures(of_amplitude: bool) -> None:
-    one = approximator(Network("identity"), with_judge=False, of_amplitude=of_amplitude)
+    one = approximator(Network("identity"), with_critic=False, of_amplitude=of_amplitude)
     (phase,) = phases()
     light = torch.tensor([1.0, 2.0, 3.0])
     one.gain = torch.tensor([2.0, 4.0, 8.0])
@@ -92,7 +92,7 @@ def test_the_identity_predicts_the_ideal_image_in_the_unit_of_captures(of_amplit
 
 
 def test_amplitudes_are_learned_as_square_roots_and_squared_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    one = approximator(with_judge=False, of_amplitude=True)
+    one = approximator(with_critic=False, of_amplitude=True)
     (sample,) = samples(1)
     one.gain = torch.tensor([2.0, 1.0, 0.5])
     seen: list[tuple[Tensor, Tensor]] = []
@@ -112,14 +112,14 @@ def test_amplitudes_are_learned_as_square_roots_and_squared_back(monkeypatch: py
 
 
 def test_dark_noise_has_an_amplitude() -> None:
-    one = approximator(with_judge=False, of_amplitude=True)
+    one = approximator(with_critic=False, of_amplitude=True)
     (sample,) = samples(1)
     black = Sample(sample.phase, torch.full_like(sample.capture, -0.01), sample.target, sample.light)
     assert all(value == value for value in one.step(black, 0.0).values())
 
 
 def test_training_brings_predictions_to_captures() -> None:
-    one, (sample,) = approximator(Network("unet", levels=2, width=16), with_judge=False), samples(1)
+    one, (sample,) = approximator(Network("unet", levels=2, width=16), with_critic=False), samples(1)
     one.expose([sample])
 
     def error() -> float:
@@ -133,7 +133,7 @@ def test_training_brings_predictions_to_captures() -> None:
 
 
 def made(kind: str) -> Any:
-    return approximator() if kind == "network" else PlusApproximator(SPEC, SMALL, seed=0)
+    return approximator() if kind == "network" else HILPlus(network=SMALL, seed=0).approximator(SPEC)
 
 
 @pytest.mark.parametrize("kind", ["network", "plus"])
@@ -181,7 +181,7 @@ def test_what_was_learned_gives_the_same_display_to_another(kind: str) -> None:
     one, (sample,) = made(kind), samples(1)
     one.expose([sample])
     one.step(sample, 0.0)
-    other = approximator(seed=9) if kind == "network" else PlusApproximator(SPEC, SMALL, seed=9)
+    other = approximator(seed=9) if kind == "network" else HILPlus(network=SMALL, seed=9).approximator(SPEC)
     other.load_learned(through_a_file(one.learned()))
     views = [each.image(sample.light)(sample.phase).detach() for each in (one, other)]
     assert torch.equal(*views)
@@ -198,7 +198,7 @@ def test_the_weights_of_another_network_are_refused_in_one_line() -> None:
     refuses(approximator(Network(levels=2, width=6)).load_learned, learned)
     refuses(approximator(Network(levels=3, width=4)).load_learned, learned)
     refuses(approximator(spec=small_spec(48, 40, colours=1)).load_learned, learned)
-    refuses(approximator().load_learned, approximator(with_judge=False).learned())
+    refuses(approximator().load_learned, approximator(with_critic=False).learned())
     for damaged in (
         {},
         {**learned, "generator": None},
@@ -209,19 +209,19 @@ def test_the_weights_of_another_network_are_refused_in_one_line() -> None:
 
 
 def test_the_parameters_of_another_display_are_refused_in_one_line() -> None:
-    learned = PlusApproximator(SPEC, SMALL, seed=0).learned()
+    learned = HILPlus(network=SMALL, seed=0).approximator(SPEC).learned()
     for other in (
-        PlusApproximator(SPEC, Network(levels=2, width=6), seed=0),
-        PlusApproximator(small_spec(48, 40), SMALL, seed=0),
+        HILPlus(network=Network(levels=2, width=6)).approximator(SPEC),
+        HILPlus(network=SMALL).approximator(small_spec(48, 40)),
     ):
         refuses(other.load_learned, learned)
-    alone = PlusApproximator(SPEC, None, seed=0).learned()
-    refuses(PlusApproximator(SPEC, SMALL, seed=0).load_learned, alone)
+    alone = HILPlus().approximator(SPEC).learned()
+    refuses(HILPlus(network=SMALL, seed=0).approximator(SPEC).load_learned, alone)
 
 
 def test_the_residual_network_starts_at_nothing() -> None:
-    one, (sample,) = PlusApproximator(SPEC, SMALL, seed=0), samples(1)
-    alone = PlusApproximator(SPEC, None, seed=0)
+    one, (sample,) = HILPlus(network=SMALL, seed=0).approximator(SPEC), samples(1)
+    alone = HILPlus().approximator(SPEC)
     views = [each.image(sample.light)(sample.phase).detach() for each in (one, alone)]
     assert torch.equal(*views)
     one.step(sample, 0.0)
@@ -233,7 +233,7 @@ def test_the_residual_network_starts_at_nothing() -> None:
 def test_the_residual_of_a_network_that_ends_in_a_transposed_convolution_starts_at_nothing() -> None:
     (sample,) = samples(1)
     ends_so = Network(levels=2, width=4, full_resolution_stage=False)
-    one, alone = (PlusApproximator(SPEC, wanted, seed=0) for wanted in (ends_so, None))
+    one, alone = (HILPlus(network=wanted, seed=0).approximator(SPEC) for wanted in (ends_so, None))
     views = [each.image(sample.light)(sample.phase).detach() for each in (one, alone)]
     assert torch.equal(*views)
 
@@ -241,7 +241,7 @@ def test_the_residual_of_a_network_that_ends_in_a_transposed_convolution_starts_
 @pytest.mark.parametrize("network", [Network(levels=4, width=4, dropout=True), Network("pix2pix", levels=2, width=4)])
 def test_a_residual_network_with_dropout_is_refused(network: Network) -> None:
     with pytest.raises(UserError, match="dropout"):
-        PlusApproximator(SPEC, network, seed=0)
+        HILPlus(network=network, seed=0).approximator(SPEC)
 
 
 def test_seeds_draw_the_weights_and_leave_torchs_random_numbers_alone() -> None:
@@ -253,26 +253,26 @@ def test_seeds_draw_the_weights_and_leave_torchs_random_numbers_alone() -> None:
     assert torch.equal(torch.get_rng_state(), state)
 
 
-def test_the_judge_learns_to_tell_targets_from_noise() -> None:
-    judge, targets = Judge(3, Network(width=8), seed=0), pictures(SPEC, 6)
+def test_the_critic_learns_to_tell_targets_from_noise() -> None:
+    critic, targets = Critic(3, Network(width=8), seed=0), pictures(SPEC, 6)
     draw = torch.Generator().manual_seed(2)
     noises = torch.rand(targets.shape, generator=draw)
-    losses = [judge.step(noises[n % 4][None], targets[n % 4][None]) for n in range(40)]
+    losses = [critic.step(noises[n % 4][None], targets[n % 4][None]) for n in range(40)]
     assert sum(losses[-4:]) < 0.5 * sum(losses[:4])
     for target, noise in zip(targets[4:], noises[4:], strict=True):  # not seen in training
-        assert float(judge.verdict(target[None])) < float(judge.verdict(noise[None]))
+        assert float(critic.verdict(target[None])) < float(critic.verdict(noise[None]))
 
 
-def test_the_judge_is_shown_predictions_as_bright_as_their_targets(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_critic_is_shown_predictions_as_bright_as_their_targets(monkeypatch: pytest.MonkeyPatch) -> None:
     one, (sample,) = approximator(), samples(1)
     seen: list[tuple[Tensor, Tensor]] = []
-    assert one.judge is not None
+    assert one.critic is not None
 
     def step(picture: Tensor, target: Tensor) -> float:
         seen.append((picture, target))
         return 0.5
 
-    monkeypatch.setattr(one.judge, "step", step)
+    monkeypatch.setattr(one.critic, "step", step)
     losses = one.step(sample, 0.0)
     ((picture, target),) = seen
     assert losses["judge"] == 0.5

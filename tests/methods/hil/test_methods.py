@@ -13,14 +13,14 @@ from torch import Tensor
 
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss
 from holobench_eval.methods.hil.hil import HIL
-from holobench_eval.methods.hil.loop import Rounds
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
-from holobench_eval.methods.hil.objective import Objective
 from holobench_eval.methods.hil.plus import HILPlus
-from holobench_eval.methods.hil.retrieval import Image, Retrieval
 from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval
+from holobench_eval.methods.learned.samples import Schedule
 from tests.support.small_training import (
     Memory,
     pictures,
@@ -33,13 +33,13 @@ from tests.support.small_training import (
 
 SPEC = small_spec(48, 40, colours=3)
 SHORT: dict[str, Any] = {
-    "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
+    "training": Schedule(2, refine_images=1, steps=4, refine_steps=2),
     "start": SmoothStart(iterations=2),
 }
-PLAIN = Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0)
+PLAIN = PhaseRetrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0)
 SMALL = Network(levels=2, width=4)
 METHODS: dict[str, Any] = {
-    "hil": HIL(SMALL, Objective(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), offsets=2, **SHORT),
+    "hil": HIL(SMALL, ApproximatorLoss(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), offsets=2, **SHORT),
     "hil_nh3d": HILNH3D(Network("unet", levels=2, width=4), retrieval=PLAIN, **SHORT),
     "hil_plus": HILPlus(network=SMALL, retrieval=PLAIN, **SHORT),
 }
@@ -182,7 +182,7 @@ def test_a_method_keeps_its_own_defaults_for_parameters_that_are_not_given() -> 
 def test_the_constant_phase_is_the_one_whose_captures_are_closest(learned: dict[str, Mapping[str, Any]]) -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory, images=2)
-    method = replace(METHODS["hil"], offsets=4, training=Rounds(1, steps=1))
+    method = replace(METHODS["hil"], offsets=4, training=Schedule(1, steps=1))
     offset = method.prepare(bench)["offset"]
     kept = memory.load("offset")
     assert kept is not None
@@ -195,6 +195,6 @@ def test_the_constant_phase_is_the_one_whose_captures_are_closest(learned: dict[
 
 def test_one_constant_phase_needs_no_capture() -> None:
     bench = training_bench(SPEC, Memory(), images=2)
-    method = replace(METHODS["hil"], offsets=1, training=Rounds(1, steps=1))
+    method = replace(METHODS["hil"], offsets=1, training=Schedule(1, steps=1))
     assert method.prepare(bench)["offset"] == 0
     assert bench.captures == 2 + 1

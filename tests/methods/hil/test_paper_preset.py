@@ -19,10 +19,10 @@ from tests.support.small_training import pictures
 from holobench_eval.display.api import DisplaySpec, Region
 from holobench_eval.display.api import white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
-from holobench_eval.methods.hil.loop import Sample
+from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.hil.networks import Network
-from holobench_eval.methods.hil.objective import Objective
-from holobench_eval.methods.hil.retrieval import Retrieval, retrieve
+from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss
+from holobench_eval.methods.learned.retrieval import PhaseRetrieval, retrieve
 
 torch.set_num_threads(1)
 spec = DisplaySpec(
@@ -31,10 +31,10 @@ spec = DisplaySpec(
 (target,) = pictures(spec)
 phase = 4 * target.flip(-1)
 sample = Sample(phase, 0.8 * target, target, white_irradiance(target, spec))
-approximator = NetworkApproximator(spec, Network(preset="paper"), Objective(), with_judge=True, seed=0)
+approximator = NetworkApproximator(spec, Network(preset="paper"), ApproximatorLoss(), with_critic=True, seed=0)
 approximator.expose([sample])
 losses = approximator.step(sample, 0.0)
-found = retrieve(approximator.image(sample.light), target, phase, Retrieval(iterations=1), approximator.judge)
+found = retrieve(approximator.image(sample.light), target, phase, PhaseRetrieval(iterations=1), approximator.verdict)
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 print(json.dumps({"losses": losses, "shape": list(found.shape), "finite": bool(found.isfinite().all()), "peak": peak}))
 """

@@ -13,7 +13,7 @@ from torch.nn import functional
 from holobench_eval.core.errors import UserError
 from holobench_eval.methods.hil.perceptual import VGG19, OrientedFilters, find_weights, perceptual_loss
 from holobench_eval.metrics.base import gaussian_blur
-from holobench_eval.metrics.feature_distance import _opponent, _responses
+from holobench_eval.metrics.feature_distance import opponent_channels, oriented_responses
 
 LAYERS = {0: (3, 64), 2: (64, 64), 5: (64, 128), 7: (128, 128), 10: (128, 256)}
 
@@ -69,7 +69,7 @@ def test_oriented_filters_equal_the_difference_of_rectified_features(channels: i
     image, target = images(channels)
     total, a, b = 0.0, image, target
     for scale, weight in enumerate((1.5, 1.0)):
-        mine, theirs = (_responses(_opponent(x, scale)) for x in (a, b))
+        mine, theirs = (oriented_responses(opponent_channels(x, scale)) for x in (a, b))
         for sign in (1, -1):
             total += weight * float(((sign * mine).clamp_min(0) - (sign * theirs).clamp_min(0)).abs().mean())
         a, b = (gaussian_blur(x, 1.0)[:, :, ::2, ::2] for x in (a, b))

@@ -12,15 +12,18 @@ import torch
 from torch import Tensor
 
 from holobench_eval.display.training import TrainingBench, TrainingImage
-from holobench_eval.methods.hil import loop
+from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss
 from holobench_eval.methods.hil.hil import HIL
-from holobench_eval.methods.hil.loop import Rounds, Sample, fidelity, train_in_the_loop
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
-from holobench_eval.methods.hil.objective import Objective
 from holobench_eval.methods.hil.plus import HILPlus
-from holobench_eval.methods.hil.retrieval import Image, Retrieval
 from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.learned import checkpoint
+from holobench_eval.methods.learned.algorithm import train
+from holobench_eval.methods.learned.checkpoint import Checkpoint
+from holobench_eval.methods.learned.fidelity import fidelity
+from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval
+from holobench_eval.methods.learned.samples import Sample, Schedule
 from holobench_eval.study.artifacts import FolderMemory
 from tests.support.small_training import Fate, Killed, Memory, same, small_spec, training_bench
 
@@ -67,15 +70,15 @@ def search(display: Image, target: Tensor, phase: Tensor) -> Tensor:
     return phase + 0.1 + (display(phase).mean() - target.mean())
 
 
-def run(bench: TrainingBench, rounds: Rounds, memory: Memory) -> Scale:
+def run(bench: TrainingBench, rounds: Schedule, memory: Memory) -> Scale:
     approximator = Scale(memory.fate)
-    train_in_the_loop(bench, approximator, begin, search, rounds)
+    train(bench, approximator, begin, search, rounds)
     return approximator
 
 
 @pytest.fixture(autouse=True)
 def _saves_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+    monkeypatch.setattr(checkpoint, "STEPS_BETWEEN_SAVES", 3)
 
 
 @pytest.mark.parametrize("refine_images", [None, 1, 2, 9])
@@ -86,7 +89,7 @@ def test_captures_are_all_images_then_some_a_round_and_those_held_out(
 ) -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory, images=3, held_out=held_out)
-    run(bench, Rounds(3, used, refine_images, steps=4, refine_steps=2), memory)
+    run(bench, Schedule(3, used, refine_images, steps=4, refine_steps=2), memory)
     images = used or 3
     assert bench.captures == images + 2 * min(refine_images or images, images) + 3 * held_out
     assert memory.fate.passed.count("after a photograph") == bench.captures
@@ -94,7 +97,7 @@ def test_captures_are_all_images_then_some_a_round_and_those_held_out(
 
 def test_every_round_is_captured_under_noise_of_its_own() -> None:
     memory = Memory()
-    run(training_bench(SPEC, memory), Rounds(3, steps=2, refine_steps=2), memory)
+    run(training_bench(SPEC, memory), Schedule(3, steps=2, refine_steps=2), memory)
     captures = [kept["value"]["capture"] for name, kept in memory.kept.items() if "capture" in kept["value"]]
     assert len({float(capture.double().sum()) for capture in captures}) == len(captures) == 12
 
@@ -102,17 +105,17 @@ def test_every_round_is_captured_under_noise_of_its_own() -> None:
 def test_images_of_later_rounds_go_round_in_turn() -> None:
     memory = Memory()
     images = training_bench(SPEC, memory, images=5).images
-    rounds = Rounds(5, images=4, refine_images=3)
-    shown = [[image.item[-1] for image in rounds.shown(images, number)] for number in range(1, 6)]
+    rounds = Schedule(5, images=4, refine_images=3)
+    shown = [[image.item[-1] for image in rounds.images_of(number, images)] for number in range(1, 6)]
     assert ["".join(items) for items in shown] == ["0123", "012", "301", "230", "123"]
-    everything = Rounds(3, refine_images=None)
-    assert [len(everything.shown(images, number)) for number in (1, 2, 3)] == [5, 5, 5]
+    everything = Schedule(3, refine_images=None)
+    assert [len(everything.images_of(number, images)) for number in (1, 2, 3)] == [5, 5, 5]
 
 
 @pytest.mark.parametrize(("keep_captures", "seen"), [(True, [3, 5, 7]), (False, [3, 2, 2])])
 def test_a_round_learns_from_all_captures_so_far_or_from_its_own(keep_captures: bool, seen: list[int]) -> None:
     memory = Memory()
-    rounds = Rounds(3, refine_images=2, steps=21, refine_steps=21, keep_captures=keep_captures)
+    rounds = Schedule(3, refine_images=2, steps=21, refine_steps=21, keep_captures=keep_captures)
     approximator = run(training_bench(SPEC, memory), rounds, memory)
     captures = [{value for value, _ in approximator.trained_on[start : start + 21]} for start in (0, 21, 42)]
     assert [len(round_) for round_ in captures] == seen
@@ -126,8 +129,8 @@ def test_samples_from_before_are_learned_from_in_every_round(keep_captures: bool
     earlier = [
         Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (5.0, 6.0)
     ]
-    rounds = Rounds(2, refine_images=1, steps=5, refine_steps=10, keep_captures=keep_captures)
-    train_in_the_loop(bench, approximator, begin, search, rounds, earlier)
+    rounds = Schedule(2, refine_images=1, steps=5, refine_steps=10, keep_captures=keep_captures)
+    train(bench, approximator, begin, search, rounds, earlier)
     assert approximator.exposed == [5]
     learned_from = [value for value, _ in approximator.trained_on]
     for seen in (learned_from[:5], learned_from[5:]):
@@ -138,7 +141,7 @@ def test_samples_from_before_are_learned_from_in_every_round(keep_captures: bool
 
 def test_every_capture_is_learned_from_equally_often_and_not_in_the_order_it_was_taken() -> None:
     memory = Memory()
-    approximator = run(training_bench(SPEC, memory, images=6), Rounds(1, steps=18), memory)
+    approximator = run(training_bench(SPEC, memory, images=6), Schedule(1, steps=18), memory)
     passes = [[value for value, _ in approximator.trained_on[start : start + 6]] for start in (0, 6, 12)]
     assert len({tuple(sorted(one)) for one in passes}) == 1
     assert len({tuple(one) for one in passes}) == 3
@@ -148,7 +151,7 @@ def test_every_capture_is_learned_from_equally_often_and_not_in_the_order_it_was
 def test_the_order_depends_on_the_study_and_on_the_round() -> None:
     def order(seed: int) -> list[list[float]]:
         memory = Memory()
-        rounds = Rounds(2, refine_images=1, steps=6, refine_steps=6, keep_captures=True)
+        rounds = Schedule(2, refine_images=1, steps=6, refine_steps=6, keep_captures=True)
         known = run(training_bench(SPEC, memory, images=6, seed=seed), rounds, memory).trained_on
         first = [value for value, _ in known[:6]]
         ranks = {value: rank for rank, value in enumerate(sorted(first))}
@@ -161,14 +164,14 @@ def test_the_order_depends_on_the_study_and_on_the_round() -> None:
 
 def test_the_unit_of_captures_is_chosen_from_the_first_round_alone() -> None:
     memory = Memory()
-    approximator = run(training_bench(SPEC, memory), Rounds(3, steps=2, refine_steps=2), memory)
+    approximator = run(training_bench(SPEC, memory), Schedule(3, steps=2, refine_steps=2), memory)
     assert approximator.exposed == [3]
 
 
 def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory)
-    run(bench, Rounds(2, steps=2, refine_steps=2), memory)
+    run(bench, Schedule(2, steps=2, refine_steps=2), memory)
     start, first, second = (
         memory.load(f"{name} picture 0") for name in ("start", "phase of round 1", "phase of round 2")
     )
@@ -180,7 +183,7 @@ def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None
     assert not torch.equal(second["value"]["phase"], start["value"]["phase"])
 
 
-RESUMED = Rounds(3, images=2, refine_images=1, steps=4, refine_steps=4)
+RESUMED = Schedule(3, images=2, refine_images=1, steps=4, refine_steps=4)
 
 
 @dataclass(frozen=True)
@@ -204,7 +207,7 @@ def finished(memory: Memory) -> Outcome:
 @pytest.fixture(scope="module")
 def whole() -> Outcome:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+        patch.setattr(checkpoint, "STEPS_BETWEEN_SAVES", 3)
         return finished(Memory())
 
 
@@ -213,7 +216,7 @@ def resumed(whole: Outcome) -> dict[int, Outcome]:
     """Trainings that were killed at each moment of an undisturbed one, and started again."""
     moments, outcomes = whole.memory.fate.passed, {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "STEPS_BETWEEN_SAVES", 3)
+        patch.setattr(checkpoint, "STEPS_BETWEEN_SAVES", 3)
         for at in range(len(moments)):
             memory, fate = Memory(), Fate(at)
             with pytest.raises(Killed):
@@ -281,13 +284,13 @@ def test_the_log_in_a_folder_has_the_losses_and_the_fidelity_of_every_round(tmp_
     memory = FolderMemory(tmp_path)
     bench = training_bench(SPEC, Memory())
     bench._memory = memory
-    train_in_the_loop(bench, Scale(Fate()), begin, search, Rounds(2, steps=3, refine_steps=3))
+    train(bench, Scale(Fate()), begin, search, Schedule(2, steps=3, refine_steps=3))
     rows = memory.rows()
     assert sum(bool(row.get("fidelity_psnr")) for row in rows) == 2
     assert sum(bool(row.get("error")) for row in rows) == 2
 
 
-def test_a_row_tells_the_mean_loss_since_the_row_before() -> None:
+def test_a_row_tells_the_mean_loss_since_the_row_earlier() -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory)
     approximator, losses = Scale(Fate()), []
@@ -301,7 +304,10 @@ def test_a_row_tells_the_mean_loss_since_the_row_before() -> None:
     samples = [
         Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (1.0, 2.0)
     ]
-    loop.refine(bench, approximator, samples, 1, range(8))
+    kept = Checkpoint(bench, approximator)
+    for _ in kept.rounds(1):
+        for sample, progress in kept.steps(samples, 8):
+            kept.add(approximator.step(sample, progress))
     assert [row["step"] for row in memory.rows] == [3, 6, 8]
     expected = [sum(losses[a:b]) / (b - a) for a, b in ((0, 3), (3, 6), (6, 8))]
     assert [row["error"] for row in memory.rows] == pytest.approx(expected)
@@ -326,13 +332,13 @@ def test_fidelity_tells_how_good_prediction_and_capture_are_and_how_close() -> N
 JUDGED_SPEC = small_spec(size=48, region=40)
 SHORT: dict[str, Any] = {
     "network": Network(levels=2, width=4),
-    "training": Rounds(2, refine_images=1, steps=4, refine_steps=2),
-    "retrieval": Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0),
+    "training": Schedule(2, refine_images=1, steps=4, refine_steps=2),
+    "retrieval": PhaseRetrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0),
     "start": SmoothStart(iterations=2),
 }
-JUDGED = Retrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.1)
+JUDGED = PhaseRetrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.1)
 METHODS: dict[str, Any] = {
-    "hil": HIL(**{**SHORT, "retrieval": JUDGED}, loss=Objective(perceptual=0.0), offsets=2),
+    "hil": HIL(**{**SHORT, "retrieval": JUDGED}, loss=ApproximatorLoss(perceptual=0.0), offsets=2),
     "hil_nh3d": HILNH3D(**{**SHORT, "network": Network("unet", levels=2, width=4)}),
     "hil_plus": HILPlus(**SHORT),
 }

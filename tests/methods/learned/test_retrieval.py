@@ -10,10 +10,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.methods.hil import retrieval
-from holobench_eval.methods.hil.judge import Judge
+from holobench_eval.methods.hil.critic import Critic
 from holobench_eval.methods.hil.networks import Network
-from holobench_eval.methods.hil.retrieval import Image, PictureLoss, Retrieval, check_region, matched, retrieve
+from holobench_eval.methods.learned import retrieval
+from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval, PictureLoss, check_region, matched, retrieve
 from holobench_eval.metrics.feature_distance import mofd
 from holobench_eval.metrics.ms_ssim import ms_ssim
 from holobench_eval.optics import srgb_encode
@@ -27,15 +27,15 @@ def _no_lpips(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(retrieval, "available", lambda network: "no weights")
 
 
-def only(term: str, weight: float = 1.0, **settings: Any) -> Retrieval:
+def only(term: str, weight: float = 1.0, **settings: Any) -> PhaseRetrieval:
     weights: dict[str, Any] = {**dict.fromkeys(TERMS, 0.0), term: weight}
-    return Retrieval(**weights, **settings)
+    return PhaseRetrieval(**weights, **settings)
 
 
-def double_judge(channels: int = 1) -> Judge:
-    judge = Judge(channels, Network(width=4), seed=0)
-    judge.network.double()
-    return judge
+def double_critic(channels: int = 1) -> Critic:
+    critic = Critic(channels, Network(width=4), seed=0)
+    critic.network.double()
+    return critic
 
 
 def pair(channels: int = 1) -> tuple[Tensor, Tensor]:
@@ -45,7 +45,7 @@ def pair(channels: int = 1) -> tuple[Tensor, Tensor]:
     return target, 0.3 * (target + 0.1 * noise).clamp_min(0.01)
 
 
-def plain(term: str, image: Tensor, target: Tensor, judge: Judge) -> Tensor:
+def plain(term: str, image: Tensor, target: Tensor, critic: Critic) -> Tensor:
     """The terms by their definitions."""
     factor = (image * target).sum((1, 2), keepdim=True) / image.square().sum((1, 2), keepdim=True)
     picture = factor * image
@@ -55,20 +55,20 @@ def plain(term: str, image: Tensor, target: Tensor, judge: Judge) -> Tensor:
         return 1 - ms_ssim(picture.clamp(0, 1), target)
     if term == "perceptual":
         return mofd(srgb_encode(picture.clamp(0, 1)), srgb_encode(target))
-    logits = judge.network(picture[None], picture[None])
+    logits = critic.network(picture[None], picture[None])
     return functional.softplus(-logits).mean()
 
 
 @pytest.mark.parametrize("term", TERMS)
 def test_a_term_alone_has_its_value_and_its_gradient(term: str) -> None:
     target, image = pair()
-    judge = double_judge()
-    loss = PictureLoss(target, only(term, 3.0), judge)
+    critic = double_critic()
+    loss = PictureLoss(target, only(term, 3.0), critic.verdict)
     image.requires_grad_()
     value, error = loss(image)
-    expected = plain(term, image, target, judge)
+    expected = plain(term, image, target, critic)
     assert float(value.detach()) == pytest.approx(3 * float(expected.detach()), rel=1e-9)
-    assert float(error) == pytest.approx(float(plain("l2", image.detach(), target, judge)), rel=1e-9)
+    assert float(error) == pytest.approx(float(plain("l2", image.detach(), target, critic)), rel=1e-9)
     (ours,) = torch.autograd.grad(value, image)
     (theirs,) = torch.autograd.grad(3 * expected, image)
     assert (ours - theirs).norm() < 1e-9 * theirs.norm()
@@ -78,7 +78,7 @@ def test_a_term_alone_has_its_value_and_its_gradient(term: str) -> None:
 @pytest.mark.parametrize("term", TERMS)
 def test_the_gradient_of_a_term_equals_finite_differences(term: str) -> None:
     target, image = pair()
-    loss = PictureLoss(target, only(term), double_judge())
+    loss = PictureLoss(target, only(term), double_critic().verdict)
     direction = torch.randn(image.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
     image.requires_grad_()
     (gradient,) = torch.autograd.grad(loss(image)[0], image)
@@ -90,9 +90,9 @@ def test_the_gradient_of_a_term_equals_finite_differences(term: str) -> None:
 def test_the_loss_is_the_weighted_sum_of_its_terms() -> None:
     target, image = pair(channels=3)
     weights: dict[str, Any] = {"perceptual": 2.0, "ms_ssim": 0.5, "l2": 7.0, "adversarial": 0.3}
-    judge = double_judge(3)
-    alone = [weights[term] * PictureLoss(target, only(term), judge)(image)[0] for term in TERMS]
-    together = PictureLoss(target, Retrieval(**weights), judge)(image)[0]
+    critic = double_critic(3)
+    alone = [weights[term] * PictureLoss(target, only(term), critic.verdict)(image)[0] for term in TERMS]
+    together = PictureLoss(target, PhaseRetrieval(**weights), critic.verdict)(image)[0]
     assert float(together) == pytest.approx(float(torch.stack(alone).sum()), rel=1e-9)
 
 
@@ -100,7 +100,7 @@ def test_the_loss_is_the_weighted_sum_of_its_terms() -> None:
 @pytest.mark.parametrize("factor", [0.01, 100.0])
 def test_the_brightness_of_a_prediction_does_not_matter(term: str, factor: float) -> None:
     target, image = pair()
-    loss = PictureLoss(target, only(term), double_judge())
+    loss = PictureLoss(target, only(term), double_critic().verdict)
     assert float(loss(factor * image)[0]) == pytest.approx(float(loss(image)[0]), rel=1e-9)
 
 
@@ -118,7 +118,9 @@ def test_a_black_prediction_and_a_black_target_have_a_finite_gradient() -> None:
     target, image = pair()
     for one, other in ((torch.zeros_like(image), target), (image, torch.zeros_like(target))):
         shown = one.clone().requires_grad_()
-        (gradient,) = torch.autograd.grad(PictureLoss(other, Retrieval(), double_judge())(shown)[0], shown)
+        (gradient,) = torch.autograd.grad(
+            PictureLoss(other, PhaseRetrieval(), double_critic().verdict)(shown)[0], shown
+        )
         assert gradient.isfinite().all()
 
 
@@ -134,10 +136,10 @@ class Refusing:
 def test_a_term_without_weight_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("FixedMofd", "FixedMsSsim", "lpips"):
         monkeypatch.setattr(retrieval, name, Refusing)
-    judge = double_judge()
-    monkeypatch.setattr(judge, "verdict", Refusing)
+    critic = double_critic()
+    monkeypatch.setattr(critic, "verdict", Refusing)
     target, image = (one[:, :20, :20] for one in pair())  # too small for every term but l2
-    loss, error = PictureLoss(target, only("l2", 2.0), judge)(image)
+    loss, error = PictureLoss(target, only("l2", 2.0), critic.verdict)(image)
     assert float(loss) == 2 * float(error)
 
 
@@ -248,12 +250,14 @@ def test_retrieval_does_not_depend_on_the_unit_of_the_prediction() -> None:
     assert torch.allclose(found_one, found_other, atol=1e-4)
 
 
-def test_the_judge_is_asked_where_it_has_a_weight() -> None:
-    judge = Judge(1, Network(width=4), seed=0)
+def test_the_critic_is_asked_where_it_has_a_weight() -> None:
+    critic = Critic(1, Network(width=4), seed=0)
     target = pictures(small_spec(48, 40))[0]
-    before = [value.clone() for value in judge.network.parameters()]
+    before = [value.clone() for value in critic.network.parameters()]
     start = torch.zeros(1, 40, 40)
-    phase = retrieve(lambda x: target * (1.1 + torch.sin(x)), target, start, only("adversarial", iterations=3), judge)
+    phase = retrieve(
+        lambda x: target * (1.1 + torch.sin(x)), target, start, only("adversarial", iterations=3), critic.verdict
+    )
     assert not torch.equal(phase, start)
-    assert all(torch.equal(a, b) for a, b in zip(before, judge.network.parameters(), strict=True))
-    assert all(value.grad is None for value in judge.network.parameters())
+    assert all(torch.equal(a, b) for a, b in zip(before, critic.network.parameters(), strict=True))
+    assert all(value.grad is None for value in critic.network.parameters())

@@ -1,4 +1,4 @@
-"""Training the aberration approximator: its loss, Eq. 20, and one step of both optimisers.
+"""Training the aberration approximator: one step of its network and of the adversary.
 
 Chakravarthula et al. 2020, Sections 4.3.1 and 5.2.
 """
@@ -8,81 +8,26 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 import torch
-from annotated_types import Interval
 from torch import Tensor, nn
 from torch.nn import functional
 
 from ...core import seeds
 from ...core.errors import UserError
+from ..learned.weights import load_moments, seeded
+from .approximator_loss import (
+    BETAS,
+    LEARNING_RATE,
+    ApproximatorLoss,
+    adversarial_loss,
+    discriminator_loss,
+    feature_matching_loss,
+    published_loss,
+)
 from .networks import Discriminator, Network
-from .perceptual import find_weights, perceptual_loss
-
-Weight = Annotated[float, Interval(ge=0, le=1e6)]
-Gan = Literal["cross_entropy", "least_squares"]
-
-LEARNING_RATE = 2e-4
-BETAS = (0.5, 0.999)
-
-
-@dataclass(frozen=True)
-class Objective:
-    """Weights of the generator's loss, by default those of Eq. 20; a term of weight 0 is not computed.
-
-    l1, l2: mean absolute and mean squared error. perceptual: Eq. 21. adversarial: the discriminator's verdict, by
-    cross entropy or least squares (``gan``). feature_matching: mean absolute differences of the discriminator's
-    features, summed over layers and scales (T.-C. Wang et al. 2018, Eq. 4).
-    """
-
-    l1: Weight = 10.0
-    l2: Weight = 0.0
-    perceptual: Weight = 0.05
-    adversarial: Weight = 0.5
-    feature_matching: Weight = 0.0
-    gan: Gan = "cross_entropy"
-
-    def __post_init__(self) -> None:
-        if not any((self.l1, self.l2, self.perceptual, self.adversarial, self.feature_matching)):
-            raise UserError("loss: every weight is 0; give at least one of l1, l2, perceptual, adversarial a weight")
-
-    @property
-    def needs_discriminator(self) -> bool:
-        """Does a term ask the discriminator?"""
-        return self.adversarial > 0 or self.feature_matching > 0
-
-
-def published_objective(network: Network) -> Objective:
-    """The loss a network is published with; for U-Net, which is published for segmentation, the paper's L1.
-
-    Pix2PixHD's perceptual term needs VGG-19 and is left out without its weights.
-    """
-    if network.name == "pix2pix":
-        return Objective(l1=100.0, perceptual=0.0, adversarial=1.0)
-    if network.name == "pix2pixhd":
-        perceptual = 10.0 if find_weights() else 0.0
-        return Objective(0.0, 0.0, perceptual, adversarial=1.0, feature_matching=10.0, gan="least_squares")
-    if network.name in ("unet", "identity"):
-        return Objective(l1=1.0, perceptual=0.0, adversarial=0.0)
-    return Objective()
-
-
-def adversarial_loss(judged: list[list[Tensor]], wanted: float, gan: Gan) -> Tensor:
-    """Distance of a discriminator's logits from ``wanted``, 1: capture, 0: prediction; averaged, summed over scales."""
-    compare = functional.binary_cross_entropy_with_logits if gan == "cross_entropy" else functional.mse_loss
-    verdicts = [activations[-1] for activations in judged]
-    return torch.stack([compare(verdict, torch.full_like(verdict, wanted)) for verdict in verdicts]).sum()
-
-
-def feature_matching_loss(judged: list[list[Tensor]], captured: list[list[Tensor]]) -> Tensor:
-    """Mean absolute difference of each layer's features, the logits apart, summed over layers and scales."""
-    scales = zip(judged, captured, strict=True)
-    differences = [
-        functional.l1_loss(a, b) for ours, theirs in scales for a, b in zip(ours[:-1], theirs[:-1], strict=True)
-    ]
-    return torch.stack(differences).sum()
+from .perceptual import perceptual_loss
 
 
 class Trainer:
@@ -92,7 +37,7 @@ class Trainer:
     """
 
     def __init__(
-        self, generator: nn.Module, discriminator: Discriminator | None, loss: Objective, noise: Tensor
+        self, generator: nn.Module, discriminator: Discriminator | None, loss: ApproximatorLoss, noise: Tensor
     ) -> None:
         self.generator, self.discriminator, self.loss = generator, discriminator, loss
         self.perceptual = perceptual_loss() if loss.perceptual else None
@@ -135,10 +80,8 @@ class Trainer:
     def _step_discriminator(self, predicted: Tensor, ideal: Tensor, capture: Tensor) -> float:
         if self.discriminator is None:
             return 0.0
-        wrong = adversarial_loss(self.discriminator.judge(predicted, ideal), 0.0, self.loss.gan)
-        missed = adversarial_loss(self.discriminator.judge(capture, ideal), 1.0, self.loss.gan)
-        loss = (wrong + missed) / 2  # halved to slow it down against the generator (Isola et al., Section 3.3)
-        return self._descend("discriminator", loss)
+        judged = self.discriminator.judge(predicted, ideal), self.discriminator.judge(capture, ideal)
+        return self._descend("discriminator", discriminator_loss(*judged, self.loss.gan))
 
     def _step_generator(self, predicted: Tensor, ideal: Tensor, capture: Tensor) -> dict[str, float]:
         terms = self._terms(predicted, ideal, capture)
@@ -215,30 +158,13 @@ class Trainer:
             raise UserError(f"the saved training does not fit: {reason}; remove it to train anew") from error
 
 
-def load_moments(optimiser: torch.optim.Adam, state: dict[int, dict[str, Tensor]]) -> None:
-    """Copies of Adam's moments in the layout of the parameters, which the fused step takes for granted, as it does the
-    number of steps on their device.
-
-    Raises ValueError where a shape is not the parameter's.
-    """
-    optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
-    for parameter, values in optimiser.state.items():
-        place = parameter.device if optimiser.defaults["fused"] else "cpu"
-        values["step"] = torch.tensor(float(values["step"]), device=place)
-        for moment in ("exp_avg", "exp_avg_sq"):
-            if values[moment].shape != parameter.shape:
-                raise ValueError(f"{moment} {tuple(values[moment].shape)} for a parameter {tuple(parameter.shape)}")
-            values[moment] = torch.empty_like(parameter).copy_(values[moment])
-
-
-def trainer(network: Network, loss: Objective | None, inputs: int, outputs: int, seed: int) -> Trainer:
+def trainer(network: Network, loss: ApproximatorLoss | None, inputs: int, outputs: int, seed: int) -> Trainer:
     """A fresh trainer for intensities with so many channels; ``loss`` None takes the published one.
 
     Raises UserError where the loss needs a discriminator and the network has none.
     """
-    loss = published_objective(network) if loss is None else loss
-    with torch.random.fork_rng(devices=[]):
-        torch.set_rng_state(seeds.generator("aberration approximator", seed).get_state())
+    loss = published_loss(network) if loss is None else loss
+    with seeded("aberration approximator", seed):
         generator = network.generator(inputs, outputs)
         discriminator = network.discriminator(outputs, inputs) if loss.needs_discriminator else None
     if loss.needs_discriminator and discriminator is None:

@@ -14,15 +14,14 @@ from torch.nn import functional
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.methods.hil import perceptual
-from holobench_eval.methods.hil.networks import Network
-from holobench_eval.methods.hil.objective import (
-    Objective,
-    Trainer,
+from holobench_eval.methods.hil.approximator_loss import (
+    ApproximatorLoss,
     adversarial_loss,
     feature_matching_loss,
-    published_objective,
-    trainer,
+    published_loss,
 )
+from holobench_eval.methods.hil.networks import Network
+from holobench_eval.methods.hil.trainer import Trainer, trainer
 
 TRAINED = ("proposed", "unet", "pix2pix", "pix2pixhd")
 
@@ -40,7 +39,7 @@ def _deterministic() -> Any:
     torch.use_deterministic_algorithms(False)
 
 
-def small(name: Any = "proposed", loss: Objective | None = None, seed: int = 0, **params: Any) -> Trainer:
+def small(name: Any = "proposed", loss: ApproximatorLoss | None = None, seed: int = 0, **params: Any) -> Trainer:
     return trainer(Network(name, levels=2, width=4, **params), loss, 3, 3, seed)
 
 
@@ -122,7 +121,7 @@ def test_the_total_is_the_weighted_sum_of_eq_20() -> None:
 
 
 def test_the_terms_equal_their_formulas() -> None:
-    training = small(loss=Objective(l1=2, l2=3, perceptual=0, adversarial=0))
+    training = small(loss=ApproximatorLoss(l1=2, l2=3, perceptual=0, adversarial=0))
     ideal, capture = pair()
     error = training.frozen()(ideal) - capture
     losses = training.step(ideal, capture)
@@ -199,26 +198,26 @@ def test_the_identity_has_losses_and_nothing_to_learn() -> None:
 
 
 def test_networks_are_trained_with_their_published_losses(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert published_objective(Network()) == Objective(10.0, 0.0, 0.05, 0.5)
-    assert published_objective(Network("unet")) == Objective(1.0, 0.0, 0.0, 0.0)
-    assert published_objective(Network("pix2pix")) == Objective(100.0, 0.0, 0.0, 1.0)
-    least_squares = published_objective(Network("pix2pixhd"))
-    assert least_squares == Objective(0.0, 0.0, 0.0, 1.0, feature_matching=10.0, gan="least_squares")
-    monkeypatch.setattr("holobench_eval.methods.hil.objective.find_weights", lambda: perceptual.URL)
-    assert published_objective(Network("pix2pixhd")).perceptual == 10
+    assert published_loss(Network()) == ApproximatorLoss(10.0, 0.0, 0.05, 0.5)
+    assert published_loss(Network("unet")) == ApproximatorLoss(1.0, 0.0, 0.0, 0.0)
+    assert published_loss(Network("pix2pix")) == ApproximatorLoss(100.0, 0.0, 0.0, 1.0)
+    least_squares = published_loss(Network("pix2pixhd"))
+    assert least_squares == ApproximatorLoss(0.0, 0.0, 0.0, 1.0, feature_matching=10.0, gan="least_squares")
+    monkeypatch.setattr("holobench_eval.methods.hil.approximator_loss.find_weights", lambda: perceptual.URL)
+    assert published_loss(Network("pix2pixhd")).perceptual == 10
 
 
 def test_a_loss_without_a_discriminator_to_ask_is_refused() -> None:
     with pytest.raises(UserError, match="'unet' has no discriminator; set 'adversarial' to 0"):
-        small("unet", Objective())
+        small("unet", ApproximatorLoss())
     with pytest.raises(UserError, match="every weight is 0"):
-        Objective(0, 0, 0, 0)
+        ApproximatorLoss(0, 0, 0, 0)
 
 
 @pytest.mark.parametrize("params", [{"l1": -1}, {"adversarial": float("nan")}, {"l2": float("inf")}, {"gan": "wgan"}])
 def test_wrong_weights_are_refused(params: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
-        TypeAdapter(Objective).validate_python(params)
+        TypeAdapter(ApproximatorLoss).validate_python(params)
 
 
 def test_images_that_do_not_belong_together_are_refused() -> None:

@@ -7,23 +7,22 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from ...core import seeds
+from ..learned.weights import draw_weights, load_moments, seeded
+from .approximator_loss import BETAS, LEARNING_RATE, adversarial_loss, discriminator_loss
 from .discriminator import PatchDiscriminator
-from .networks import PIX2PIX_DEVIATION, Network, draw_weights
-from .objective import BETAS, LEARNING_RATE, adversarial_loss, load_moments
+from .networks import PIX2PIX_DEVIATION, Network
 
 
-class Judge:
+class Critic:
     """A PatchGAN that tells targets from predicted pictures (Chakravarthula et al. 2020, Section 4.4).
 
-    The paper does not say what its additional adversarial loss sees. Here it is trained in Algorithm 1 beside the
+    Not in the paper: what its additional adversarial loss sees. Here the critic is trained in Algorithm 1 beside the
     approximator, on the training targets and on what their holograms are predicted to show, both in linear light and
     without a condition, and it is frozen in the retrieval of unseen images.
     """
 
     def __init__(self, channels: int, network: Network, seed: int) -> None:
-        with torch.random.fork_rng(devices=[]):
-            torch.set_rng_state(seeds.generator("judge", seed).get_state())
+        with seeded("judge", seed):
             self.network = draw_weights(PatchDiscriminator(channels, 0, network.filters), PIX2PIX_DEVIATION)
         self.to(torch.device("cpu"))
 
@@ -36,9 +35,8 @@ class Judge:
     def step(self, picture: Tensor, target: Tensor) -> float:
         """One step on a predicted picture and a target ``(1, C, h, w)``; the loss before it."""
         self.network.requires_grad_(True)
-        wrong = adversarial_loss(self.network.judge(picture, picture), 0.0, "cross_entropy")
-        missed = adversarial_loss(self.network.judge(target, target), 1.0, "cross_entropy")
-        loss = (wrong + missed) / 2
+        judged = self.network.judge(picture, picture), self.network.judge(target, target)
+        loss = discriminator_loss(*judged, "cross_entropy")
         self._optimiser.zero_grad()
         loss.backward()
         self._optimiser.step()

@@ -1,0 +1,128 @@
+"""Phase retrieval through a frozen approximator of the display: Eq. 22 and its Wirtinger gradient.
+
+Chakravarthula et al. 2020, Sections 4.4 and 5.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+from torch.nn import functional
+
+from ...core.errors import UserError
+from ...metrics.feature_distance import SMALLEST_MOFD, FixedMofd
+from ...metrics.lpips import available, lpips
+from ...metrics.ms_ssim import SMALLEST_MS_SSIM, FixedMsSsim
+from ...optics import srgb_encode
+from ..common import matched
+from ..descent import adam, by_autograd
+
+Weight = Annotated[float, Interval(ge=0, le=1e6)]
+
+# Phase (C, H, W) [rad] to the predicted capture (C, h, w), differentiable.
+Image = Callable[[Tensor], Tensor]
+# A picture (1, C, h, w) to its adversarial loss.
+Verdict = Callable[[Tensor], Tensor]
+
+
+@dataclass(frozen=True)
+class PhaseRetrieval:
+    """Adam on the phase for Eq. 22 of Chakravarthula et al. 2020, from a start that the method chooses.
+
+    A term of weight 0 is not computed.
+
+    Parameters
+    ----------
+    iterations : int
+        0 leaves the start as it is; the paper takes 300.
+    step : float
+        Adam's step [rad], cosine-decayed to zero (not in the paper, whose step of 0.001 rad is constant). Twice this
+        step lost 0.6 dB on captures of dead leaves: the network is to be believed near its start alone.
+    perceptual : float
+        Weight of LPIPS where its weights are found, else of the weight-free feature distance (``mofd``, not in the
+        paper), of sRGB pictures; 1 in the paper, which gives none of the other three.
+    ms_ssim, l2 : float
+        Weights of MS-SSIM and of the squared error, in linear light.
+    adversarial : float
+        Weight of the verdict of a critic, where the method has one.
+    threshold : float
+        Stop when the mean squared error of the predicted picture is below.
+    """
+
+    iterations: Annotated[int, Interval(ge=0, le=100_000)] = 60
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.0075
+    perceptual: Weight = 1.0
+    ms_ssim: Weight = 1.0
+    l2: Weight = 10.0
+    adversarial: Weight = 0.01
+    threshold: Annotated[float, Interval(ge=0)] = 0.0
+
+
+@dataclass(frozen=True)
+class SquaredErrorRetrieval(PhaseRetrieval):
+    """`PhaseRetrieval` for the squared error alone, for methods without a critic."""
+
+    perceptual: Weight = 0.0
+    ms_ssim: Weight = 0.0
+    adversarial: Annotated[float, Interval(ge=0, le=0)] = 0.0
+
+
+class PictureLoss:
+    """Eq. 22 for one target ``(C, h, w)``, of which everything that does not change is computed once.
+
+    The perceptual distance is LPIPS if its weights are there, else the project's feature distance.
+    """
+
+    def __init__(self, target: Tensor, settings: PhaseRetrieval, verdict: Verdict | None) -> None:
+        check_region((target.shape[-2], target.shape[-1]), settings)
+        self.target, self.settings, self.verdict = target, settings, verdict
+        wanted = target[None]
+        encoded = srgb_encode(wanted)
+        self.structure = FixedMsSsim(wanted) if settings.ms_ssim else None
+        self.perceptual: Callable[[Tensor], Tensor] | None = None
+        if settings.perceptual:
+            self.perceptual = FixedMofd(encoded) if available("alex") else lambda picture: lpips(picture, encoded)
+
+    def __call__(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        """The loss of a predicted capture ``(C, h, w)``, and its mean squared error alone."""
+        weights, picture = self.settings, matched(image, self.target)
+        error = functional.mse_loss(picture, self.target)
+        loss = weights.l2 * error
+        clipped = picture.clamp(0, 1)[None]
+        if self.perceptual is not None:
+            loss = loss + weights.perceptual * self.perceptual(srgb_encode(clipped)).mean()
+        if self.structure is not None:
+            loss = loss + weights.ms_ssim * (1 - self.structure(clipped).mean())
+        if weights.adversarial and self.verdict is not None:
+            loss = loss + weights.adversarial * self.verdict(picture[None])
+        return loss, error.detach()
+
+
+def check_region(shape: tuple[int, int], settings: PhaseRetrieval) -> None:
+    """UserError for a region that is too small for a term of the loss."""
+    for name, smallest in (("perceptual", SMALLEST_MOFD), ("ms_ssim", SMALLEST_MS_SSIM)):
+        if getattr(settings, name) and min(shape) < smallest:
+            size = " x ".join(map(str, shape))
+            raise UserError(f"retrieval: {name} needs a region of {smallest} x {smallest} px, got {size}; set it to 0")
+
+
+def retrieve(
+    image: Image, target: Tensor, start: Tensor, settings: PhaseRetrieval, verdict: Verdict | None = None
+) -> Tensor:
+    """The phase ``(C, H, W)`` [rad] near ``start`` whose predicted capture looks most like ``target`` ``(C, h, w)``."""
+    picture_loss, error = PictureLoss(target, settings, verdict), torch.tensor(torch.inf)
+
+    def loss(phase: Tensor) -> Tensor:
+        nonlocal error
+        value, error = picture_loss(image(phase[0]))
+        return value[None]
+
+    def done(_: Tensor) -> bool:
+        return float(error) < settings.threshold
+
+    return adam(start[None], by_autograd(loss), settings.iterations, settings.step, decay=True, done=done)[0]

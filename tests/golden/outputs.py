@@ -1,0 +1,270 @@
+"""A small case of everything whose version is declared, and the numbers that it gave: ``outputs.json``.
+
+``python -m tests.golden.outputs`` adds what the file lacks, replaces what has a new version, and refuses the rest.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from holobench_eval.core import plugins, seeds
+from holobench_eval.display import DisplaySpec, load_profile
+from holobench_eval.display.simulated import profile as profiles
+from holobench_eval.imaging.align import align
+from holobench_eval.metrics import score
+from holobench_eval.study.opening import open_bench
+from holobench_eval.study.versions import ALIGNMENT, HARNESS, method_version
+from tests.support import photographed
+from tests.support.small_training import (
+    ROUNDS,
+    Memory,
+    pictures,
+    quick,
+    small_spec,
+    solving_bench,
+    through_a_file,
+    training_bench,
+)
+from tests.support.toy_camera import ToyDisplay, picture
+
+FILE = Path(__file__).with_name("outputs.json")
+REWRITE = "`python -m tests.golden.outputs`"
+PROJECTIONS = 6
+
+# Relative to a tensor's size: rounding on another CPU stays ten times below, the smallest changes of interest above.
+EXACT, ITERATED = 1e-4, 2e-3
+# Gradients vanish at some pixels, where the step of Adam is that of rounding.
+ROUNDED = {"hil": 5e-3, "odak_sgd": 5e-2}
+
+Numbers = dict[str, list[float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is computed, in tensors by name, under which version, and how far it may lie off on another CPU."""
+
+    version: str
+    compute: Callable[[], Mapping[str, Tensor]]
+    tolerance: float = ITERATED
+
+    def numbers(self) -> Numbers:
+        """Summaries of the tensors."""
+        with _one_thread(), _no_weights(), torch.random.fork_rng(devices=[]):
+            return {name: summary(values) for name, values in self.compute().items()}
+
+
+def summary(values: Tensor) -> list[float]:
+    """Mean, standard deviation and random projections of a tensor, all of the size of its values.
+
+    A projection is a sum weighted by normal numbers over the square root of their count: a change of all values by a
+    share of their size changes it by about that share, and rounding by nothing that counts.
+    """
+    flat = values.detach().double().flatten()
+    if len(flat) == 1:
+        return flat.tolist()
+    draw = seeds.generator("golden", len(flat))
+    weights = torch.randn(PROJECTIONS, len(flat), generator=draw, dtype=torch.float64)
+    numbers = torch.cat([torch.stack([flat.mean(), flat.std()]), weights @ flat / len(flat) ** 0.5])
+    return [float(f"{number:.9g}") for number in numbers.tolist()]
+
+
+def differences(case: Case, numbers: Numbers, recorded: Numbers) -> list[str]:
+    """The names of the tensors whose numbers lie further from the recorded ones than rounding explains."""
+    if numbers.keys() != recorded.keys():
+        return sorted(numbers.keys() ^ recorded.keys())
+    return [name for name in numbers if not _close(numbers[name], recorded[name], case.tolerance)]
+
+
+def _close(numbers: list[float], recorded: list[float], tolerance: float) -> bool:
+    size = max(abs(value) for value in recorded[:2])  # mean and deviation, or the number itself
+    off = np.abs(np.subtract(numbers, recorded))
+    return bool(np.all(off <= tolerance * max(size, 1e-6)))  # false for numbers that are not finite
+
+
+def complaint(name: str, case: Case, numbers: Numbers, recorded: Mapping[str, Any] | None) -> str | None:
+    """What is wrong with a case, and what to do about it; None where its numbers are those of its version."""
+    if recorded is None:
+        return f"'{name}' is not in {FILE.name}: {REWRITE} adds it"
+    if recorded["version"] != case.version:
+        return f"'{name}' has a new version, and {FILE.name} the numbers of the old one: {REWRITE} rewrites it"
+    changed = differences(case, numbers, recorded["numbers"])
+    if not changed:
+        return None
+    declared = {HARNESS: "HARNESS", ALIGNMENT: "ALIGNMENT"}.get(case.version, "`version` of the method's class")
+    return (
+        f"numbers of '{name}' changed ({', '.join(changed)}): raise its declared version ({declared}; see "
+        f"holobench_eval/study/versions.py), then {REWRITE} rewrites {FILE.name}; or undo the change"
+    )
+
+
+def recorded() -> dict[str, Any]:
+    """What the file holds."""
+    return dict(json.loads(FILE.read_text(encoding="utf-8"))) if FILE.is_file() else {}
+
+
+def cases() -> dict[str, Case]:
+    """All that can be computed here; methods whose package is not installed are left out."""
+    folder = Path(profiles.__file__).with_name("profiles")
+    shipped = sorted(path.stem for path in folder.glob("*.yaml"))
+    methods = {name: plugins.find("methods", name) for name in plugins.names("methods")}
+    known: dict[str, Case] = {f"profile {name}": Case(HARNESS, partial(_profile, name)) for name in shipped}
+    known["metrics"] = Case(HARNESS, _metrics, EXACT)
+    known["alignment"] = Case(ALIGNMENT, _alignment)
+    for name, cls in methods.items():
+        if _installed(cls):
+            known[f"method {name}"] = Case(method_version(cls), partial(_method, name), ROUNDED.get(name, ITERATED))
+    return known
+
+
+def _installed(cls: type[Any]) -> bool:
+    return getattr(cls, "available", lambda _: None)(cls()) is None
+
+
+def _profile(name: str) -> dict[str, Tensor]:
+    """A panel of 128 px with its registration: what its camera counts, and what is scored."""
+    bench = open_bench(load_profile(name), (128, 128), seed=3)
+    channels = len(bench.spec.wavelengths)
+    target = _smooth(channels, bench.spec.region.shape, 0.0, 1.0)
+    phase = _smooth(channels, bench.spec.shape, -9.0, 9.0)
+    equal = bench.photograph(phase, target, "golden", 0)
+    matched = bench.photograph(phase, target, "golden", 1, exposure="matched")
+    where = [torch.tensor(warp.corners()) for warp in bench.registration.warps]
+    return {
+        "sensor": equal.capture.frame,
+        "rectified": equal.image,
+        "rectified at matched exposure": matched.image,
+        "without noise": bench.simulation.image(phase),
+        "registered corners": torch.stack(where),
+        "efficiency": torch.tensor(equal.efficiency),
+    }
+
+
+def _metrics() -> dict[str, Tensor]:
+    """A picture of 192 px, speckled, shifted by a part of a pixel and noisy, against itself."""
+    target = _smooth(3, (192, 192), 0.0, 1.0).double()
+    target[:, 40:90, 50:120] = 0.7
+    grain = torch.rand(target.shape, generator=seeds.generator("golden", "speckle"), dtype=torch.float64)
+    capture = 0.6 * target.roll(1, -1) + 1.2 * target * (0.8 + 0.4 * grain) + 0.02 * grain
+    scores = score(capture, target) | {f"stored {key}": v for key, v in score(capture, target, stored=True).items()}
+    return {name: torch.tensor(value, dtype=torch.float64) for name, value in scores.items()}
+
+
+def _alignment() -> dict[str, Tensor]:
+    """A photograph through a mirror, a quarter turn and some perspective, with speckle."""
+    draw = np.random.default_rng(5)
+    target = photographed.photograph("coffee", (200, 250))
+    homography, size = photographed.pose(draw, (200, 250), scale=1.3, turns=1, mirrored=True)
+    alignment = align(photographed.captured(target, homography, size, draw), target)
+    corners = torch.tensor(alignment.warp.corners())
+    return {"corners": corners, "correlation": torch.tensor(alignment.correlation)}
+
+
+# Retrieval with all terms of Eq. 22, through a network that shows what it is given.
+_RETRIEVAL = {"network": {"name": "identity"}, "training": ROUNDS, "offsets": 1, "start": {"offset": "none"}}
+_RETRIEVAL["retrieval"] = {"iterations": 3, "step": 0.05}
+
+
+def _method(name: str) -> dict[str, Tensor]:
+    """Phases of a method; where it is trained, also what it learned and predicts."""
+    method = quick(name)
+    if name == "hil":
+        identity = _trained(plugins.build("methods", name, _RETRIEVAL), small_spec(192, 176))
+        return _trained(method, small_spec(48, 40, 3)) | {f"retrieval {key}": identity[key] for key in ("cos", "sin")}
+    if getattr(method, "trains", False):
+        return _trained(method, small_spec(48, 40, 3))
+    display, target = ToyDisplay(aberration=0.3, unmodulated=0.1, noise=0.02), picture()
+    phase = method.solve(target[None], display.handle(method, target))
+    found = _of_phase(phase)
+    if getattr(method, "planes", False):
+        stack = torch.stack([picture(), picture(1)])
+        found |= _of_phase(method.solve_planes(stack, (0.0, 1e-4), display.handle(method, target)), "planes: ")
+    return found
+
+
+def _trained(method: Any, spec: DisplaySpec) -> dict[str, Tensor]:
+    learned = through_a_file(dict(method.prepare(training_bench(spec, Memory(), images=2))))
+    found = {name: value.float() for name, value in _leaves("learned", learned)}
+    if "nominal" in learned:
+        learned["nominal"] = 0  # so few steps teach nothing that would be kept
+    (target,) = pictures(spec, first=20)
+    handle = solving_bench(method, target, spec, learned)
+    phase = method.solve(target[None], handle)
+    return {**found, **_of_phase(phase), "prediction": method.predict(phase, handle)}
+
+
+def _leaves(path: str, value: Any) -> Iterator[tuple[str, Tensor]]:
+    """The tensors and numbers of what was learned, those of one network as one."""
+    if isinstance(value, Mapping) and value and all(isinstance(part, Tensor) for part in value.values()):
+        yield path, torch.cat([part.flatten().float() for part in value.values()])
+    elif isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from _leaves(f"{path} {key}", part)
+    elif isinstance(value, Tensor | int | float):
+        yield path, torch.as_tensor(value)
+
+
+def _of_phase(phase: Tensor, prefix: str = "") -> dict[str, Tensor]:
+    return {f"{prefix}cos": phase.cos(), f"{prefix}sin": phase.sin()}
+
+
+def _smooth(channels: int, shape: tuple[int, int], low: float, high: float) -> Tensor:
+    """A smooth random map ``(channels, *shape)`` between two values."""
+    draw = torch.rand(1, channels, 9, 9, generator=seeds.generator("golden", channels, *shape))
+    return low + (high - low) * functional.interpolate(draw, shape, mode="bilinear", align_corners=True)[0]
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+@contextmanager
+def _no_weights() -> Iterator[None]:
+    """Torch's hub cache empty: the numbers must not depend on which published weights lie there."""
+    hub = torch.hub.get_dir()
+    with tempfile.TemporaryDirectory() as empty:
+        torch.hub.set_dir(empty)
+        try:
+            yield
+        finally:
+            torch.hub.set_dir(hub)
+
+
+def main() -> int:
+    """Bring the file up to date; 1 where numbers changed under a version that is still the same."""
+    known, written, refused = cases(), recorded(), []
+    shipped = {f"method {name}" for name in plugins.names("methods")}
+    kept = {name: entry for name, entry in written.items() if name in known or name in shipped}
+    for name, case in known.items():
+        numbers = case.numbers()
+        if name not in kept or kept[name]["version"] != case.version:
+            kept[name] = {"version": case.version, "numbers": numbers}
+            print(f"written: {name}")
+        elif problem := complaint(name, case, numbers, kept[name]):
+            refused.append(problem)
+    lines = json.dumps(dict(sorted(kept.items())), indent=1)
+    FILE.write_text(lines + "\n", encoding="utf-8")
+    print("\n".join(refused) or f"{FILE.name} is up to date", file=sys.stderr if refused else sys.stdout)
+    return bool(refused)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
