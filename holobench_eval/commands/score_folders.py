@@ -17,12 +17,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from .. import __version__
 from ..core.errors import UserError, suggest
 from ..core.installed import installed
-from ..report.build import write_report
-from ..report.data.layout import Layout
-from ..report.data.results import Results
-from ..report.data.tables import records_frame
+from ..report import Description, Layout, Results, write_report
 from ..report.data.text import FILES
-from ..report.sections.description import Description
 from ..study import provenance
 from ..study.folders.files import Folders, read_folders
 from ..study.folders.scoring import CONDITION, Said, Scoring
@@ -70,9 +66,7 @@ def score_folders(
         words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
         words += ["--baseline", baseline] if baseline else []
         described = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
-        layout = _layout(folders, scoring.domain, values, baseline)
-        report = write_report(layout, records, output, known, described)
-        return report, Results(records_frame(records, layout), layout)
+        return write_report(_layout(folders, scoring.domain, values, baseline), records, output, known, described)
 
 
 def _layout(folders: Folders, domain: str, values: str, baseline: str | None) -> Layout:

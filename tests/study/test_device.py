@@ -13,7 +13,7 @@ import torch
 
 from holobench_eval.commands import app as cli
 from holobench_eval.core.device import CPU
-from holobench_eval.report.sections.description import environment
+from holobench_eval.report.sections.appendix import environment
 from holobench_eval.study import clusters, provenance, timings
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial, executor

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from .gallery import Column, Picture, Tile, error_map, halved, most_detailed
 from .style import new_figure, save_picture, style
 
-SMALLEST_TILE = 192
-"""Captures narrower than this many pixels are enlarged by a whole factor."""
+SMALLEST_TILE = 192  # captures narrower than this many pixels are enlarged by a whole factor
 
 GAP = 8
 CAPTION = 20
@@ -31,8 +30,7 @@ HEADER = 52
 SIDE = 30
 FOOTER = 74
 ERROR_COLOURS = "magma"
-CHARACTER = 6.6
-"""Width in pixels of an average character of the captions."""
+CHARACTER = 6.6  # width in pixels of an average character of the captions
 
 
 def tile_size(shape: tuple[int, ...]) -> tuple[int, int]:

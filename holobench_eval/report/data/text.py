@@ -6,9 +6,12 @@ said how good a picture is, so everything that differs is here, side by side.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
+
+FILES = "files"  # the measure of pictures that were given as files
 
 
 def plain(values: Mapping[str, Any]) -> str:
@@ -31,8 +34,18 @@ def words(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def number(value: float) -> str:
+    """Four significant digits at most, no exponent for everyday sizes; a dash for NaN."""
+    return "–" if math.isnan(value) else f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+def p_value(p: float) -> str:
+    """``p = 0.031`` or ``p < 0.001``."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
+
+
 @dataclass(frozen=True)
-class Wording:
+class Text:
     """The words of one kind of study.
 
     scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
@@ -96,7 +109,7 @@ class Wording:
         }[name]
 
 
-PICTURE = Wording()
+PICTURE = Text()
 
 ON_A_NETWORK = replace(
     PICTURE,
@@ -182,9 +195,6 @@ FOCUS = replace(
 )
 
 
-FILES = "files"
-"""The measure of pictures that were given as files."""
-
 _COMPARED = {
     "stored": "in the values as stored",
     "srgb": "in linear light, for which captures and targets were decoded from sRGB",
@@ -212,13 +222,13 @@ GIVEN = replace(
 )
 
 
-def from_files(values: str) -> Wording:
+def from_files(values: str) -> Text:
     """The words for pictures that were given as files; values: how they were read."""
+    text = replace(GIVEN, compared=_COMPARED[values])
     if values != "stored":
-        return replace(GIVEN, compared=_COMPARED[values])
+        return text
     return replace(
-        GIVEN,
-        compared=_COMPARED[values],
+        text,
         domains=(
             "Values as stored: the numbers in the files over their full scale, without any decoding. If the pictures "
             "are sRGB, as most are, equal differences of values are not equal differences of light, and these scores "
@@ -238,13 +248,13 @@ REAL_SEEDS = (
 )
 
 
-def wording(measure: str, holograms: str, on_a_network: bool, real: bool = False) -> Wording:
+def text_of(measure: str, holograms: str, on_a_network: bool, real: bool = False) -> Text:
     """The words for a measure; holograms: the method whose captures are predicted; real: whether the display exists."""
     words = _of_measure(measure, holograms, on_a_network)
     return replace(words, displays=REAL, seeds=REAL_SEEDS) if real else words
 
 
-def _of_measure(measure: str, holograms: str, on_a_network: bool) -> Wording:
+def _of_measure(measure: str, holograms: str, on_a_network: bool) -> Text:
     if measure == "prediction":
         return replace(
             PREDICTION,

@@ -1,0 +1,86 @@
+"""Captures, computing time and light."""
+
+from __future__ import annotations
+
+from ..data.results import Results
+from ..data.tables import ALONE_COLUMN, DONE, MEMORY_COLUMN
+from ..data.text import FILES, number, words
+from ..markdown import Markdown, heading, table
+from ..section import Blocks, Figures, Report, Section
+from .results import cost_columns
+
+MEMORY = "memory [MiB]"
+ELSEWHERE = ("refine_", "second_")  # how keys of figures begin that stand where the geometry is
+
+
+def _render(report: Report, _: Figures) -> Blocks:
+    results, text = report.results, report.layout.text
+    yield heading("Light" if report.layout.measure == FILES else "Captures, time and light")
+    if report.layout.measure == FILES:
+        yield f"{text.effort} Match factors and brightness ratios are {text.compared}."
+    else:
+        memory = MEMORY_COLUMN in results.table
+        sentences = [
+            text.effort,
+            f"Seconds {'and memory ' * memory}are the first measurement on this machine, kept so that the same command "
+            "gives the same table.",
+            timing(results, report.provenance.get("workers", 1)),
+        ]
+        if memory:
+            sentences.append(
+                f"Memory is the most that a {text.each} took beyond what the process held before it, the median over "
+                "targets, without any training."
+            )
+        if report.trainings:
+            sentences.append(
+                "Captures and seconds of training were spent once, before any target was seen, and are not part of "
+                "those per target."
+            )
+        yield " ".join(filter(None, sentences))
+    yield report.by_display(_light_and_time)
+
+
+def _light_and_time(results: Results, condition: str) -> Markdown:
+    """Captures, computing time and the figures that describe a capture and are no image metric."""
+    figures = [score for score in results.scores if not score.domain and not score.key.startswith(ELSEWHERE)]
+    cost, sensor = cost_columns(results, " per target"), results.layout.learned_display is None
+    cost |= {MEMORY_COLUMN: MEMORY} if MEMORY_COLUMN in results.table else {}
+    rows = []
+    for name in results.methods(condition):
+        row, cells = results.row(name, condition), results.cells(name, condition)
+        saturated = cells.loc[cells["state"] == DONE, "saturated"].max() * 100
+        rows.append(
+            [
+                results.layout.marked(name),
+                *(number(row[key]) for key in cost),
+                *([number(saturated)] if sensor else []),
+                *(number(row[score.key]) for score in figures),
+            ]
+        )
+    columns = ["method", *cost.values(), *(["most saturated samples [%]"] if sensor else [])]
+    return table([*columns, *(score.title for score in figures)], rows)
+
+
+def timing(results: Results, workers: int) -> str:
+    """What was at work beside the solutions that were timed, a sentence; workers: of the run.
+
+    Empty where a single worker left no note of it, as in records of earlier versions.
+    """
+    each, done, row = results.layout.text.each, results.done, ["method", "condition"]
+    together = f"{each}s computed {f'{workers} ' * (workers > 1)}side by side, which disturb each other"
+    if ALONE_COLUMN not in done:
+        return f"The seconds are of {together}." if workers > 1 else ""
+    alone = done[done[ALONE_COLUMN] == 1]
+    if alone.empty:
+        return f"The seconds are of {together}."
+    if len(alone) == len(done):
+        return f"Each {each} was computed with nothing beside it."
+    single = alone.groupby(row)["seconds"].nunique().max() == 1  # cells of one solution have one time
+    chosen = f"one {each} a row, computed" if single else f"those {each}s of a row that were computed"
+    timed = set(alone[row].itertuples(index=False, name=None))
+    others = [pair for pair in done[row].drop_duplicates().itertuples(index=False, name=None) if pair not in timed]
+    rest = f"; those of {words([' on '.join(pair) for pair in others])} are of {together}" if others else ""
+    return f"The seconds are of {chosen} with nothing beside {'it' if single else 'them'}{rest}."
+
+
+SECTIONS = (Section("cost", 170, _render),)
