@@ -58,7 +58,7 @@ def code_block(value: object) -> Markdown:
 
 def blocks(parts: Iterable[object]) -> Markdown:
     """Paragraphs, lists and tables below each other; empty ones are left out."""
-    return Markdown("\n\n").join(part for part in map(escape, parts) if part)
+    return Markdown("\n\n").join(filter(None, map(escape, filter(None, parts))))
 
 
 def heading(text: object, level: int = 2) -> Markdown:

@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 
 from holobench_eval.report import Results, csv_text, recompute_table, records_frame
+from holobench_eval.report.data.categories import meanings
 from holobench_eval.report.sections.findings import findings
-from holobench_eval.report.sections.leaderboard import leaderboard, reading, stopped, tracks
+from holobench_eval.report.sections.leaderboard import leaderboard, reading
+from holobench_eval.report.sections.results import stopped
 from holobench_eval.study.plan import REFERENCE
 from tests.support import budget_study as budget
 from tests.support import synthetic_study as made
@@ -76,16 +78,16 @@ def test_a_headline_of_which_less_is_better_is_ranked_the_other_way(records):
 
 
 def test_the_way_to_the_ceiling_is_zero_at_the_baseline_and_whole_at_the_ceiling(found):
-    assert found.closed("wirtinger", "ideal") == 0
-    assert found.closed("oracle", "ideal") == 1
+    assert found.gap_closed("wirtinger", "ideal") == 0
+    assert found.gap_closed("oracle", "ideal") == 1
     mean = {name: found.values(name, "ideal").mean() for name in ("wirtinger", "hil", "oracle")}
     expected = (mean["hil"] - mean["wirtinger"]) / (mean["oracle"] - mean["wirtinger"])
-    assert found.closed("hil", "ideal") == pytest.approx(expected)
+    assert found.gap_closed("hil", "ideal") == pytest.approx(expected)
 
 
 def test_there_is_no_way_to_a_ceiling_below_the_baseline(records):
     bad = [r | {"scores": {"psnr_linear": 1.0}} if r["label"] == "oracle" else r for r in records]
-    assert np.isnan(results(bad).closed("hil", "ideal"))
+    assert np.isnan(results(bad).gap_closed("hil", "ideal"))
     assert "way to the ceiling" not in leaderboard(results(bad), "ideal")
 
 
@@ -112,12 +114,12 @@ def test_the_findings_rank_online_methods_apart(found):
 
 
 def test_tracks_are_explained_where_they_occur(records, found):
-    assert [track for track, _ in tracks(found)] == ["open loop", "calibrated", "online", "ceiling"]
+    assert [category for category, _ in meanings(found.categories)] == ["open loop", "calibrated", "online", "ceiling"]
     assert "compete in a track of their own" in reading(found)
     kept = [record for record in records if not record["label"].startswith("online")]
     pairs = tuple(pair for pair in budget.layout().pairs if not pair[0].startswith("online"))
     without = results(kept, pairs=pairs, camera=frozenset())
-    assert "online" not in {track for track, _ in tracks(without)}
+    assert "online" not in without.categories
     assert "track of their own" not in reading(without)
 
 

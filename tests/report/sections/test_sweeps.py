@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holobench_eval.report.build import write_report
+from holobench_eval.report import Description, write_report
 from holobench_eval.report.data.layout import Layout, Swept
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.sweeps import Sweep, sweeps
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.report.sections import sweeps as section_sweeps
-from holobench_eval.report.sections.description import Description
 from tests.support import synthetic_study as made
 
 TARGETS = ("a", "b", "c", "d")
@@ -140,7 +139,7 @@ def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Res
 
 
 def test_a_report_with_sweeps_has_curves_and_tables(tmp_path: Path, results: Results) -> None:
-    path = write_report(layout(), records(), tmp_path, {}, Description())
+    path, _ = write_report(layout(), records(), tmp_path, {}, Description())
     text = path.read_text()
     assert "## Changes of the displays" in text
     assert "### Drift since calibration: leto-aged" in text

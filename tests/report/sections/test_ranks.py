@@ -13,11 +13,10 @@ from skimage.io import imread
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes import draws
 from holobench_eval.report import Layout, Results, layout_of, records_frame, write_report
-from holobench_eval.report.charts.ranks import draw
 from holobench_eval.report.data.layout import Swept
 from holobench_eval.report.data.ranks import ranks, share
+from holobench_eval.report.description import Description
 from holobench_eval.report.sections import ranks as section_ranks
-from holobench_eval.report.sections.description import Description
 from holobench_eval.study.config import load_study
 from tests.support import synthetic_study as made
 
@@ -125,7 +124,7 @@ def test_methods_that_are_far_apart_never_flip():
     assert (one.tau.low, one.tau.mean, one.tau.high) == (1, 1, 1)
     assert [pair.flips for pair in one.pairs] == [0, 0, 0]
     assert all(pair.cause is None for pair in one.pairs)
-    assert section_ranks.flips(one) == ""
+    assert section_ranks.flips(one) is None
     text = " ".join(section_ranks.sentences(one))
     assert "best in 30 of 30 (100 [89, 100] %). No other method is ever first." in text
     assert "3 of 3 pairs of methods have their nominal order in every draw" in text
@@ -138,7 +137,7 @@ def test_ties_share_the_first_place_flip_nothing_and_have_no_tau(tmp_path):
     assert one.pairs[0].flips == 0
     assert len(one.taus) == 0
     assert "is not defined" in " ".join(section_ranks.sentences(one))
-    ((path, caption),) = draw([one], tmp_path)
+    ((path, caption),) = section_ranks.draw([one], tmp_path)
     assert path.is_file()
     assert "tau" not in caption
 
@@ -192,15 +191,15 @@ def test_a_method_that_mostly_fails_is_not_ranked_and_takes_no_draws_from_the_ot
 
 def test_without_a_draw_that_has_scores_there_is_no_ranking(tmp_path):
     one = found(FLIPPING, lost=[(None, str(index), None) for index in range(1, COUNT + 1)])
-    assert not one.told
+    assert not one.exists
     assert "No ranking" in section_ranks.sentences(one)[-1]
-    assert list(draw([one], tmp_path)) == []
+    assert list(section_ranks.draw([one], tmp_path)) == []
 
 
 def test_the_ceiling_and_methods_that_see_the_camera_are_not_ranked():
     one = found(FLIPPING, privileged=frozenset({"robust"}), camera=frozenset({"poor"}))
     assert one.methods == ["steady"]
-    assert not one.told
+    assert not one.exists
 
 
 def test_two_sweeps_of_one_display_are_one_ranking():
@@ -226,7 +225,7 @@ def test_a_share_has_wilsons_interval():
 
 def test_the_report_has_the_section_its_tables_and_its_figure(tmp_path):
     records, layout = study(FLIPPING)
-    text = write_report(layout, records, tmp_path, {}, Description()).read_text()
+    text = write_report(layout, records, tmp_path, {}, Description())[0].read_text()
     section = text.partition("## Rank stability")[2].partition("\n## ")[0]
     for phrase in (
         "### leto-aged, 30 draws",

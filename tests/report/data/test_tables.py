@@ -7,7 +7,7 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, read_records, recompute_table, records_frame, table_from_records
-from holobench_eval.report.sections.tables import timing
+from holobench_eval.report.sections.cost import timing
 from holobench_eval.study.plan import FLOORS, REFERENCE
 from tests.support import synthetic_study as made
 

@@ -5,7 +5,7 @@ from holobench_eval.report.charts.comparison import HEADER, SIDE, draw_compariso
 from holobench_eval.report.charts.gallery import (
     Column,
     Tile,
-    error_ceiling,
+    error_limit,
     error_map,
     halved,
     load_picture,
@@ -43,9 +43,9 @@ def test_an_error_map_drawn_at_half_size_keeps_its_mean():
 
 
 def test_the_error_scale_is_a_round_number_above_most_errors():
-    assert error_ceiling([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
-    assert error_ceiling([np.zeros((4, 4))]) == pytest.approx(0.1)
-    assert error_ceiling([np.ones((4, 4))]) == 1.0
+    assert error_limit([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
+    assert error_limit([np.zeros((4, 4))]) == pytest.approx(0.1)
+    assert error_limit([np.ones((4, 4))]) == 1.0
 
 
 def test_targets_of_a_large_study_are_spread_from_first_to_last():

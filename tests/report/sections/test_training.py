@@ -10,7 +10,7 @@ from holobench_eval.core.hashing import digest
 from holobench_eval.report import csv_text, recompute_table, records_frame, table_from_records, write_report
 from holobench_eval.report.charts.training import CURVES, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
-from holobench_eval.report.sections.description import Description
+from holobench_eval.report.description import Description
 from holobench_eval.study.training_log import Round, rounds_in, rounds_of
 from tests.support import synthetic_study as made
 
@@ -66,7 +66,7 @@ def found(tmp_path_factory):
 
 
 def written(found, tmp_path, **changes):
-    return write_report(layout(**changes), found, tmp_path, {}, Description()).read_text()
+    return write_report(layout(**changes), found, tmp_path, {}, Description())[0].read_text()
 
 
 def rows_under(text, heading):

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from holobench_eval.report import Results, records_frame
-from holobench_eval.report.charts.figures import _sheets
+from holobench_eval.report import Description, Results, records_frame
 from holobench_eval.report.data.scores import parse
-from holobench_eval.report.data.text import wording
-from holobench_eval.report.sections.findings import blur_keys
-from holobench_eval.report.sections.focus import by_plane, sentences
-from holobench_eval.report.sections.tables import leading_scores
+from holobench_eval.report.data.text import text_of
+from holobench_eval.report.section import Report
+from holobench_eval.report.sections.comparison import pages_of_targets
+from holobench_eval.report.sections.focus import SECTIONS, by_plane, sentences
 from tests.support import synthetic_study as made
 
 PLANES = {
@@ -51,6 +51,10 @@ def results_of(quality: dict[str, float], noise: float = 0.2, **changes: Any) ->
     return Results(records_frame(records, layout), layout)
 
 
+def report_of(results: Results, output: Path) -> Report:
+    return Report(results, [], output, {}, Description())
+
+
 def lines(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
 
@@ -82,25 +86,29 @@ def test_without_both_there_is_nothing_to_compare(changes: dict[str, Any]) -> No
 
 
 def test_other_studies_have_no_such_section() -> None:
-    assert by_plane(results_of({"lens": 20.0}, planes={}), "bench") == ""
+    (section,) = SECTIONS
+    assert section.applies(report_of(results_of({"lens": 20.0}), Path()))
+    assert not section.applies(report_of(results_of({"lens": 20.0}, planes={}), Path()))
 
 
 def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
     assert parse("psnr_linear_infocus").axis == "PSNR in focus, linear light [dB]"
-    leading = [score.key for score in leading_scores(results_of({"lens": 20.0}))]
+    leading = [score.key for score in results_of({"lens": 20.0}).leading]
     assert leading[:3] == ["psnr_linear_infocus", "ssim_linear_infocus", "psnr_linear"]
 
 
 def test_blur_is_compared_with_whole_pictures() -> None:
-    assert [score.key for score in blur_keys(results_of({"lens": 20.0}))] == ["psnr_linear", "psnr_linear_blur1"]
+    assert [score.key for score in results_of({"lens": 20.0}).blur_scores] == ["psnr_linear", "psnr_linear_blur1"]
 
 
-def test_a_sheet_shows_every_plane_of_a_scene() -> None:
-    pictures = {target: np.zeros((8, 8, 3)) for target in PLANES}
-    sheets = _sheets(results_of({"lens": 20.0}), "bench", pictures)
+def test_a_sheet_shows_every_plane_of_a_scene(tmp_path: Path) -> None:
+    report = report_of(results_of({"lens": 20.0}), tmp_path)
+    for target in PLANES:
+        made.save_picture(report.thumbnails.store.target_thumbnail(target), np.zeros((8, 8, 3)))
+    sheets = pages_of_targets(report, "bench")
     assert [len(sheet) for sheet in sheets] == [3, 3, 3]
     assert sheets[1] == ["motorcycle@-2mm", "motorcycle@0mm", "motorcycle@2mm"]
 
 
 def test_the_words_say_what_the_display_does() -> None:
-    assert "adds the phase of a lens" in wording("focus", "", False).procedure
+    assert "adds the phase of a lens" in text_of("focus", "", False).procedure
