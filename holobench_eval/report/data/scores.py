@@ -106,6 +106,10 @@ class Score:
         """An estimate with its interval."""
         return self.interval(estimate.mean, estimate.low, estimate.high, signed)
 
+    def mean_in(self, row: pd.Series) -> str:
+        """Mean of the score in a row of the table."""
+        return self.number(row[self.key])
+
     def in_row(self, row: pd.Series) -> str:
         """Mean and interval of the score in a row of the table."""
         return self.interval(row[self.key], row[f"{self.key}_lo"], row[f"{self.key}_hi"])

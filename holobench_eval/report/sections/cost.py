@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from ..data.results import Results
 from ..data.tables import ALONE_COLUMN, DONE, MEMORY_COLUMN
 from ..data.text import FILES, number, words
-from ..markdown import Markdown, heading, table
-from ..section import Blocks, Figures, Report, Section
+from ..markdown import Markdown, heading
+from ..section import Blocks, Figures, Report, Section, by_method, column
 from .results import cost_columns
 
 MEMORY = "memory [MiB]"
@@ -42,23 +44,21 @@ def _render(report: Report, _: Figures) -> Blocks:
 
 def _light_and_time(results: Results, condition: str) -> Markdown:
     """Captures, computing time and the figures that describe a capture and are no image metric."""
+
+    def saturated(row: pd.Series) -> str:
+        cells = results.cells(row["method"], condition)
+        return number(cells.loc[cells["state"] == DONE, "saturated"].max() * 100)
+
+    costs = cost_columns(results, " per target")
+    costs |= {MEMORY_COLUMN: MEMORY} if MEMORY_COLUMN in results.table else {}
+    sensor = results.layout.learned_display is None
     figures = [score for score in results.scores if not score.domain and not score.key.startswith(ELSEWHERE)]
-    cost, sensor = cost_columns(results, " per target"), results.layout.learned_display is None
-    cost |= {MEMORY_COLUMN: MEMORY} if MEMORY_COLUMN in results.table else {}
-    rows = []
-    for name in results.methods(condition):
-        row, cells = results.row(name, condition), results.cells(name, condition)
-        saturated = cells.loc[cells["state"] == DONE, "saturated"].max() * 100
-        rows.append(
-            [
-                results.layout.marked(name),
-                *(number(row[key]) for key in cost),
-                *([number(saturated)] if sensor else []),
-                *(number(row[score.key]) for score in figures),
-            ]
-        )
-    columns = ["method", *cost.values(), *(["most saturated samples [%]"] if sensor else [])]
-    return table([*columns, *(score.title for score in figures)], rows)
+    columns = [
+        *(column(title, key) for key, title in costs.items()),
+        *([("most saturated samples [%]", saturated)] if sensor else []),
+        *(column(score.title, score.key) for score in figures),
+    ]
+    return by_method(results, condition, columns)
 
 
 def timing(results: Results, workers: int) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 
 from ..data.results import Results
-from ..data.scores import DOMAINS
+from ..data.scores import DOMAINS, Score
 from ..data.text import FILES, number
 from ..markdown import Markdown, heading, table
-from ..section import Blocks, Figures, Report, Section
+from ..section import Blocks, Column, Figures, Report, Section, by_method
 
 
 def _domains(report: Report, _: Figures) -> Blocks:
@@ -21,7 +22,7 @@ def _other_metrics(results: Results, condition: str) -> Markdown | None:
     names = results.methods(condition)
     rest = [score for score in results.scores if score.domain and not score.variant and score not in results.leading]
     rows = [
-        [score.heading, *(score.number(results.row(name, condition)[score.key]) for name in names)]
+        [score.heading, *(score.mean_in(results.row(name, condition)) for name in names)]
         for score in sorted(rest, key=lambda score: DOMAINS.index(score.domain))
     ]
     return table(["metric", *map(results.layout.marked, names)], rows) if rows else None
@@ -42,23 +43,24 @@ def _refined(results: Results, condition: str) -> Markdown | None:
     pairs = [(plain[s.metric, s.domain], s) for s in results.scores if s.variant == "refined"]
     if not pairs:
         return None
-    rows = []
-    for name in results.methods(condition):
-        row, cells = results.row(name, condition), results.cells(name, condition)
-        shift = np.hypot(cells["refine_dx_px"], cells["refine_dy_px"]).max()
-        scores = [
-            text
-            for fixed, refined in pairs
-            for text in (
-                fixed.number(row[fixed.key]),
-                fixed.number(row[refined.key]),
-                fixed.number(row[refined.key] - row[fixed.key], signed=True),
-            )
-        ]
-        turn = number(cells["refine_theta_deg"].abs().max())
-        rows.append([results.layout.marked(name), *scores, number(shift), turn])
-    headings = [text for fixed, _ in pairs for text in (fixed.axis, "refined", "difference")]
-    return table(["method", *headings, "largest shift [px]", "largest rotation [deg]"], rows)
+
+    def difference(fixed: Score, refined: Score) -> Column:
+        return "difference", lambda row: fixed.number(row[refined.key] - row[fixed.key], signed=True)
+
+    def moved(row: pd.Series) -> str:
+        cells = results.cells(row["method"], condition)
+        return number(np.hypot(cells["refine_dx_px"], cells["refine_dy_px"]).max())
+
+    def turned(row: pd.Series) -> str:
+        return number(results.cells(row["method"], condition)["refine_theta_deg"].abs().max())
+
+    scores = [
+        column
+        for fixed, refined in pairs
+        for column in ((fixed.axis, fixed.mean_in), ("refined", refined.mean_in), difference(fixed, refined))
+    ]
+    columns = [*scores, ("largest shift [px]", moved), ("largest rotation [deg]", turned)]
+    return by_method(results, condition, columns)
 
 
 def _blur(report: Report, _: Figures) -> Blocks:
@@ -74,12 +76,8 @@ def _blur(report: Report, _: Figures) -> Blocks:
 def _blurred(results: Results, condition: str) -> Markdown | None:
     """The headline metric after a Gaussian blur of both images."""
     scores = results.blur_scores
-    rows = [
-        [results.layout.marked(name), *(score.number(results.row(name, condition)[score.key]) for score in scores)]
-        for name in results.methods(condition)
-    ]
-    widths = (f"blur {score.blur:g} px" if score.blur else "no blur" for score in scores)
-    return table(["method", *widths], rows) if scores else None
+    columns = [(f"blur {score.blur:g} px" if score.blur else "no blur", score.mean_in) for score in scores]
+    return by_method(results, condition, columns) if scores else None
 
 
 SECTIONS = (

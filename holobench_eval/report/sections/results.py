@@ -13,9 +13,9 @@ from ..charts.quality import Chart, quality_bars, target_dots
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.tables import DONE, STOPPED_COLUMN
-from ..data.text import FILES, number
+from ..data.text import FILES
 from ..markdown import Markdown, bullets, heading, table
-from ..section import Blocks, Figures, Report, Section
+from ..section import Blocks, Column, Figures, Report, Section, column, method_rows
 
 WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
 
@@ -86,22 +86,15 @@ def cost_columns(results: Results, each: str = "") -> dict[str, str]:
 
 def headline_rows(results: Results, condition: str) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of a condition's main table; published figures stand in columns of their own."""
-    layout, cost = results.layout, cost_columns(results)
+    layout = results.layout
     reported = layout.reported_metrics if layout.reported_beside in (None, condition) else ()
-    rows = []
-    for name in results.methods(condition):
-        row, published = results.row(name, condition), layout.published(name, condition)
-        rows.append(
-            [
-                layout.marked(name),
-                f"{row['n']:.0f} of {len(results.targets)}",
-                *(score.in_row(row) for score in results.leading),
-                *(number(row[key]) for key in cost),
-                *(number(published.get(metric, float("nan"))) for metric in reported),
-            ]
-        )
-    columns = ["method", "n", *(score.heading for score in results.leading), *cost.values()]
-    return [*columns, *(f"reported {Score(metric, metric).axis}" for metric in reported)], rows
+    columns: list[Column] = [
+        ("n", lambda row: f"{row['n']:.0f} of {len(results.targets)}"),
+        *((score.heading, score.in_row) for score in results.leading),
+        *(column(title, key) for key, title in cost_columns(results).items()),
+        *(column(f"reported {Score(metric, metric).axis}", f"reported_{metric}") for metric in reported),
+    ]
+    return method_rows(results, condition, columns)
 
 
 def stopped(results: Results, condition: str) -> list[str]:
