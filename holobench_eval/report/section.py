@@ -90,10 +90,11 @@ class Report:
 
     def by_display(self, rows: Callable[[Results, str], object], instead: str = "") -> Markdown:
         """A table for every display that has one, under its name; ``instead`` where none has."""
-        tables = [(condition, rows(self.results, condition)) for condition in self.results.conditions]
-        return blocks(part for name, shown in tables if shown for part in (heading(name, 3), shown)) or blocks(
-            [instead]
-        )
+        parts: list[object] = []
+        for condition in self.results.conditions:
+            if contents := rows(self.results, condition):
+                parts += [heading(condition, 3), contents]
+        return blocks(parts or [instead])
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from skimage.io import imread
 from holobench_eval.report import write_report
 from holobench_eval.report.description import Description, Display
 from holobench_eval.study.store import Store
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 PROVENANCE = {
     "package": "0.1.0",
@@ -21,8 +21,8 @@ PROVENANCE = {
     "started": "2031-01-02T03:04:05+00:00",
     "ended": "2031-01-02T03:05:06+00:00",
 }
-TARGETS = made.TARGETS[1:4]
-LAYOUT = made.layout(targets=TARGETS)
+TARGETS = synthetic.TARGETS[1:4]
+LAYOUT = synthetic.layout(targets=TARGETS)
 DESCRIPTION = Description(
     displays=(Display("leto-aged", "Version 1. An aged panel.", ("crosstalk: width = 0.45",)),),
     config_file="configs/table3.yaml",
@@ -34,7 +34,7 @@ def minimal(records, **changes):
     """The records of one display and three methods, and the layout for them: little to draw."""
     kept = [r for r in records if r["cell"]["condition"] != "ideal" and r["label"] not in ("SGD", "HIL", "Oracle")]
     pairs = tuple((label, "leto-aged") for label in ("Double phase", "GS", "Wirtinger"))
-    return kept, made.layout(**({"targets": TARGETS, "pairs": pairs, "reported": {}} | changes))
+    return kept, synthetic.layout(**({"targets": TARGETS, "pairs": pairs, "reported": {}} | changes))
 
 
 def files(folder):
@@ -44,7 +44,7 @@ def files(folder):
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    return folder, made.study(folder, size=48, targets=TARGETS)
+    return folder, synthetic.study(folder, size=48, targets=TARGETS)
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
     kept, layout = minimal(found)
     stale, sheet = tmp_path / "figures" / "comparison-old-9.jpg", tmp_path / "figures" / "stages-leto-aged.png"
     for file in (stale, sheet):
-        made.save_picture(file, np.full((8, 8, 3), 0.5))
+        synthetic.save_picture(file, np.full((8, 8, 3), 0.5))
     text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert not stale.exists()
     assert "(figures/stages-leto-aged.png)" in text
@@ -150,9 +150,9 @@ def test_missing_thumbnails_are_said_and_stop_nothing(records, tmp_path):
 
     store = Store(tmp_path)
     for target in TARGETS:
-        made.save_picture(store.target_thumbnail(target), np.full((48, 48, 3), 0.5))
+        synthetic.save_picture(store.target_thumbnail(target), np.full((48, 48, 3), 0.5))
     one = kept[-1]
-    made.save_picture(store.folder / f"{made.digest(one['cell'])}.png", np.full((48, 48, 3), 0.4))
+    synthetic.save_picture(store.folder / f"{synthetic.digest(one['cell'])}.png", np.full((48, 48, 3), 0.4))
     text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert "(figures/comparison-leto-aged-1.jpg)" in text
     assert "Thumbnails that were expected and are not there (7)" in text
@@ -162,7 +162,7 @@ def test_hostile_names_stay_text(records, tmp_path):
     _, found = records
     evil = "<img src=x onerror=alert(1)> | **b** [l](javascript:1)"
     kept, layout = minimal(found, title=evil, baseline=evil)
-    layout = made.layout(
+    layout = synthetic.layout(
         **vars(layout) | {"pairs": (("Double phase", "leto-aged"), ("GS", "leto-aged"), (evil, "leto-aged"))}
     )
     renamed = [record | {"label": evil} if record["label"] == "Wirtinger" else record for record in kept]

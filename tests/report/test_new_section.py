@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.report import Description, sections, write_report
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 FILE = '''
 """How bright the captures are, which no other section asks."""
@@ -48,11 +48,11 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def text_of(tmp_path: Path, condition: str) -> str:
     pairs = tuple((label, condition) for label in ("GS", "Wirtinger"))
     records = [
-        made.record(label, made.cell(label, target, condition), {"psnr_linear": 20.0})
+        synthetic.record(label, synthetic.cell(label, target, condition), {"psnr_linear": 20.0})
         for label, _ in pairs
-        for target in made.TARGETS
+        for target in synthetic.TARGETS
     ]
-    layout = made.layout(pairs=pairs, reported={}, privileged=frozenset())
+    layout = synthetic.layout(pairs=pairs, reported={}, privileged=frozenset())
     return write_report(layout, records, tmp_path / "report", {}, Description())[0].read_text()
 
 

@@ -206,13 +206,13 @@ def _draw_frontier(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str,
         steps = _front(panel, categories, costs)
         axes.plot([x for x, _ in steps], [y for _, y in steps], color=PALE, linewidth=2.2, zorder=1)
     for marks in _joined(panel):
-        places, colour = [costs.position(mark) for mark in marks], colours[marks[0].group]
-        if len(set(places)) > 1:
-            axes.plot(places, [mark.quality for mark in marks], color=colour, linewidth=1.4, zorder=2)
-        for place, mark in zip(places, marks, strict=True):
+        positions, colour = [costs.position(mark) for mark in marks], colours[marks[0].group]
+        if len(set(positions)) > 1:
+            axes.plot(positions, [mark.quality for mark in marks], color=colour, linewidth=1.4, zorder=2)
+        for position, mark in zip(positions, marks, strict=True):
             offsets = np.nan_to_num([[mark.quality - mark.low], [mark.high - mark.quality]])
             axes.errorbar(
-                place,
+                position,
                 mark.quality,
                 yerr=offsets,
                 fmt=MARKERS[mark.category],
@@ -235,10 +235,10 @@ def _name_all(axes: Axes, panel: Frontier, costs: Costs) -> None:
     for marks in joined:
         names.keep_clear_line([(costs.position(mark), mark.quality) for mark in marks])
         for mark in marks:
-            place = costs.position(mark)
-            names.keep_clear(place, mark.quality, 11)
+            position = costs.position(mark)
+            names.keep_clear(position, mark.quality, 11)
             if np.isfinite(mark.low):
-                names.keep_clear_line([(place, mark.low), (place, mark.high)])
+                names.keep_clear_line([(position, mark.low), (position, mark.high)])
     for categories in (OFFLINE, (ONLINE,)):
         names.keep_clear_line(_front(panel, categories, costs))
     for line in lines:

@@ -40,13 +40,13 @@ def _shares(axes: Axes, ranks: Ranks) -> None:
         percent = 100 * shares[row, column]
         colour = "white" if shares[row, column] > DARK else "black"
         axes.text(column, row, f"{percent:.0f}" if percent >= 1 else "<1", ha="center", va="center", color=colour)
-    for row, place in enumerate(ranks.nominal_places):
+    for row, position in enumerate(ranks.nominal_positions):
         axes.add_patch(
-            Rectangle((place - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
+            Rectangle((position - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
         )
     names = [textwrap.fill(label, NAME, max_lines=2, placeholder="...") for label in ranks.methods]
     axes.set_yticks(range(count), names, parse_math=False, fontsize=8)
-    axes.set_xticks(range(count), [str(place) for place in range(1, count + 1)])
+    axes.set_xticks(range(count), [str(rank) for rank in range(1, count + 1)])
     axes.set_xticks(np.arange(count + 1) - 0.5, minor=True)
     axes.set_yticks(np.arange(count + 1) - 0.5, minor=True)
     axes.grid(which="minor", color="#E5E5E5", linewidth=0.6)

@@ -12,7 +12,7 @@ from ...display.simulated.profile import load_profile
 from ...study.focal_stacks import planes_of
 from ...study.plan import changed, displays, scored_dataset
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
-from .text import FILES, Text, from_files, plain, text_of
+from .text import FILES, Text, plain, text_of
 
 if TYPE_CHECKING:
     from ...study.config import Study
@@ -111,9 +111,8 @@ class Layout:
     @property
     def text(self) -> Text:
         """What is compared, in words."""
-        if self.measure == FILES:
-            return from_files(self.values)
-        return text_of(self.measure, self.holograms.partition(" (")[0], self.learned_display is not None, self.real)
+        holograms = self.holograms.partition(" (")[0]
+        return text_of(self.measure, holograms, self.learned_display is not None, self.real, self.values)
 
     def marked(self, label: str) -> str:
         """A method's label, marked when it is the oracle."""

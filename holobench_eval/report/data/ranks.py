@@ -137,23 +137,23 @@ class Ranks:
         return np.stack([self.quality[label][1:][self.used] for label in self.methods], axis=1)
 
     @cached_property
-    def nominal_places(self) -> Array:
+    def nominal_positions(self) -> Array:
         """``(methods,)`` from 1; equal means share the better place."""
-        return places(self.nominal)
+        return positions(self.nominal)
 
     @cached_property
-    def places(self) -> Array:
+    def positions(self) -> Array:
         """``(draws, methods)`` from 1; equal means share the better place."""
-        return places(self.drawn)
+        return positions(self.drawn)
 
     @cached_property
     def shares(self) -> Array:
-        """``(methods, places)`` share of draws in which a method has a place."""
-        return np.stack([(self.places == place).mean(axis=0) for place in range(1, len(self.methods) + 1)], axis=1)
+        """``(methods, positions)`` share of draws in which a method has a place."""
+        return np.stack([(self.positions == rank).mean(axis=0) for rank in range(1, len(self.methods) + 1)], axis=1)
 
     def first(self, label: str) -> Estimate:
         """Share of draws in which a method is first."""
-        return share(int((self.places[:, self.methods.index(label)] == 1).sum()), len(self.used))
+        return share(int((self.positions[:, self.methods.index(label)] == 1).sum()), len(self.used))
 
     @cached_property
     def taus(self) -> Array:
@@ -169,7 +169,7 @@ class Ranks:
     @property
     def unchanged(self) -> int:
         """Draws in which every method has its nominal place."""
-        return int((self.places == self.nominal_places).all(axis=1).sum())
+        return int((self.positions == self.nominal_positions).all(axis=1).sum())
 
     @cached_property
     def features(self) -> list[Feature]:
@@ -202,7 +202,7 @@ class Ranks:
         return len(self.features) * sum(pair.flips > 0 for pair in self.pairs)
 
 
-def places(quality: Array) -> Array:
+def positions(quality: Array) -> Array:
     """Places from 1 along the last axis, the largest first; equal values share the better place."""
     ranks: Array = stats.rankdata(-quality, method="min", axis=-1).astype(np.float64)
     return ranks

@@ -86,12 +86,12 @@ class Results:
 
     def methods(self, condition: str) -> list[str]:
         """Labels with a row under ``condition``, in the order of the table."""
-        return [label for label, place in self._rows if place == condition]
+        return [label for label, name in self._rows if name == condition]
 
     def lost(self, label: str, before: str, condition: str) -> Estimate | None:
         """Headline score before a change minus that after it, target by target, so that a loss is positive where higher
         is better; None without a complete pair of rows."""
-        rows = [name for name in (before, condition) if label in self.methods(name) and self.whole(label, name)]
+        rows = [name for name in (before, condition) if label in self.methods(name) and self.is_complete(label, name)]
         if len(rows) < 2:
             return None
         sign = 1 if self.headline.higher_is_better else -1
@@ -112,7 +112,7 @@ class Results:
 
     @cached_property
     def _groups(self) -> dict[tuple[str, str], pd.DataFrame]:
-        return {(str(label), str(place)): rows for (label, place), rows in self.frame.groupby(["method", "condition"])}
+        return {(str(label), str(name)): rows for (label, name), rows in self.frame.groupby(["method", "condition"])}
 
     def values(self, label: str, condition: str, key: str | None = None) -> Array:
         """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
@@ -126,7 +126,7 @@ class Results:
         """Every number of a method under a condition, a row for each of ``targets``."""
         return {pair: per_target(rows).reindex(self.targets) for pair, rows in self._groups.items()}
 
-    def whole(self, label: str, condition: str, key: str | None = None) -> bool:
+    def is_complete(self, label: str, condition: str, key: str | None = None) -> bool:
         """Whether a method has a value for every target: only then may its mean be compared."""
         return not np.isnan(self.values(label, condition, key)).any()
 
@@ -138,7 +138,7 @@ class Results:
         return [
             label
             for label in self.methods(condition)
-            if self.layout.category(label) in categories and self.whole(label, condition, key)
+            if self.layout.category(label) in categories and self.is_complete(label, condition, key)
         ]
 
     def ranking(self, condition: str, key: str | None = None, categories: Sequence[str] = OFFLINE) -> list[str]:
@@ -163,9 +163,9 @@ class Results:
     def gain(self, label: str, condition: str) -> Estimate | None:
         """Headline score minus that of the baseline, target by target; None without a complete pair of rows."""
         baseline = self.layout.baseline
-        if baseline not in self.methods(condition) or not self.whole(baseline, condition):
+        if baseline not in self.methods(condition) or not self.is_complete(baseline, condition):
             return None
-        if not self.whole(label, condition):
+        if not self.is_complete(label, condition):
             return None
         return bootstrap_mean(self.values(label, condition) - self.values(baseline, condition))
 

@@ -65,17 +65,17 @@ def bootstrap_mean(values: Sequence[float] | Array) -> Estimate:
     return Estimate(mean, float(low), float(high), n)
 
 
-def bootstrap_ratio(part: Array, whole: Array) -> Estimate:
+def bootstrap_ratio(numerator: Array, denominator: Array) -> Estimate:
     """Ratio of two means over the same targets, each ``(n,)``, and its percentile interval over resampled targets, with
     the expansion of ``bootstrap_mean``."""
-    n = part.size
-    ratio = float(part.mean() / whole.mean())
+    n = numerator.size
+    ratio = float(numerator.mean() / denominator.mean())
     if n < FEWEST:
         return Estimate(ratio, np.nan, np.nan, n)
     tail = _tail(n)
     chosen = _resamples(n)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = part[chosen].mean(axis=1) / whole[chosen].mean(axis=1)
+        ratios = numerator[chosen].mean(axis=1) / denominator[chosen].mean(axis=1)
     low, high = np.quantile(ratios, [tail, 1 - tail])
     return Estimate(ratio, float(low), float(high), n)
 

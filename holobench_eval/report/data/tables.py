@@ -25,15 +25,13 @@ from .text import FILES
 
 TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
 LEARNED_COLUMN = "learned_sha256"
-TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)
-"""Of studies with a method that was trained; others have no such columns."""
-MEMORY_COLUMN = "memory_mib"
-STOPPED_COLUMN = "stopped"
-"""Of studies in which a solution's memory was measured, or the display stopped a method; others lack them."""
+TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)  # of studies that train a method
+MEMORY_COLUMN = "memory_mib"  # of studies that measured the memory of a solution
+STOPPED_COLUMN = "stopped"  # of studies in which the display stopped a method
+# Reports of earlier versions lack these two, and the columns that are computed from them. Alone: 1 where nothing else
+# was at work beside a solution, else 0.
 ALONE_COLUMN = "timed_alone"
-"""1 where nothing else was at work beside a solution, else 0; reports of earlier versions lack it."""
 CATEGORY_COLUMN = "track"
-"""Which reports of earlier versions lack, and with it the columns that are computed from it."""
 MEASURED_COLUMNS = ("captures", "seconds", "registration_residual_px", "saturated")
 IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol")
 
@@ -115,10 +113,10 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
 
 def row_order(frame: pd.DataFrame, layout: Layout) -> list[tuple[str, str]]:
     """(method, condition) of every row: planned pairs, pairs outside the plan by name, then the reference rows."""
-    found = set(zip(frame["method"], frame["condition"], strict=True))
-    floors = [(name, REFERENCE) for name in FLOORS if (name, REFERENCE) in found]
-    extra = sorted(found - set(layout.pairs) - set(floors))
-    return [*(pair for pair in layout.pairs if pair in found), *extra, *floors]
+    pairs = set(zip(frame["method"], frame["condition"], strict=True))
+    floors = [(name, REFERENCE) for name in FLOORS if (name, REFERENCE) in pairs]
+    extra = sorted(pairs - set(layout.pairs) - set(floors))
+    return [*(pair for pair in layout.pairs if pair in pairs), *extra, *floors]
 
 
 def _sorted(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
@@ -206,9 +204,9 @@ def _ranked(table: pd.DataFrame, targets: int, layout: Layout) -> pd.DataFrame:
     """
     score = parse(layout.headline)
     if score.key in table:
-        whole = (table["n"] == targets) & table[score.key].notna() & ~table[CATEGORY_COLUMN].isin(("", ORACLE))
-        groups = table[whole].groupby(["condition", CATEGORY_COLUMN])[score.key]
-        table.loc[whole, "rank"] = groups.rank(method="min", ascending=not score.higher_is_better)
+        ranked = (table["n"] == targets) & table[score.key].notna() & ~table[CATEGORY_COLUMN].isin(("", ORACLE))
+        groups = table[ranked].groupby(["condition", CATEGORY_COLUMN])[score.key]
+        table.loc[ranked, "rank"] = groups.rank(method="min", ascending=not score.higher_is_better)
     return table
 
 

@@ -222,22 +222,12 @@ GIVEN = replace(
 )
 
 
-def from_files(values: str) -> Text:
-    """The words for pictures that were given as files; values: how they were read."""
-    text = replace(GIVEN, compared=_COMPARED[values])
-    if values != "stored":
-        return text
-    return replace(
-        text,
-        domains=(
-            "Values as stored: the numbers in the files over their full scale, without any decoding. If the pictures "
-            "are sRGB, as most are, equal differences of values are not equal differences of light, and these scores "
-            "must not stand beside those in linear light. Perceptual metrics take the values for display-encoded "
-            "pictures, as they are defined."
-        ),
-    )
-
-
+AS_STORED = (
+    "Values as stored: the numbers in the files over their full scale, without any decoding. If the pictures are sRGB, "
+    "as most are, equal differences of values are not equal differences of light, and these scores must not stand "
+    "beside those in linear light. Perceptual metrics take the values for display-encoded pictures, as they are "
+    "defined."
+)
 REAL = (
     "The display is a real bench that was photographed. Listed are its nominal optics, which methods know; what "
     "separates it from them nobody knows."
@@ -248,19 +238,21 @@ REAL_SEEDS = (
 )
 
 
-def text_of(measure: str, holograms: str, on_a_network: bool, real: bool = False) -> Text:
-    """The words for a measure; holograms: the method whose captures are predicted; real: whether the display exists."""
-    words = _of_measure(measure, holograms, on_a_network)
-    return replace(words, displays=REAL, seeds=REAL_SEEDS) if real else words
+_BY_MEASURE = {"picture": PICTURE, "prediction": PREDICTION, "focus": FOCUS, FILES: GIVEN}
 
 
-def _of_measure(measure: str, holograms: str, on_a_network: bool) -> Text:
-    if measure == "prediction":
-        return replace(
-            PREDICTION,
-            procedure=PREDICTION.procedure.replace("{holograms}", holograms),
-            picture=PREDICTION.picture.replace("{holograms}", holograms),
-        )
-    if measure == "focus":
-        return FOCUS
-    return ON_A_NETWORK if on_a_network else PICTURE
+def text_of(
+    measure: str, holograms: str = "", on_a_network: bool = False, real: bool = False, values: str = "stored"
+) -> Text:
+    """The words for a measure.
+
+    holograms: the method whose captures are predicted; real: whether the display exists; values: how pictures were read
+    that were given as files.
+    """
+    text = ON_A_NETWORK if on_a_network and measure == "picture" else _BY_MEASURE[measure]
+    if measure == FILES:
+        text = replace(text, compared=_COMPARED[values], domains=AS_STORED if values == "stored" else text.domains)
+    if real:
+        text = replace(text, displays=REAL, seeds=REAL_SEEDS)
+    procedure, picture = (words.replace("{holograms}", holograms) for words in (text.procedure, text.picture))
+    return replace(text, procedure=procedure, picture=picture)

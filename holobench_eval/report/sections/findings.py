@@ -104,7 +104,7 @@ def _leading(results: Results, condition: str, ranking: Sequence[str], among: st
 
 def _incomplete(results: Results, condition: str) -> list[str]:
     plain = [label for label in results.methods(condition) if label not in results.layout.privileged]
-    holes = [label for label in plain if not results.whole(label, condition)]
+    holes = [label for label in plain if not results.is_complete(label, condition)]
     counts = [f"{label} ({int(results.row(label, condition)['n'])} of {len(results.targets)})" for label in holes]
     return [f"Not ranked, since they lack targets: {', '.join(counts)}."] if holes else []
 

@@ -163,11 +163,11 @@ def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
             **_ends(results, name, condition),
         )
         for name in results.methods(condition)
-        if results.layout.category(name) != ORACLE and results.whole(name, condition)
+        if results.layout.category(name) != ORACLE and results.is_complete(name, condition)
         if np.isfinite(spent := cost.spent(results, name, condition))
     )
     baseline, oracle = results.layout.baseline, results.oracle(condition)
-    floor = baseline if baseline in results.methods(condition) and results.whole(baseline, condition) else None
+    floor = baseline if baseline in results.methods(condition) and results.is_complete(baseline, condition) else None
     return Frontier(
         condition,
         marks,
@@ -212,7 +212,7 @@ def _caption(results: Results, panels: list[Frontier], cost: Cost) -> str:
     if any(panel.oracle for panel in panels):
         sentences.append("The upper line is the privileged ceiling, with its interval as a band.")
     rows = [(name, condition) for condition in results.conditions for name in results.methods(condition)]
-    lacking = sorted({name for name, condition in rows if not results.whole(name, condition)})
+    lacking = sorted({name for name, condition in rows if not results.is_complete(name, condition)})
     if lacking:
         sentences.append(f"Left out where they lack a target: {words(lacking)}.")
     return " ".join(sentences)

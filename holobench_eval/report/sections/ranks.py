@@ -47,10 +47,10 @@ def methods(ranks: Ranks) -> Markdown:
     columns = ["method", "nominal rank", "first in [% of draws]", "mean rank", "best rank", "worst rank"]
     rows = []
     for index, label in enumerate(ranks.methods):
-        column = ranks.places[:, index]
+        column = ranks.positions[:, index]
         first = percent(ranks.first(label))
         ends = (f"{column.min():.0f}", f"{column.max():.0f}")
-        rows.append([label, f"{ranks.nominal_places[index]:.0f}", first, f"{column.mean():.1f}", *ends])
+        rows.append([label, f"{ranks.nominal_positions[index]:.0f}", first, f"{column.mean():.1f}", *ends])
     return table(columns, rows)
 
 
@@ -150,8 +150,8 @@ def _agreement(ranks: Ranks) -> list[str]:
 
 
 def _winner(ranks: Ranks) -> str:
-    counts = {label: int((ranks.places[:, index] == 1).sum()) for index, label in enumerate(ranks.methods)}
-    winners = [label for label, place in zip(ranks.methods, ranks.nominal_places, strict=True) if place == 1]
+    counts = {label: int((ranks.positions[:, index] == 1).sum()) for index, label in enumerate(ranks.methods)}
+    winners = [label for label, rank in zip(ranks.methods, ranks.nominal_positions, strict=True) if rank == 1]
     firsts = [f"{label} in {counts[label]} of {len(ranks.used)} ({percent(ranks.first(label))} %)" for label in winners]
     sentence = f"First on the nominal display, and over the draws: {words(firsts)}"
     others = sorted((label for label in counts if label not in winners and counts[label]), key=lambda x: -counts[x])

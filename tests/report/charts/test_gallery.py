@@ -13,7 +13,7 @@ from holobench_eval.report.charts.gallery import (
     spread,
 )
 from holobench_eval.report.charts.style import slugs
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 
 def noise(size, seed=0):
@@ -77,7 +77,7 @@ def test_an_absent_capture_leaves_a_note_in_its_place(tmp_path):
 
 
 def test_gray_thumbnails_are_read_as_colour(tmp_path):
-    made.save_picture(tmp_path / "gray.png", np.full((8, 8), 0.5))
+    synthetic.save_picture(tmp_path / "gray.png", np.full((8, 8), 0.5))
     assert load_picture(tmp_path / "gray.png").shape == (8, 8, 3)
     assert load_picture(tmp_path / "absent.png") is None
 

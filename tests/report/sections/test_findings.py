@@ -5,7 +5,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.sections.findings import findings
 from holobench_eval.study.plan import REFERENCE
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 TARGETS = tuple(f"t{index}" for index in range(8))
 NOISE = np.array([0.0, 0.3, -0.2, 0.1, 0.4, -0.1, 0.2, -0.3])
@@ -19,10 +19,10 @@ def results_of(scores, targets=TARGETS, **changes):
         for index, target in enumerate(targets):
             found = {key: float(values[index]) for key, values in columns.items() if not np.isnan(values[index])}
             state = {"state": "done"} if found else {"state": "failed", "reason": "lost"}
-            records.append(made.record(label, made.cell(label, target, condition), found, **state))
+            records.append(synthetic.record(label, synthetic.cell(label, target, condition), found, **state))
     labels = tuple((label, "bench") for label in scores if not label.startswith("floor_"))
     given = {"pairs": labels, "targets": targets, "baseline": "old", "reported": {}, "privileged": frozenset()}
-    layout = made.layout(**(given | changes))
+    layout = synthetic.layout(**(given | changes))
     return Results(records_frame(records, layout), layout)
 
 

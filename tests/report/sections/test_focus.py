@@ -14,7 +14,7 @@ from holobench_eval.report.data.text import text_of
 from holobench_eval.report.section import Report
 from holobench_eval.report.sections.comparison import pages_of_targets
 from holobench_eval.report.sections.focus import SECTIONS, by_plane, sentences
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 PLANES = {
     f"{scene}@{plane:g}mm": (scene, plane) for scene in ("shapes", "motorcycle", "room") for plane in (-2.0, 0.0, 2.0)
@@ -34,8 +34,8 @@ def results_of(quality: dict[str, float], noise: float = 0.2, **changes: Any) ->
                 "psnr_linear_infocus": value,
                 "ssim_linear_infocus": 0.5,
             }
-            described = made.cell(label, target, "bench", measure="focus")
-            records.append(made.record(label, described, scores, seconds=SECONDS[label]))
+            described = synthetic.cell(label, target, "bench", measure="focus")
+            records.append(synthetic.record(label, described, scores, seconds=SECONDS[label]))
     given = {
         "pairs": tuple((label, "bench") for label in quality),
         "targets": tuple(PLANES),
@@ -47,7 +47,7 @@ def results_of(quality: dict[str, float], noise: float = 0.2, **changes: Any) ->
         "privileged": frozenset(),
         "reported": {},
     }
-    layout = made.layout(**(given | changes))
+    layout = synthetic.layout(**(given | changes))
     return Results(records_frame(records, layout), layout)
 
 
@@ -104,11 +104,11 @@ def test_blur_is_compared_with_whole_pictures() -> None:
 def test_a_sheet_shows_every_plane_of_a_scene(tmp_path: Path) -> None:
     report = report_of(results_of({"lens": 20.0}), tmp_path)
     for target in PLANES:
-        made.save_picture(report.thumbnails.store.target_thumbnail(target), np.zeros((8, 8, 3)))
+        synthetic.save_picture(report.thumbnails.store.target_thumbnail(target), np.zeros((8, 8, 3)))
     sheets = pages_of_targets(report, "bench")
     assert [len(sheet) for sheet in sheets] == [3, 3, 3]
     assert sheets[1] == ["motorcycle@-2mm", "motorcycle@0mm", "motorcycle@2mm"]
 
 
 def test_the_words_say_what_the_display_does() -> None:
-    assert "adds the phase of a lens" in text_of("focus", "", False).procedure
+    assert "adds the phase of a lens" in text_of("focus").procedure

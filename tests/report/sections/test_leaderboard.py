@@ -8,7 +8,7 @@ from holobench_eval.report.sections.leaderboard import leaderboard, reading
 from holobench_eval.report.sections.results import stopped
 from holobench_eval.study.plan import REFERENCE
 from tests.support import budget_study as budget
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 NEW = ("track", "rank", "total_captures", "memory_mib", "stopped")
 
@@ -131,7 +131,7 @@ def test_a_study_without_captures_has_no_leaderboard(records):
 
 def test_the_table_follows_from_the_written_records(records):
     ended = [record | {"stopped": "over, and out"} for record in records]
-    floor = made.record("floor_black", made.cell("floor_black", "coffee", REFERENCE), {"psnr_linear": 1.0})
+    floor = synthetic.record("floor_black", synthetic.cell("floor_black", "coffee", REFERENCE), {"psnr_linear": 1.0})
     found = results([*ended, floor])
     assert recompute_table(csv_text(found.frame), found.layout) == csv_text(found.table)
 

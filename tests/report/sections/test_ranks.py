@@ -18,11 +18,11 @@ from holobench_eval.report.data.ranks import ranks, share
 from holobench_eval.report.description import Description
 from holobench_eval.report.sections import ranks as section_ranks
 from holobench_eval.study.config import load_study
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 Quality = Callable[[Mapping[str, float]], float]
 
-DISPLAY, COUNT, TARGETS = "leto-aged", 30, made.TARGETS[:3]
+DISPLAY, COUNT, TARGETS = "leto-aged", 30, synthetic.TARGETS[:3]
 LEVELS = dict(zip(TARGETS, (-2.0, 0.5, 1.5), strict=True))
 PROFILE = load_profile(DISPLAY)
 NOMINAL = {"crosstalk": 0.45, "zero_phase": -0.5, "astigmatism": 0.05, "gamma": 1.28}
@@ -35,9 +35,9 @@ def study(methods: Mapping[str, Quality], count: int = COUNT, **changes):
     drawn = tuple(draws.values(PROFILE, index) for index in range(1, count + 1))
     conditions = {DISPLAY: NOMINAL} | {f"{DISPLAY}, draw {i}": values for i, values in enumerate(drawn, start=1)}
     records = [
-        made.record(
+        synthetic.record(
             label,
-            made.cell("sgd", target, condition, params={"label": label}),
+            synthetic.cell("sgd", target, condition, params={"label": label}),
             {"psnr_linear": quality(values) + level},
         )
         for label, quality in methods.items()
@@ -94,7 +94,7 @@ def test_a_method_that_wins_above_the_middle_of_a_parameter_flips_there_and_the_
 def test_places_and_agreement_follow_from_the_order_of_each_draw():
     one = found(FLIPPING)
     high = np.array([values["crosstalk"] > MIDDLE for values in one.swept.drawn])
-    assert one.places.tolist() == [[1, 2, 3] if up else [2, 1, 3] for up in high]
+    assert one.positions.tolist() == [[1, 2, 3] if up else [2, 1, 3] for up in high]
     assert one.taus == pytest.approx(np.where(high, 1.0, 1 / 3))
     assert one.unchanged == high.sum()
     assert one.tau.low < one.taus.mean() < one.tau.high
@@ -132,7 +132,7 @@ def test_methods_that_are_far_apart_never_flip():
 
 def test_ties_share_the_first_place_flip_nothing_and_have_no_tau(tmp_path):
     one = found({"a": lambda v: 20.0, "b": lambda v: 20.0})
-    assert (one.places == 1).all()
+    assert (one.positions == 1).all()
     assert one.first("a").mean == one.first("b").mean == 1
     assert one.pairs[0].flips == 0
     assert len(one.taus) == 0

@@ -14,7 +14,7 @@ from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.sweeps import Sweep, sweeps
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.report.sections import sweeps as section_sweeps
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 TARGETS = ("a", "b", "c", "d")
 DAYS = (30.0, 60.0, 90.0)
@@ -42,7 +42,7 @@ def layout() -> Layout:
         for kind, values in kinds.items()
     )
     conditions = ["leto-aged", *(name for one in swept for _, name in one.points)]
-    return made.layout(
+    return synthetic.layout(
         pairs=tuple((label, condition) for label in NAMES for condition in conditions),
         targets=TARGETS,
         privileged=frozenset(),
@@ -51,16 +51,16 @@ def layout() -> Layout:
     )
 
 
-def records() -> list[made.Record]:
+def records() -> list[synthetic.Record]:
     found = []
     points = [("", 0.0, "leto-aged")]
     points += [(one.kind, value, name) for one in layout().sweeps for value, name in one.points]
     for label, name in NAMES.items():
         for target in TARGETS:
             for kind, value, condition in points:
-                described = made.cell(name, target, condition, profile="leto-aged")
+                described = synthetic.cell(name, target, condition, profile="leto-aged")
                 scores = {"psnr_linear": psnr(label, target, kind, value)}
-                found.append(made.record(label, described, scores))
+                found.append(synthetic.record(label, described, scores))
     return found
 
 

@@ -12,9 +12,9 @@ from holobench_eval.report.charts.training import CURVES, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
 from holobench_eval.study.training_log import Round, rounds_in, rounds_of
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
-TARGETS = made.TARGETS[1:4]
+TARGETS = synthetic.TARGETS[1:4]
 PAIRS = (("GS", "leto-aged"), ("HIL", "leto-aged"), ("U-Net", "leto-aged"))
 TRAINING = TrainingSet("dead_leaves (count = 24, seed = 0)", 24, 4, 200)
 COLUMNS = "round,step,predicted_psnr,captured_psnr,fidelity_psnr,captures,seconds,l1,perceptual,adversarial,total,judge"
@@ -28,7 +28,7 @@ LOG = f"""{COLUMNS}
 
 def layout(**changes):
     given = {"targets": TARGETS, "pairs": PAIRS, "reported": {}, "baseline": "GS", "privileged": frozenset()}
-    return made.layout(**(given | {"trained": frozenset({"HIL", "U-Net"}), "training": TRAINING} | changes))
+    return synthetic.layout(**(given | {"trained": frozenset({"HIL", "U-Net"}), "training": TRAINING} | changes))
 
 
 def description(method):
@@ -54,13 +54,13 @@ def keep(output, name, log=LOG, **facts):
 def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     records = []
-    for record in made.study(folder, size=32, targets=TARGETS):
+    for record in synthetic.study(folder, size=32, targets=TARGETS):
         if record["label"] in ("HIL", "SGD") and record["cell"]["condition"] == "leto-aged":
             label, method = {"HIL": ("HIL", "hil"), "SGD": ("U-Net", "unet")}[record["label"]]
             records.append(trained(record | {"label": label}, method))
         elif record["label"] == "GS" and record["cell"]["condition"] == "leto-aged":
             records.append(record | {"learned": None})
-        elif record["cell"]["condition"] == made.REFERENCE:
+        elif record["cell"]["condition"] == synthetic.REFERENCE:
             records.append(record)
     return records
 
@@ -200,7 +200,7 @@ def test_predictions_on_another_display_are_not_set_beside_captures_of_the_first
     records = [record for record in found if record["label"] != "GS"]
     elsewhere = [
         record | {"cell": record["cell"] | {"profile": "other"}}
-        if record["cell"]["condition"] == made.REFERENCE
+        if record["cell"]["condition"] == synthetic.REFERENCE
         else record
         for record in records
     ]
