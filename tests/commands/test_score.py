@@ -164,7 +164,7 @@ def test_a_capture_of_another_picture_and_a_lacking_one_are_holes(pictures, quic
     text = run(pictures)
     assert "the target is not found in the capture" in text
     assert "no capture of 'astronaut' in the folder of clean" in text
-    assert "Refused, and without a score: 1 capture." in text
+    assert "Refused, without a score: 1 capture." in text
     assert "is the same picture as" in text
     cells = pd.read_csv(pictures / "out" / "records.csv")
     holes = cells[cells["state"] != "done"]

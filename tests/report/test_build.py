@@ -113,7 +113,7 @@ def test_a_reader_is_told_what_was_at_work_beside_what_was_timed(records, tmp_pa
     noted = [record | {"memory_mib": 9.0, "alone": record["cell"]["target"] == TARGETS[0]} for record in kept]
     text = write_report(layout, noted, tmp_path, PROVENANCE, DESCRIPTION)[0].read_text()
     assert "Seconds and memory are the first measurement on this machine" in text
-    assert "The seconds are of one hologram a row, computed with nothing beside it. Memory is" in text
+    assert "Seconds are those of one hologram per row, timed alone. Memory is" in text
 
 
 @pytest.mark.parametrize(("wanted", "missed"), [(None, True), (("psnr", "lpips_alex"), True), (("psnr",), False)])
@@ -144,7 +144,7 @@ def test_missing_thumbnails_are_said_and_stop_nothing(records, tmp_path):
     kept, layout = minimal(found)
     text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert "There is no comparison figure" in text
-    assert "Thumbnails that were expected and are not there (3): target-chelsea.png" in text
+    assert "Missing thumbnails (3): target-chelsea.png" in text
     assert "No description of the displays was recorded." in text
     assert "The environment was not recorded." in text
 
@@ -155,7 +155,7 @@ def test_missing_thumbnails_are_said_and_stop_nothing(records, tmp_path):
     synthetic.save_picture(store.folder / f"{synthetic.digest(one['cell'])}.png", np.full((48, 48, 3), 0.4))
     text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert "(figures/comparison-leto-aged-1.jpg)" in text
-    assert "Thumbnails that were expected and are not there (7)" in text
+    assert "Missing thumbnails (7)" in text
 
 
 def test_hostile_names_stay_text(records, tmp_path):

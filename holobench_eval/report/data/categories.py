@@ -17,12 +17,12 @@ OFFLINE = (OPEN_LOOP, CALIBRATED, GIVEN)
 
 _MEANINGS = {
     OPEN_LOOP: "knows the nominal optics and takes no captures at all.",
-    CALIBRATED: "was trained on captures of other images before any target was seen, and takes none of a scored "
-    "image; its captures are spent once, however many images follow.",
-    ONLINE: "sees, through the camera, captures of the very image that is scored while it solves; it spends captures "
-    "on every image, and needs the camera in front of the display for as long as the display is in use.",
+    CALIBRATED: "is trained on captures of other images before any target is seen, and takes none of a scored image; "
+    "its captures are spent once, for any number of images.",
+    ONLINE: "captures the scored image itself while it solves; it spends captures on every image, and needs a camera "
+    "in front of the display in use.",
     ORACLE: "may differentiate through the simulated bench, which no real method can, and is not ranked.",
-    GIVEN: "gave pictures alone; what it was given of the camera is not known.",
+    GIVEN: "gave pictures only; its access to the camera is unknown.",
 }
 
 

@@ -36,22 +36,22 @@ def sentences(results: Results, records: Records) -> list[str]:
     kinds = [record["cell"]["geometry"]["kind"] for record in _captures(records)]
     shared, own, none = (kinds.count(kind) for kind in ("shared", "own", "none"))
     lines = [
-        "The geometry comes from the images and not from fiducials: features or templates propose where a target lies "
-        "in its capture, and the enhanced correlation coefficient refines the homography. No score takes part."
+        "The geometry comes from the images, not from fiducials: features or templates locate a target in its capture, "
+        "and the enhanced correlation coefficient refines the homography. No score is used."
     ]
     if shared:
         lines.append(
-            f"One shared alignment for {_count(shared)} in one pose: their own alignments agree within a pixel and "
-            "were averaged, so that none has an alignment better fitted to it than another. A capture that gave "
-            "none of its own is among them only where the shared one fits it."
+            f"One shared alignment for {_count(shared)} in one pose: the mean of their own alignments, which agree "
+            "within a pixel, so that none is better fitted than another. A capture without an alignment of its own is "
+            "included only if the shared one fits it."
         )
     if own:
         lines.append(
             f"An alignment of its own for {_count(own)}: no other capture of its size agrees with it within a pixel. "
-            "Each has an error of its own, which counts in its score."
+            "Its error affects its score."
         )
     if none:
-        lines.append(f"Refused, and without a score: {_count(none)}.")
+        lines.append(f"Refused, without a score: {_count(none)}.")
     return [*lines, *filter(None, [agreement(results)])]
 
 
@@ -115,15 +115,15 @@ def agreement(results: Results) -> str:
         differences = done[f"{score.key}_second"] - done[score.key]
         names = done["method"] + ", " + done["target"].astype(str)
         apart = {name: value for name, value in zip(names, differences, strict=True) if np.isfinite(value)}
-    silent = f" It has no opinion of {_count(len(done) - len(apart))}." if len(apart) < len(done) else ""
+    silent = f" It cannot judge {_count(len(done) - len(apart))}." if len(apart) < len(done) else ""
     if not apart:
-        return "Warning: the second aligner has no opinion of any capture."
+        return "Warning: the second aligner cannot judge any capture."
     most = max(apart.values(), key=abs)
     beyond = [f"{name}: {value:+.2f} dB" for name, value in apart.items() if abs(value) > AGREE]
     if not beyond:
         return (
             f"A second aligner, which shares no algorithm with the first, agrees within {AGREE} dB on "
-            f"{_count(len(apart))}; it differs by {most:+.2f} dB at most.{silent}"
+            f"{_count(len(apart))}; its largest difference is {most:+.2f} dB.{silent}"
         )
     return (
         f"Warning: a second aligner, which shares no algorithm with the first, gives scores that differ by more than "

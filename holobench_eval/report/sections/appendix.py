@@ -42,9 +42,9 @@ def _notes(report: Report) -> Iterator[tuple[str, object]]:
     lit = " and the efficiency (light in the scored region over light on the panel)" * ("efficiency" in results.frame)
     yield (
         "Intensity match",
-        f"One least-squares factor per colour channel, {text.compared}, without offset, clipped to [0, 1] after. It "
-        f"hides wasted light, so the factors, the brightness ratio (mean of the {text.scored} over mean of the "
-        f"{text.truth}, before the match){lit} are given under "
+        f"One least-squares factor per colour channel, {text.compared}, without offset, then clipped to [0, 1]. It "
+        f"hides wasted light; the factors, the brightness ratio (mean of the {text.scored} over mean of the "
+        f"{text.truth}, before the match){lit} are therefore given under "
         f'"{"Light" if files else "Captures, time and light"}".',
     )
     yield "Registration", _registration(results)
@@ -55,7 +55,7 @@ def _notes(report: Report) -> Iterator[tuple[str, object]]:
     yield (
         "Intervals",
         f"Percentile bootstrap of the mean over targets, {RESAMPLES:,} resamples, widened for small samples after "
-        "Hesterberg (2015). They say how the mean would vary with other targets of the same kind, not with other "
+        "Hesterberg (2015). They show how the mean varies with other targets of the same kind, not with other "
         f"displays{' or another training of the same method' * trained}.",
     )
     yield (
@@ -74,10 +74,7 @@ def _registration(results: Results) -> str:
     if layout.learned_display is not None:
         return "None: the network predicts in the frame of the target, and nothing is captured."
     if layout.measure == FILES:
-        return (
-            "None by fiducials. Each target was found in its capture by the two pictures alone, as told under "
-            '"Alignment".'
-        )
+        return 'No fiducials. Each target was located in its capture from the two pictures alone; see "Alignment".'
     changed = done["condition"].isin(layout.changed)
     named = done["condition"].where(~changed, "displays after a change")
     residuals = [
@@ -96,12 +93,9 @@ def _registration(results: Results) -> str:
 
 def _exposure(results: Results) -> str:
     if results.layout.learned_display is not None:
-        return "Without effect: there is no noise, so that the unit of light changes no score."
+        return "No effect: without noise the unit of light changes no score."
     if results.layout.measure == FILES:
-        return (
-            "Not known: pictures do not tell it, and the intensity match takes its effect on brightness away, not "
-            "that on noise."
-        )
+        return "Unknown. The intensity match removes its effect on brightness, not its effect on noise."
     known = EXPOSURES if results.layout.measure != "prediction" else EXPOSURES_PREDICTED
     policies = sorted(set(results.frame["exposure"]) - {""})
     return " ".join(known.get(policy, policy) for policy in policies) or "Not recorded."
@@ -114,7 +108,7 @@ def _saturation(results: Results) -> str:
     if not most >= 0:
         return "Not recorded."
     if results.layout.measure == FILES:
-        doubt = " Above 0.1 % highlights were cut, and a study on a bench would refuse the capture." * (most > 0.001)
+        doubt = " Above 0.1 % highlights are clipped; a study on a bench would refuse the capture." * (most > 0.001)
         return f"At most {100 * most:.3g} % of a capture's samples in the scored region are at full scale.{doubt}"
     refused = "; above 0.1 % a capture is refused" if results.layout.measure != "prediction" else ""
     return f"At most {100 * most:.3g} % of a capture's samples{refused}."

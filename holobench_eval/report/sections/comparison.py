@@ -24,10 +24,10 @@ def _render(report: Report, figures: Figures) -> Blocks:
     yield heading(text.looked_at)
     yield from figures
     if not figures:
-        yield f"There is no comparison figure, since there are no thumbnails of {text.scored}s."
+        yield f"There is no comparison figure: thumbnails of {text.scored}s are missing."
     if absent:
         named = ", ".join(absent[:ABSENT_NAMED]) + (", and others" if len(absent) > ABSENT_NAMED else "")
-        yield f"Thumbnails that were expected and are not there ({len(absent)}): {named}."
+        yield f"Missing thumbnails ({len(absent)}): {named}."
 
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
@@ -60,7 +60,7 @@ def _caption(results: Results, condition: str, page: str, drawn: int) -> str:
     chosen = "every target" if drawn == total else f"{drawn} of {total} targets, evenly spaced from worst to best"
     return (
         f"{text.scored.capitalize()}s on {condition}{page}: {chosen}. {text.picture}; below, the most detailed window "
-        f"of the {text.truth} enlarged twice as much, and the absolute error against the {text.truth} in sRGB."
+        f"of the {text.truth} at twice the scale, and the absolute error against the {text.truth} in sRGB."
     )
 
 

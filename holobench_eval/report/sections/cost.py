@@ -19,24 +19,24 @@ def _render(report: Report, _: Figures) -> Blocks:
     results, text = report.results, report.layout.text
     yield heading("Light" if report.layout.measure == FILES else "Captures, time and light")
     if report.layout.measure == FILES:
-        yield f"{text.effort} Match factors and brightness ratios are {text.compared}."
+        yield f"{text.effort} Match factors and brightness ratios are computed {text.compared}."
     else:
         memory = MEMORY_COLUMN in results.table
         sentences = [
             text.effort,
-            f"Seconds {'and memory ' * memory}are the first measurement on this machine, kept so that the same command "
-            "gives the same table.",
+            f"Seconds {'and memory ' * memory}are the first measurement on this machine; later runs keep it, so that "
+            "the same command gives the same table.",
             timing(results, report.provenance.get("workers", 1)),
         ]
         if memory:
             sentences.append(
-                f"Memory is the most that a {text.each} took beyond what the process held before it, the median over "
-                "targets, without any training."
+                f"Memory is the peak of a {text.each} above what the process held before it, the median over targets; "
+                "training is not included."
             )
         if report.trainings:
             sentences.append(
-                "Captures and seconds of training were spent once, before any target was seen, and are not part of "
-                "those per target."
+                "Captures and seconds of training were spent once, before any target was seen; those per target do not "
+                "include them."
             )
         yield " ".join(filter(None, sentences))
     yield report.by_display(_light_and_time)
@@ -67,20 +67,20 @@ def timing(results: Results, workers: int) -> str:
     Empty where a single worker left no note of it, as in records of earlier versions.
     """
     each, done, row = results.layout.text.each, results.done, ["method", "condition"]
-    together = f"{each}s computed {f'{workers} ' * (workers > 1)}side by side, which disturb each other"
+    inflated = f"timed with {f'{workers} ' * (workers > 1)}concurrent workers and are inflated"
     if ALONE_COLUMN not in done:
-        return f"The seconds are of {together}." if workers > 1 else ""
+        return f"Seconds were {inflated}." if workers > 1 else ""
     alone = done[done[ALONE_COLUMN] == 1]
     if alone.empty:
-        return f"The seconds are of {together}."
+        return f"Seconds were {inflated}."
     if len(alone) == len(done):
-        return f"Each {each} was computed with nothing beside it."
+        return f"Each {each} was timed alone."
     single = alone.groupby(row)["seconds"].nunique().max() == 1  # cells of one solution have one time
-    chosen = f"one {each} a row, computed" if single else f"those {each}s of a row that were computed"
+    chosen = f"one {each} per row," if single else f"the {each}s"
     timed = set(alone[row].itertuples(index=False, name=None))
     others = [pair for pair in done[row].drop_duplicates().itertuples(index=False, name=None) if pair not in timed]
-    rest = f"; those of {words([' on '.join(pair) for pair in others])} are of {together}" if others else ""
-    return f"The seconds are of {chosen} with nothing beside {'it' if single else 'them'}{rest}."
+    rest = f"; those of {words([' on '.join(pair) for pair in others])} were {inflated}" if others else ""
+    return f"Seconds are those of {chosen} timed alone{rest}."
 
 
 SECTIONS = (Section("cost", 170, _render),)

@@ -24,17 +24,17 @@ def _render(report: Report, _: Figures) -> Blocks:
     if estimated:
         yield heading("Diagnosis", 3)
         yield (
-            "What the learned models say of their displays, read so that it does not depend on what images leave open; "
-            "in brackets the truth of the simulated bench, which no method sees. The stated error is for a model that "
-            "learned from patterns which reach every level of the panel."
+            "Display parameters as the learned models estimate them, in forms that images determine; in brackets the "
+            "ground truth of the simulated bench, which no method sees. The stated error holds for a model that was "
+            "trained on patterns that reach every level of the panel."
         )
     for whose, rows, verdict in estimated:
         yield Markdown("**{}.** {}").format(whose, verdict)
         yield rows
     if lacking:
         yield (
-            "Effects of the benches that lie outside the form of the learned models, so that no values of their "
-            "parameters describe the display exactly:"
+            "Effects of the benches that the learned models cannot represent, so that no values of their parameters "
+            "describe the display exactly:"
         )
         yield bullets(lacking)
 
@@ -60,8 +60,8 @@ def missing(trainings: Sequence[Training]) -> list[str]:
         if isinstance(texts, list) and all(isinstance(text, str) for text in texts):
             lists.setdefault((item.display, tuple(texts)), []).extend(item.labels)
     return [
-        f"{display} has, and the form of the model of {', '.join(dict.fromkeys(labels))} has not: "
-        f"{'; '.join(texts) if texts else 'nothing'}."
+        f"{display} contains {'effects' if texts else 'no effect'} that {', '.join(dict.fromkeys(labels))} cannot "
+        f"represent{': ' * bool(texts)}{'; '.join(texts)}."
         for (display, texts), labels in lists.items()
     ]
 
@@ -125,7 +125,7 @@ def difference(row: Row) -> float:
 def _verdict(rows: Sequence[Row]) -> str:
     judged = [row for row in rows if _known(row.get("truth")) and _known(row.get("error"))]
     if not judged:
-        return "None of these has a truth and a stated error to be compared with."
+        return "None of these has a ground truth and a stated error to compare with."
     outside = [row for row in judged if abs(difference(row)) > row["error"]]
     if not outside:
         return f"All {len(judged)} numbers are within their stated errors."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -20,7 +21,7 @@ def _render(report: Report, _: Figures) -> Blocks:
     text = report.layout.text
     yield heading("Findings")
     yield (
-        f'Computed from the records of this study; "{report.results.headline.axis}"{text.axis} is the headline metric, '
+        f'Computed from the records of this study. The headline metric is "{report.results.headline.axis}"{text.axis}; '
         f"intervals are 95 %. {text.caution}"
     )
     for title, sentences in findings(report.results):
@@ -65,10 +66,8 @@ def _best(results: Results, condition: str) -> list[str]:
     ranking, text = results.ranking(condition), results.layout.text
     if not ranking:
         return ["No method has a score for every target, so none is ranked."]
-    among = text.best.format(count=len(ranking)) if len(ranking) > 1 else text.only
-    if ONLINE in results.categories:
-        among = f"Without the camera for the scored image, {among[0].lower()}{among[1:]}"
-    return _leading(results, condition, ranking, among)
+    predicate = text.best.format(count=len(ranking)) if len(ranking) > 1 else text.only
+    return _leading(results, condition, ranking, predicate, "without" if ONLINE in results.categories else "")
 
 
 def _best_online(results: Results, condition: str) -> list[str]:
@@ -76,37 +75,39 @@ def _best_online(results: Results, condition: str) -> list[str]:
     ranking = results.ranking(condition, categories=(ONLINE,))
     if not ranking:
         return []
-    among = f"best of the {len(ranking)} ranked methods" if len(ranking) > 1 else "the only ranked method"
-    return _leading(results, condition, ranking, f"With the camera for the scored image (online track), {among}")
+    predicate = f"ranks first of {len(ranking)} methods" if len(ranking) > 1 else "is the only ranked method"
+    return _leading(results, condition, ranking, f"{predicate} of the online track", "with")
 
 
-def _leading(results: Results, condition: str, ranking: Sequence[str], among: str) -> list[str]:
+def _leading(
+    results: Results, condition: str, ranking: Sequence[str], predicate: str, camera: Literal["", "with", "without"]
+) -> list[str]:
     """What the first of a ranking scores, and by how much it differs from the baseline (the baseline: from the next).
 
-    among: who was ranked, the beginning of the sentence.
+    predicate: what the first one does; camera: for the scored image, where that makes a difference.
     """
     score, baseline, best = results.headline, results.layout.baseline, ranking[0]
     row = results.row(best, condition)
     over = f"over {row['n']} target{'' if row['n'] == 1 else 's'}"
-    sentence = f"{among}: {best}, {score.title} {score.in_row(row)}{f' {score.unit}' if score.unit else ''} {over}"
-    if best == baseline:
-        compared, intro = list(ranking[1:2]), "; it is the baseline, and from it the next,"
-    else:
-        compared, intro = [best], f"; against the baseline {baseline}, which has"
+    seen = f", {camera} the camera for the scored image" if camera else ""
+    subject = f"The baseline {best}" if best == baseline else best
+    value = f"{score.in_row(row)}{f' {score.unit}' if score.unit else ''}"
+    sentence = f"{subject} {predicate}{seen}: {score.title} {value} {over}."
+    compared = ranking[1:2] if best == baseline else [best]
     for test in results.against_baseline:
         if test.condition == condition and test.second in compared and test.complete:
             if best == baseline:
-                return [f"{sentence}{intro} {test.second}, differs by {_margin(score, test)}."]
+                return [f"{sentence} {test.second} follows at {_margin(score, test)}."]
             other = score.with_unit(results.row(test.first, condition)[score.key])
-            return [f"{sentence}{intro} {other}: {_margin(score, test)}."]
-    return [f"{sentence}."]
+            return [f"{sentence} Difference from the baseline {baseline} ({other}): {_margin(score, test)}."]
+    return [sentence]
 
 
 def _incomplete(results: Results, condition: str) -> list[str]:
     plain = [label for label in results.methods(condition) if label not in results.layout.privileged]
     holes = [label for label in plain if not results.is_complete(label, condition)]
     counts = [f"{label} ({int(results.row(label, condition)['n'])} of {len(results.targets)})" for label in holes]
-    return [f"Not ranked, since they lack targets: {', '.join(counts)}."] if holes else []
+    return [f"Not ranked, because targets are missing: {', '.join(counts)}."] if holes else []
 
 
 def _other_metrics(results: Results, condition: str) -> list[str]:
@@ -129,7 +130,7 @@ def _oracle(results: Results, condition: str) -> list[str]:
         if label in results.layout.privileged and ranking and np.isfinite(value):
             gap = float(np.nanmean(results.values(label, condition) - results.values(ranking[0], condition)))
             sentences.append(
-                f"The ceiling {label} (privileged: it may differentiate through the bench) scores "
+                f"The privileged method {label}, an oracle that may differentiate through the bench, scores "
                 f"{score.with_unit(value)}, {score.with_unit(gap, signed=True)} from {ranking[0]}."
             )
     for category in (CALIBRATED, ONLINE):
@@ -137,8 +138,8 @@ def _oracle(results: Results, condition: str) -> list[str]:
         closed = [value for label in best if np.isfinite(value := results.gap_closed(label, condition))]
         if closed:
             sentences.append(
-                f"Of the way from the baseline {results.layout.baseline} to the ceiling, the best method of the "
-                f"{category} track, {best[0]}, goes {100 * closed[0]:z.0f} %."
+                f"{best[0]}, the best method of the {category} track, closes {100 * closed[0]:z.0f} % of the gap "
+                f"between {results.layout.baseline} and the oracle."
             )
     return sentences
 
@@ -155,7 +156,7 @@ def _significant(results: Results, condition: str) -> list[str]:
     smallest = min(1.0, len(tested) * 2.0 ** (1 - most))
     caution = (
         f"With {most} pairs and {len(tested)} comparisons no corrected p can be below {smallest:.2g}, so this test "
-        f"could not have shown any difference."
+        f"cannot show a difference."
         if smallest >= SIGNIFICANCE
         else f"The smallest corrected p that {most} pairs and {len(tested)} comparisons allow is {smallest:.2g}."
     )
@@ -177,7 +178,7 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
     verdict = (
         f"not better on average: {words(below)}"
         if below
-        else f"all of the {len(known)} with a score are better on average"
+        else f"all scored methods ({len(known)}) are better on average"
     )
     named = results.layout.text.floor_name(floor)
     return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]
@@ -213,9 +214,7 @@ def _across_conditions(results: Results) -> list[str]:
     orders = {name: [label for label in ranking if label in shared] for name, ranking in rankings.items()}
     distinct = {tuple(order) for order in orders.values()}
     if len(distinct) == 1:
-        return [
-            f"The {len(shared)} methods ranked under every display have the same order on all {len(orders)} of them."
-        ]
+        return [f"The {len(shared)} methods ranked on every display have the same order on all {len(orders)} displays."]
     listed = "; ".join(f"{name}: {' > '.join(order)}" for name, order in orders.items())
     return [f"The order of methods depends on the display: {listed}."]
 

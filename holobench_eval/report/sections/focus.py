@@ -14,9 +14,9 @@ from ..section import Blocks, Figures, Report, Section
 def _render(report: Report, _: Figures) -> Blocks:
     yield heading("Plane by plane")
     yield (
-        f"{report.results.headline.axis}, mean over scenes. Planes are in mm from the image distance of the full "
-        "panel, positive away from it, and shrink with the panel. A scene takes one hologram a plane, or one of all "
-        "planes."
+        f"{report.results.headline.axis}, mean over scenes. Planes are given in mm from the image distance of the "
+        "full panel, positive away from the panel, and scale with the panel. A scene takes one hologram per plane, or "
+        "one of all planes."
     )
     for condition in report.results.conditions:
         yield heading(condition, 3)
@@ -71,10 +71,10 @@ def _compared(results: Results, condition: str, baseline: str, name: str) -> str
     unit = f" {score.unit}" if score.unit else ""
     where = " in focus" if score.in_focus else ""
     return (
-        f"{name} makes one hologram of all {count} planes and need not know where the eye looks. It takes "
-        f"{number(seconds)} s, {number(seconds / other)} times what {baseline} takes for one plane and "
-        f"{number(seconds / other / count)} times what {baseline} takes for all of them. Against {baseline} moved "
-        f"by a lens it {'gains' if score.better(estimate.mean, 0.0) else 'loses'}{where}: {difference}{unit} over all "
+        f"{name} makes one hologram of all {count} planes, whichever one the eye looks at. It takes "
+        f"{number(seconds)} s: {number(seconds / other)} times the time of {baseline} for one plane, "
+        f"{number(seconds / other / count)} times that for all planes. Compared with {baseline}, refocused by a lens, "
+        f"it {'gains' if score.better(estimate.mean, 0.0) else 'loses'}{where}: {difference}{unit} over all "
         f"planes; {_each(results, gained)}."
     )
 

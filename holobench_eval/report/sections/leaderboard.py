@@ -24,7 +24,7 @@ def _render(report: Report, figures: Figures) -> Blocks:
     results, tables = report.results, report.by_display(leaderboard)
     if tables:
         yield heading("Quality and what it cost")
-        yield "Methods compete in tracks, by what they were given of the camera:"
+        yield "Methods compete in tracks, by their access to the camera:"
         yield bullets(
             Markdown("**{}**: {}").format(category, meaning) for category, meaning in meanings(results.categories)
         )
@@ -84,19 +84,19 @@ def reading(results: Results) -> str:
     """How the columns of the leaderboard are to be read."""
     each = results.layout.text.each
     sentences = [
-        "Ranks go by the mean of the headline, within a display and a track; a method that lacks a target has none.",
-        "Total captures are all that the row took: those of its training, and those of every target.",
-        f"Seconds of training are spent once, seconds per {each} for every image.",
+        "Ranks order the means of the headline within a display and a track; a method that lacks a target has no rank.",
+        "Total captures are those of the training and of every target.",
+        f"Seconds of training are spent once, seconds per {each} on every image.",
     ]
     if results.layout.baseline and any(results.oracle(condition) for condition in results.conditions):
         sentences.append(
-            f"The way to the ceiling is 0 % for the baseline {results.layout.baseline} and 100 % for the best "
-            "privileged method, by means of the headline."
+            f'"Way to the ceiling" is the share of the gap between the baseline {results.layout.baseline} and the '
+            "oracle, the best privileged method, that a method closes, by means of the headline."
         )
     if ONLINE in results.categories:
         sentences.append(
-            "Methods that see the camera for the scored image compete in a track of their own: with a camera at hand "
-            "for every image more is possible, and it says nothing about a display that has none."
+            "Methods that capture the scored image compete in a track of their own: a camera for every image makes "
+            "more possible, and their scores do not apply to a display without one."
         )
     return " ".join(sentences)
 
@@ -121,7 +121,7 @@ def draw(results: Results, folder: Path) -> Iterator[tuple[Path, str]]:
         "quality-captures.png",
         _captures,
         "captures in total, of training and of all targets (logarithmic; zero left of the break)",
-        "all captures that a row of the study took: those of its training once, and those of every target",
+        "all captures of a row: those of its training once, and those of every target",
     )
     seconds = Cost("quality-time.png", _seconds, f"{each} [s] (logarithmic)", each)
     for cost, wanted in ((captures, _spends_captures), (seconds, _times_enough)):
@@ -197,24 +197,25 @@ def _line(results: Results, name: str, condition: str, role: str, band: bool) ->
 
 def _caption(results: Results, panels: list[Frontier], cost: Cost) -> str:
     """What is drawn, what the bars are, and who is missing."""
+    online = ", separately for methods with and without the camera for the scored image"
     sentences = [
         f"{results.headline.axis}{results.layout.text.axis}, against {cost.words}.",
-        "A line joins the rows of one registered method. Pale steps: the best that is to be had for a cost"
-        f"{', apart for methods with and without the camera for the scored image' * (ONLINE in results.categories)}.",
+        "Lines join the rows of one registered method.",
+        f"Pale steps: the best quality for a cost{online * (ONLINE in results.categories)}.",
     ]
     if any(panel.floor for panel in panels):
         sentences.append(
-            "Bars: 95 % interval of the mean difference to the baseline, target by target, so that a bar clear of the "
-            "baseline's line is a difference; intervals of the means themselves stand in the tables."
+            "Bars: 95 % interval of the paired mean difference to the baseline; a bar clear of the baseline's line is "
+            "a difference. The tables hold the intervals of the means themselves."
         )
     else:
         sentences.append("Bars: 95 % interval of the mean over targets.")
     if any(panel.oracle for panel in panels):
-        sentences.append("The upper line is the privileged ceiling, with its interval as a band.")
+        sentences.append("The upper line is the oracle, with its interval as a band.")
     rows = [(name, condition) for condition in results.conditions for name in results.methods(condition)]
     lacking = sorted({name for name, condition in rows if not results.is_complete(name, condition)})
     if lacking:
-        sentences.append(f"Left out where they lack a target: {words(lacking)}.")
+        sentences.append(f"Omitted where a target is missing: {words(lacking)}.")
     return " ".join(sentences)
 
 

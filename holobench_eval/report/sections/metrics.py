@@ -67,8 +67,8 @@ def _blur(report: Report, _: Figures) -> Blocks:
     text, score = report.layout.text, next(iter(report.results.blur_scores), report.results.headline)
     yield heading("Sensitivity to blur")
     yield (
-        f"{score.axis} after {text.scored} and {text.truth} are blurred alike, {text.compared} and before the "
-        f"intensity match, by a Gaussian of the given standard deviation. {text.blur}"
+        f"{score.axis} after a Gaussian blur of both {text.scored} and {text.truth}, {text.compared} and before the "
+        f"intensity match; widths are standard deviations. {text.blur}"
     )
     yield report.by_display(_blurred, instead="No blurred scores were recorded.")
 

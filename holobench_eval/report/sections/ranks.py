@@ -25,8 +25,8 @@ def _render(report: Report, figures: Figures) -> Blocks:
     yield heading("Rank stability")
     yield (
         f"A draw is another bench of the same kind: {MODEL}. Methods know the nominal optics alone, or were trained on "
-        "the nominal display, and the same holograms are shown on every draw. Methods are ranked by their mean over "
-        "targets. Brackets hold 95 % intervals over draws: other benches, the same images. Shares: Wilson's interval."
+        "the nominal display; the same holograms are shown on every draw. Ranks order the means over targets. Brackets "
+        "hold 95 % intervals over draws (other benches, the same images); those of shares are Wilson's."
     )
     for ranks in report.ranks:
         yield heading(f"{ranks.swept.before}, {len(ranks.swept.points)} draws", 3)
@@ -34,10 +34,10 @@ def _render(report: Report, figures: Figures) -> Blocks:
         if ranks.exists:
             yield methods(ranks)
         if ranks.exists and (pairs := flips(ranks)):
-            yield Markdown("Pairs of methods that change places, {}:").format(report.results.headline.axis)
+            yield Markdown("Pairs of methods whose order changes, {}:").format(report.results.headline.axis)
             yield pairs
         if drawn := _ranges(ranks):
-            yield "What was drawn:"
+            yield "Parameters that were drawn:"
             yield drawn
     yield from figures
 
@@ -114,7 +114,7 @@ def left_out(ranks: Ranks) -> list[str]:
     unranked = [label for label in ranks.quality if label not in ranks.methods]
     if unranked:
         lines.append(
-            "Not ranked, since they lack targets on the nominal display or in more than half of the draws: "
+            "Not ranked, because targets are missing on the nominal display or in more than half of the draws: "
             f"{words(unranked)}."
         )
     empty = set(ranks.empty)
@@ -122,7 +122,7 @@ def left_out(ranks: Ranks) -> list[str]:
     if empty and ranks.used:
         lines.append(
             f"{_draws(ranks, sorted(empty))}: no ranked method has a score for every target there, as where the camera "
-            "cannot be registered (see Holes). What follows holds for benches on which it can."
+            "cannot be registered (see Holes). The results hold for benches on which it can be registered."
         )
     if partly and ranks.used:
         lines.append(f"{_draws(ranks, partly)}: a ranked method lacks a target there.")
@@ -144,20 +144,21 @@ def _agreement(ranks: Ranks) -> list[str]:
     interval = f" [{mean.low:.2f}, {mean.high:.2f}]" if np.isfinite(mean.low) else ""
     return [
         f"{what}: median {np.median(taus):.2f}, mean {mean.mean:.2f}{interval}, lowest {taus.min():.2f}, over "
-        f"{len(taus)} draws. The {len(ranks.methods)} methods have their nominal order in {ranks.unchanged} of "
-        f"{count}."
+        f"{len(taus)} draws. The {len(ranks.methods)} methods keep their nominal order in {ranks.unchanged} of "
+        f"{count} draws."
     ]
 
 
 def _winner(ranks: Ranks) -> str:
     counts = {label: int((ranks.positions[:, index] == 1).sum()) for index, label in enumerate(ranks.methods)}
     winners = [label for label, rank in zip(ranks.methods, ranks.nominal_positions, strict=True) if rank == 1]
-    firsts = [f"{label} in {counts[label]} of {len(ranks.used)} ({percent(ranks.first(label))} %)" for label in winners]
-    sentence = f"First on the nominal display, and over the draws: {words(firsts)}"
+    firsts = [f"{counts[label]} of {len(ranks.used)} draws ({percent(ranks.first(label))} %)" for label in winners]
+    pairs = zip(winners, firsts, strict=True)
+    sentence = f"First on the nominal display: {words([f'{label}, also first in {share}' for label, share in pairs])}"
     others = sorted((label for label in counts if label not in winners and counts[label]), key=lambda x: -counts[x])
     if not others:
-        return f"{sentence}. No other method is ever first."
-    return f"{sentence}. Others that are first: {words([f'{label} in {counts[label]}' for label in others])}."
+        return f"{sentence}. No other method is first in any draw."
+    return f"{sentence}. Also first in some draws: {words([f'{label} in {counts[label]}' for label in others])}."
 
 
 def _pairs(ranks: Ranks) -> list[str]:
@@ -166,18 +167,18 @@ def _pairs(ranks: Ranks) -> list[str]:
     still = pairs - len(flipping)
     most = 100 * share(0, len(ranks.used)).high
     lines = [
-        f"{still} of {pairs} pairs of methods have their nominal order in every draw; such a pair may still be the "
-        f"other way on up to {most:.0f} % of benches (upper end of the interval)."
+        f"{still} of {pairs} pairs of methods keep their nominal order in every draw; such a pair may still be "
+        f"reversed on up to {most:.0f} % of benches (upper end of the interval)."
         if still
-        else f"None of the {pairs} pairs of methods has its nominal order in every draw."
+        else f"None of the {pairs} pairs of methods keeps its nominal order in every draw."
     ]
     if flipping and ranks.tests:
         known = sum(pair.cause is not None for pair in flipping)
         lines.append(
-            f"Of the {len(flipping)} pairs that are the other way in some draw, {known} go with a parameter: "
-            "Spearman's correlation over draws between its value and the difference of the two means, "
-            f"p < {SIGNIFICANCE} after Holm over all {ranks.tests} that were tried; the strongest is named. The others "
-            f"go with {NOTHING} as clearly: with several at once, with the random patterns, or with chance."
+            f"Of the {len(flipping)} pairs that are reversed in some draw, {known} correlate with a parameter "
+            "(Spearman's correlation over draws between its value and the difference of the two means, "
+            f"p < {SIGNIFICANCE} after Holm over all {ranks.tests} tests); the table names the strongest. The others "
+            "depend on several parameters at once, on the random patterns, or on chance."
         )
     return lines
 
@@ -208,12 +209,12 @@ def draw(rankings: Sequence[Ranks], folder: Path) -> Iterator[tuple[Path, str]]:
 def _caption(ranks: Ranks) -> str:
     left = (
         f"Ranks of the methods over {len(ranks.used)} draws of {ranks.swept.before}. Left: share of draws [%] in which "
-        "a method has a rank, methods in nominal order, the nominal rank framed."
+        "a method has each rank; methods in nominal order, nominal ranks framed."
     )
     if not len(ranks.taus):
         return left
     return (
-        f"{left} Right: draws by Kendall's tau-b of their ranking against the nominal one. Dot and bar: mean with its "
+        f"{left} Right: draws by Kendall's tau-b of their ranking against the nominal one. Dot and bar: mean and "
         "95 % interval; dashed: unrelated."
     )
 

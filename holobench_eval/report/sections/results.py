@@ -24,13 +24,13 @@ def _render(report: Report, figures: Figures) -> Blocks:
     results, layout = report.results, report.layout
     yield heading("Results")
     yield (
-        f"{results.headline.axis}{layout.text.axis} is the headline. Brackets hold 95 % bootstrap intervals over "
-        "targets; n is the number of targets with a score."
+        f"The headline metric is {results.headline.axis}{layout.text.axis}. Brackets hold 95 % bootstrap intervals "
+        "over targets; n is the number of targets with a score."
     )
     if layout.privileged:
         yield (
-            'Rows marked "ceiling (privileged)" may differentiate through the simulated bench, which no real method '
-            "can; they bound what is possible and do not compete."
+            'Rows marked "ceiling (privileged)" are oracles: they may differentiate through the simulated bench, which '
+            "no real method can. They bound what is possible and do not compete."
         )
     for condition in results.conditions:
         yield heading(condition, 3)
@@ -39,8 +39,8 @@ def _render(report: Report, figures: Figures) -> Blocks:
     yield layout.note
     if layout.reported_source:
         yield (
-            'Columns named "reported" are published figures and were not measured here; they come from other hardware '
-            f"and other images. Source: {layout.reported_source}"
+            'Columns named "reported" hold published figures from other hardware and other images; they were not '
+            f"measured here. Source: {layout.reported_source}"
         )
     yield _without_lpips(results)
     yield heading("The floor", 3)
@@ -58,13 +58,13 @@ def _without_lpips(results: Results) -> str:
     lpips = any(name.startswith("lpips") for name in metrics)
     if lpips or not (wanted is None or any(name.startswith("lpips") for name in wanted)):
         return ""
-    option = "" if results.layout.measure == FILES else "or give its path as `protocol: {lpips_weights: ...}`, "
+    option = "" if results.layout.measure == FILES else "or set `protocol: {lpips_weights: ...}` to its path, "
     mofd = (
-        " MOFD (multi-scale oriented feature distance) stands in the table instead: a perceptual distance without "
-        "trained weights, whose values are not LPIPS values."
+        " The tables have MOFD (multi-scale oriented feature distance) instead, a perceptual distance without trained "
+        "weights; its values are not LPIPS values."
     )
     return Markdown(
-        f"LPIPS is not in these tables: the weights of its trunk are in no package. To have it, put <{WEIGHTS}> into "
+        f"LPIPS is not in these tables: no package contains the weights of its trunk. To add it, put <{WEIGHTS}> into "
         f"the folder `checkpoints` of torch's hub cache, {option}and run again.{mofd if 'mofd' in metrics else ''}"
     )
 
@@ -104,8 +104,8 @@ def stopped(results: Results, condition: str) -> list[str]:
     frame, targets = results.frame, len(results.targets)
     ended = frame[(frame["condition"] == condition) & (frame["state"] == DONE) & (frame[STOPPED_COLUMN] != "")]
     return [
-        f"Stopped by the display, {name}: {reason}, on {cells['target'].nunique()} of {targets} targets. Its best "
-        "hologram so far was scored."
+        f"The display stopped {name} on {cells['target'].nunique()} of {targets} targets: {reason}. Its best hologram "
+        "until then was scored."
         for (name, reason), cells in ended.groupby(["method", STOPPED_COLUMN], sort=False)
     ]
 
@@ -133,7 +133,7 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     chart = Chart(score, report.layout, tuple(dict.fromkeys(rows["method"])), floors)
     path = report.figures / "quality-bars.png"
     quality_bars(path, rows, chart)
-    lines = f"{' Vertical lines: the floor.' * bool(floors)}{' Hatched: the ceiling.' * bool(report.layout.privileged)}"
+    lines = f"{' Vertical lines: the floor.' * bool(floors)}{' Hatched: the oracle.' * bool(report.layout.privileged)}"
     yield path, f"{chart.axis}, by method and display. Mean over targets with its 95 % interval.{lines}"
 
     frames = {
@@ -146,8 +146,8 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     target_dots(path, {condition: frame for condition, frame in frames.items() if not frame.empty}, chart)
     yield (
         path,
-        f"{chart.axis}, of every target. A dot is a target, a line joins the same target across methods (a gap is a "
-        "hole), a bar is the mean.",
+        f"{chart.axis}, of every target. Dots are targets, lines join a target across methods (a gap is a hole), bars "
+        "are means.",
     )
 
 

@@ -130,13 +130,15 @@ def training_paragraph(layout: Layout, trainings: Sequence[Training]) -> str:
     methods = [label for label in layout.methods if label in layout.trained]
     trained = [*methods, *([DISPLAY] if layout.learned_display is not None else [])]
     who = words(trained)
-    limit = "" if given.captures is None else f", and none may take more than {given.captures} captures for it"
+    limit = (
+        "" if given.captures is None else f", and none may take more than {given.captures} captures for its training"
+    )
     return (
         f"{who[:1].upper() + who[1:] if who.startswith('the ') else who} {'are' if len(trained) > 1 else 'is'} trained "
         f"on captures of a display before any target is seen. The {given.images} training images come from the dataset "
-        f"{given.dataset}; {given.held_out} of them only watch the training. All methods of the study are "
-        f"given the same{limit}. Training images are never scored: a study in which one is a target is refused. "
-        f"{_captures(trainings)}"
+        f"{given.dataset}; {given.held_out} of them only monitor the training. All methods of the study "
+        f"receive the same images{limit}. Training images are never scored: a study in which one is a target is "
+        f"refused. {_captures(trainings)}"
     )
 
 

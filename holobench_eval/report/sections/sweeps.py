@@ -20,10 +20,10 @@ from ..section import Blocks, Figures, Report, Section
 # What Chakravarthula et al. 2020, Section 7.2, say of their method, by kind of change, and how far a sweep has to go to
 # tell (None: two of a kind).
 PAPER = {
-    "camera_shift_x": ("the quality stays stable when the camera moves by up to 4 cm", 40.0),
-    "camera_shift_y": ("the quality stays stable when the camera moves by up to 4 cm", 40.0),
-    "drift": ("there is no significant change in quality over three months", 90.0),
-    "sensor": ("captures of two cameras are consistent", None),
+    "camera_shift_x": ("The quality stays stable when the camera moves by up to 4 cm", 40.0),
+    "camera_shift_y": ("The quality stays stable when the camera moves by up to 4 cm", 40.0),
+    "drift": ("There is no significant change in quality over three months", 90.0),
+    "sensor": ("Captures of two cameras are consistent", None),
 }
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
 MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
@@ -34,10 +34,10 @@ def _render(report: Report, figures: Figures) -> Blocks:
     results, sweeps = report.results, report.sweeps
     yield heading("Changes of the displays")
     yield (
-        "Methods were prepared on the display before the change, and their holograms are shown on it after the change; "
-        "a method that sees the camera for the scored image solves under the change. A loss is the difference to the "
-        "score before the change, target by target, positive where the picture got worse; slopes are least-squares "
-        "lines through zero, to either side of the unchanged display."
+        "Methods are prepared on the display before the change, and their holograms are shown on it after the change. "
+        "A method that captures the scored image solves under the change. A loss is the paired difference to the score "
+        "before the change, positive where the picture got worse. Slopes are least-squares lines through zero, one on "
+        "each side of the unchanged display."
     )
     yield claims(results, sweeps)
     for sweep in sweeps:
@@ -60,7 +60,7 @@ def value_text(value: float | str) -> str:
 def _introduction(sweep: Sweep) -> str:
     """The stages that change, and what is assumed."""
     stages = words([stage.replace("_", " ") for stage in sweep.kind.stages])
-    seen = "The camera is registered anew." if sweep.kind.moves else "The registration of before holds."
+    seen = "The camera is registered anew." if sweep.kind.moves else "The registration from before the change is kept."
     return f"Changes: {stages}. Model: {sweep.kind.model}. {seen}"
 
 
@@ -148,8 +148,8 @@ def _stated_range(sweep: Sweep) -> list[str]:
             ranges.setdefault(ends, []).append(label)
     unit = f" {sweep.kind.unit}" if sweep.kind.unit else ""
     return [
-        f"Within {SMALL:g} {sweep.results.headline.unit} of the score before the change from {low:g} to "
-        f"{high:g}{unit}: {words(labels)}."
+        f"From {low:g} to {high:g}{unit} the score changes by at most {SMALL:g} {sweep.results.headline.unit}: "
+        f"{words(labels)}."
         for (low, high), labels in ranges.items()
     ]
 
@@ -163,7 +163,7 @@ def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
             for value, share in sweep.recovered(label, remedy).items()
         ]
         if parts:
-            lines.append(f"Recovered of the loss by {remedy.swept.kind}, {label}: {'; '.join(parts)}.")
+            lines.append(f"Share of the loss that {remedy.swept.kind} recovers for {label}: {'; '.join(parts)}.")
     return lines
 
 
@@ -183,8 +183,8 @@ def claims(results: Results, sweeps: Sequence[Sweep]) -> str:
     ]
     if not verdicts:
         return ""
-    rule = f"A claim is said to hold where the mean loss is at most {SMALL:g} dB at every value."
-    return f"Chakravarthula et al. 2020 (Section 7.2) show pictures for three claims. {rule} {' '.join(verdicts)}"
+    rule = f"A claim holds here if the mean loss is at most {SMALL:g} dB at every value."
+    return f"Chakravarthula et al. 2020 (Section 7.2) support three claims with pictures. {rule} {' '.join(verdicts)}"
 
 
 def _claim(sweep: Sweep, label: str) -> str:
@@ -194,13 +194,13 @@ def _claim(sweep: Sweep, label: str) -> str:
     reached = len(sweep.swept.points) > 1 if far is None else max(abs(float(v)) for v, _ in sweep.swept.points) >= far
     worst = sweep.worst(label)
     if not (complete and reached) or worst is None:
-        lacking = "the sweep does not go so far" if complete else "some points have no score"
-        return f"On {sweep.swept.before}, whether {claim} for {label} cannot be told ({sweep.kind.words}): {lacking}."
+        lacking = "the sweep does not go far enough" if complete else "some points have no score"
+        return f'"{claim}" cannot be judged for {label} on {sweep.swept.before} ({sweep.kind.words}): {lacking}.'
     value, loss = worst
-    verdict = "holds here" if loss.mean <= SMALL else "does not hold here"
+    verdict = "holds" if loss.mean <= SMALL else "does not hold"
     where = f"{sweep.kind.words}, {value_text(value)} {sweep.kind.unit}".rstrip(" ,")
     sentence = (
-        f"On {sweep.swept.before}, that {claim} {verdict} for {label}: at worst ({where}) it loses "
+        f'"{claim}" {verdict} for {label} on {sweep.swept.before}: its largest loss ({where}) is '
         f"{score.interval(loss.mean, loss.low, loss.high)} {score.unit}"
     )
     if label == baseline:
@@ -211,7 +211,7 @@ def _claim(sweep: Sweep, label: str) -> str:
     if gained is None or before is None or other is None:
         return f"{sentence}."
     return (
-        f"{sentence}, {baseline} {score.number(other.mean)}, and its lead over {baseline} goes from "
+        f"{sentence}, that of {baseline} there {score.number(other.mean)}, and its lead over {baseline} goes from "
         f"{score.number(before.mean, signed=True)} to {score.number(gained.mean, signed=True)} {score.unit}."
     )
 
@@ -227,8 +227,8 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         draw_sweep(path, [_panel(sweep) for sweep in same], f"{results.headline.axis}{report.layout.text.axis}")
         yield (
             path,
-            f"{results.headline.axis} along a change: {change}. Mean over targets; bars: 95 % interval of the mean "
-            "difference to the unchanged display, target by target, moved apart a little. Dashed: the baseline.",
+            f"{results.headline.axis} along a change: {change}. Mean over targets; bars, slightly offset: 95 % "
+            "interval of the paired mean difference to the unchanged display. Dashed: the baseline.",
         )
         if not thumbnails.targets:
             continue

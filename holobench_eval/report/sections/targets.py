@@ -16,10 +16,10 @@ def _paired_tests(report: Report, _: Figures) -> Blocks:
     results = report.results
     yield heading("Paired tests")
     yield (
-        f"Differences of {results.headline.axis}{report.layout.text.axis}, target by target, repeats averaged first. "
-        "Two-sided Wilcoxon signed-rank test with its exact distribution; Holm's correction within each family, which "
-        "is all comparisons under one display in one table. Pairs with a hole are left out and counted. Below three "
-        "complete pairs there is no test and no interval."
+        f"Paired differences of {results.headline.axis}{report.layout.text.axis} over targets, repeats averaged first. "
+        "Exact two-sided Wilcoxon signed-rank test; Holm's correction over all comparisons of one display in one "
+        "table. Pairs with a hole are omitted and counted. Fewer than three complete pairs give no test and no "
+        "interval."
     )
     if results.against_baseline:
         yield heading(f"Against the baseline {report.layout.baseline}", 3)
@@ -73,7 +73,7 @@ def _holes(report: Report, _: Figures) -> Blocks:
     yield heading("Holes")
     if rows:
         yield (
-            "Cells without a score. They are in no mean, and a method that lacks a score for some target is not ranked."
+            "Cells without a score. They enter no mean, and a method without a score for every target is not ranked."
         )
         yield table(["method", "display", "target", "repeat", "state", "reason"], rows)
     else:

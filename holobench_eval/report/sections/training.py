@@ -19,18 +19,17 @@ DIGITS = 10  # of a sha256 that are printed
 def _render(report: Report, figures: Figures) -> Blocks:
     yield heading("Training")
     yield (
-        "What was learned before any target was seen. Held-out images took no part in it and only watched it; their "
-        "captures and the time they took are counted."
+        "Training took place before any target was seen. Held-out images only monitor it; their captures and their "
+        "time are counted."
     )
     yield _summary(report.layout, report.trainings)
     yield bullets(_doubts(report.trainings))
     rounds = _rounds(report.trainings)
     if rounds:
         yield (
-            "Held-out images after every round, each picture matched in intensity. Predicted: the picture that the "
-            "method expects, against the target. Captured: the picture that the display shows, against the target. "
-            "Fidelity: the one against the other. Where the predicted figure is above the captured one, the prediction "
-            "promises more than the display shows."
+            "Held-out images after every round, matched in intensity. Predicted: the method's prediction against the "
+            "target. Captured: the capture against the target. Fidelity: the prediction against the capture. Where "
+            "predicted exceeds captured, the prediction promises more than the display shows."
         )
     yield rounds or "No figures on held-out images were logged."
     yield from figures
@@ -88,11 +87,11 @@ def _doubts(trainings: Sequence[Training]) -> list[str]:
         name, used = training.name, training.used
         if DISPLAY in training.labels[1:]:
             own = words([label for label in training.labels if label != DISPLAY])
-            lines.append(f"{own} solves through the very network that is the display here, and so knows it exactly.")
+            lines.append(f"{own} solves through the network that is the display, and so knows the display exactly.")
         if training.record is None:
             lines.append(f"Nothing is known of the training of {name}: it failed, or its log is not in this folder.")
         elif used and training.text("sha256") not in used:
-            lines.append(f"The figures for {name} here are of another training than its scores come from.")
+            lines.append(f"The figures for {name} here and its scores come from different trainings.")
         if len(used) > 1:
             lines.append(f"The scores of {name} come from {len(used)} different trainings.")
     return lines

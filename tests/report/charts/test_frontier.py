@@ -130,7 +130,7 @@ def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_p
     assert seen[0][0].floor.label.startswith("baseline: wirtinger, ")
 
 
-def test_a_method_that_lacks_a_target_is_left_out_and_said_to_be(tmp_path, monkeypatch):
+def test_a_method_that_lacks_a_target_is_omitted_and_named(tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(
         "holobench_eval.report.sections.leaderboard.draw_frontiers", lambda path, panels, *_: seen.append(panels)
@@ -140,7 +140,7 @@ def test_a_method_that_lacks_a_target_is_left_out_and_said_to_be(tmp_path, monke
     records[lost] = records[lost] | {"state": "failed", "scores": {}}
     layout = budget.layout()
     captions = [caption for _, caption in draw(Results(records_frame(records, layout), layout), tmp_path)]
-    assert all("Left out where they lack a target: hil." in caption for caption in captions)
+    assert all("Omitted where a target is missing: hil." in caption for caption in captions)
     there = [{one.label for one in panel.marks} for panel in seen[0]]
     assert [("hil" in labels, "sgd" in labels) for labels in there] == [(False, True), (True, True)]
 

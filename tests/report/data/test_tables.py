@@ -126,21 +126,20 @@ def test_records_that_do_not_say_what_was_beside_them_have_no_column_for_it_and_
 
 SHARED = {"t1": (5.0, False), "t2": (3.0, False)}
 ALL = {"t1": (5.0, True), "t2": (3.0, True)}
-BESIDE = "holograms computed 2 side by side, which disturb each other"
+INFLATED = "timed with 2 concurrent workers and are inflated"
 SENTENCES = [
-    (timed(), "The seconds are of one hologram a row, computed with nothing beside it."),
+    (timed(), "Seconds are those of one hologram per row, timed alone."),
     (
         [*timed(), *timed("b", SHARED)],
-        f"The seconds are of one hologram a row, computed with nothing beside it; those of b on bench are of {BESIDE}.",
+        f"Seconds are those of one hologram per row, timed alone; those of b on bench were {INFLATED}.",
     ),
     (
         [*timed("a", SHARED), *timed("b", ALL)],
-        "The seconds are of those holograms of a row that were computed with nothing beside them; those of a on bench "
-        f"are of {BESIDE}.",
+        f"Seconds are those of the holograms timed alone; those of a on bench were {INFLATED}.",
     ),
-    (timed("a", SHARED), f"The seconds are of {BESIDE}."),
-    (timed("a", ALL), "Each hologram was computed with nothing beside it."),
-    (rows({"t1": 1.0}), f"The seconds are of {BESIDE}."),
+    (timed("a", SHARED), f"Seconds were {INFLATED}."),
+    (timed("a", ALL), "Each hologram was timed alone."),
+    (rows({"t1": 1.0}), f"Seconds were {INFLATED}."),
 ]
 
 

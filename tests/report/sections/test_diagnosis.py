@@ -48,7 +48,7 @@ def test_estimates_that_are_all_right_are_said_to_be() -> None:
     ((_, _, verdict),) = diagnoses([trained(estimates=joined(FOUND[:6], TRUTH))])
     assert verdict == "All 6 numbers are within their stated errors."
     ((_, _, verdict),) = diagnoses([trained(estimates=joined(FOUND, []))])
-    assert verdict.startswith("None of these has a truth")
+    assert verdict.startswith("None of these has a ground truth")
 
 
 def test_a_difference_of_phases_goes_the_shorter_way() -> None:
@@ -58,8 +58,8 @@ def test_a_difference_of_phases_goes_the_shorter_way() -> None:
 
 def test_methods_that_lack_the_same_are_told_once() -> None:
     both = [trained(missing=["flicker | strong", "noise"]), trained(missing=["flicker | strong", "noise"])]
-    assert missing(both) == ["leto-aged has, and the form of the model of parametric has not: flicker | strong; noise."]
-    assert "has not: nothing." in missing([trained(missing=[])])[0]
+    assert missing(both) == ["leto-aged contains effects that parametric cannot represent: flicker | strong; noise."]
+    assert missing([trained(missing=[])]) == ["leto-aged contains no effect that parametric cannot represent."]
 
 
 @pytest.mark.parametrize(

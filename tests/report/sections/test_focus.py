@@ -70,7 +70,7 @@ def test_a_table_has_a_column_a_plane_and_the_seconds_of_a_hologram_and_of_a_sce
 
 def test_the_cost_and_the_loss_of_a_hologram_of_all_planes_are_told() -> None:
     (told,) = sentences(results_of({"lens": 20.0, "joint": 19.0}), "bench")
-    assert "It takes 5 s, 2.5 times what lens takes for one plane and 0.833 times what lens takes for all" in told
+    assert "It takes 5 s: 2.5 times the time of lens for one plane, 0.833 times that for all planes." in told
     assert "it loses in focus: -2.33 [" in told
     assert "-3.00 dB at -2 mm, -1.00 dB at 0 mm and -3.00 dB at 2 mm" in told
 

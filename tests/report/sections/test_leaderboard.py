@@ -77,7 +77,7 @@ def test_a_headline_of_which_less_is_better_is_ranked_the_other_way(records):
     assert order == [name for track, _, name in ranked(results(records)) if track == "calibrated"][::-1]
 
 
-def test_the_way_to_the_ceiling_is_zero_at_the_baseline_and_whole_at_the_ceiling(found):
+def test_no_gap_is_closed_at_the_baseline_and_all_of_it_at_the_oracle(found):
     assert found.gap_closed("wirtinger", "ideal") == 0
     assert found.gap_closed("oracle", "ideal") == 1
     mean = {name: found.values(name, "ideal").mean() for name in ("wirtinger", "hil", "oracle")}
@@ -85,7 +85,7 @@ def test_the_way_to_the_ceiling_is_zero_at_the_baseline_and_whole_at_the_ceiling
     assert found.gap_closed("hil", "ideal") == pytest.approx(expected)
 
 
-def test_there_is_no_way_to_a_ceiling_below_the_baseline(records):
+def test_there_is_no_gap_to_an_oracle_below_the_baseline(records):
     bad = [r | {"scores": {"psnr_linear": 1.0}} if r["label"] == "oracle" else r for r in records]
     assert np.isnan(results(bad).gap_closed("hil", "ideal"))
     assert "way to the ceiling" not in leaderboard(results(bad), "ideal")
@@ -101,15 +101,16 @@ def test_a_stopped_method_is_named_with_its_reason_and_how_often(records):
     reason = "online_camera has used its 25 captures"
     ended = [r | {"stopped": reason} if "(25" in r["label"] and r["cell"]["target"] != "coffee" else r for r in records]
     (line,) = stopped(results(ended), "ideal")
-    assert line.startswith(f"Stopped by the display, online_camera (25 captures): {reason}, on 5 of 6 targets.")
+    assert line.startswith(f"The display stopped online_camera (25 captures) on 5 of 6 targets: {reason}.")
     assert stopped(results(records), "ideal") == []
 
 
 def test_the_findings_rank_online_methods_apart(found):
     ((_, sentences), *_) = findings(found)
-    assert sentences[0].startswith("Without the camera for the scored image, best of the 8 ranked methods: parametric")
-    assert sentences[1].startswith("With the camera for the scored image (online track), best of the 3 ranked methods")
-    assert any("best method of the calibrated track, parametric_model (64 captures), goes 7" in s for s in sentences)
+    best = "parametric_model (64 captures)"
+    assert sentences[0].startswith(f"{best} ranks first of 8 methods, without the camera for the scored image: PSNR")
+    assert "ranks first of 3 methods of the online track, with the camera for the scored image: PSNR" in sentences[1]
+    assert any(f"{best}, the best method of the calibrated track, closes 7" in sentence for sentence in sentences)
     assert not any("online" in label for label in found.ranking("leto-aged"))
 
 

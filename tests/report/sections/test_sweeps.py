@@ -117,8 +117,10 @@ def test_what_a_remedy_gets_back_is_told_as_a_share(results: Results) -> None:
 
 def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> None:
     told = section_sweeps.claims(results, sweeps(results))
-    assert "three months does not hold here for HIL" in told
-    assert "4 cm for HIL cannot be told (camera moved sideways): the sweep does not go so far" in told
+    assert 'three months" does not hold for HIL' in told
+    assert (
+        '4 cm" cannot be judged for HIL on leto-aged (camera moved sideways): the sweep does not go far enough' in told
+    )
     assert "goes from +4.00 to -5.00 dB" in told
     without = Results(results.frame[results.frame["name"] != "hil"], replace(layout(), pairs=()))
     assert section_sweeps.claims(without, sweeps(without)) == ""
@@ -134,7 +136,7 @@ def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Res
     assert drift.slope("HIL", 1) is None
     assert drift.break_even("HIL") is None
     assert of(holed, "camera_shift_x").slope("HIL", 1) is not None
-    assert "three months for HIL cannot be told" in section_sweeps.claims(holed, sweeps(holed))
+    assert 'three months" cannot be judged for HIL' in section_sweeps.claims(holed, sweeps(holed))
     assert "–" in section_sweeps.scores(drift)
 
 
