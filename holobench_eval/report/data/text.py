@@ -63,7 +63,7 @@ class Text:
     each: str = "hologram"
     best: str = "ranks first of {count} methods"
     only: str = "is the only ranked method"
-    other: str = "{label}, not {best}, ranks first by {metrics}."
+    other: str = "{label} ranks first by {metrics}, ahead of {best}."
     procedure: str = (
         "A method turns a target image into a phase pattern. The pattern is shown on a display, the display's image is "
         "captured, the capture is registered to the target, matched in intensity and scored."
@@ -142,7 +142,7 @@ PREDICTION = replace(
     axis=", of predictions against captures",
     each="prediction",
     best="predicts the captures most closely of {count} methods",
-    other="{label}, not {best}, predicts most closely by {metrics}.",
+    other="{label} predicts most closely by {metrics}, ahead of {best}.",
     procedure=(
         "Trained methods predict the capture of a phase pattern. The patterns are holograms of the targets by "
         "{holograms}, the same for all methods. Each pattern is shown on the display, captured, and registered to its "

@@ -24,7 +24,7 @@ def _render(report: Report, _: Figures) -> Blocks:
     if estimated:
         yield heading("Diagnosis", 3)
         yield (
-            "Display parameters as the learned models estimate them, in forms that images determine; in brackets the "
+            "Display parameters as the learned models estimate them, in forms that captures determine; in brackets the "
             "ground truth of the simulated bench, which no method sees. The stated error holds for a model that was "
             "trained on patterns that reach every level of the panel."
         )

@@ -67,7 +67,7 @@ def _blur(report: Report, _: Figures) -> Blocks:
     text, score = report.layout.text, next(iter(report.results.blur_scores), report.results.headline)
     yield heading("Sensitivity to blur")
     yield (
-        f"{score.axis} after a Gaussian blur of both {text.scored} and {text.truth}, {text.compared} and before the "
+        f"{score.axis} after a Gaussian blur of both {text.scored} and {text.truth}, {text.compared}, before the "
         f"intensity match; widths are standard deviations. {text.blur}"
     )
     yield report.by_display(_blurred, instead="No blurred scores were recorded.")

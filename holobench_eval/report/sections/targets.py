@@ -16,7 +16,7 @@ def _paired_tests(report: Report, _: Figures) -> Blocks:
     results = report.results
     yield heading("Paired tests")
     yield (
-        f"Paired differences of {results.headline.axis}{report.layout.text.axis} over targets, repeats averaged first. "
+        f"Paired differences over targets, repeats averaged first: {results.headline.axis}{report.layout.text.axis}. "
         "Exact two-sided Wilcoxon signed-rank test; Holm's correction over all comparisons of one display in one "
         "table. Pairs with a hole are omitted and counted. Fewer than three complete pairs give no test and no "
         "interval."
