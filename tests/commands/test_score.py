@@ -90,7 +90,7 @@ def pictures(scored, tmp_path):
 
 def test_the_report_says_where_the_geometry_came_from_and_ranks(scored):
     _, text = scored
-    assert "The geometry comes from the images and not from fiducials" in text
+    assert "The geometry comes from the images, not from fiducials" in text
     assert "One shared alignment for 4 captures in one pose" in text
     assert "A second aligner" in text
     assert "None: every planned cell has a score." in text

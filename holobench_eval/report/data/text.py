@@ -52,7 +52,7 @@ class Text:
     figures; each: what a method makes for one target. best, only: what the first of several, or the only, ranked method
     does; other: the same by another metric. procedure: what is done; caution: what the figures do not say;
     displays: what the displays are; floor, instead: the reference images and the heading of their column. looked_at:
-    heading of the pictures; picture: what a tile of the comparison is. geometry, blur, effort: first sentences of these
+    heading of the pictures; picture: what a tile of the comparison is. geometry, blur, cost: first sentences of these
     sections. seeds: what is random. compared: in which values pictures are matched and blurred; domains: what the
     domains of metrics mean.
     """
@@ -90,7 +90,7 @@ class Text:
         "means that the geometry drifted."
     )
     blur: str = "The ranking can change between methods that trade speckle for sharpness."
-    effort: str = "Captures are those that a method took to solve one target."
+    cost: str = "Captures are those that a method took to solve one target."
     seeds: str = (
         "The noise of a capture depends on target, display and repeat, not on the method: all methods meet the same "
         "noise, and differences are paired."
@@ -131,7 +131,7 @@ ON_A_NETWORK = replace(
         "at most 2 px and 0.1 degree, estimated by correlation and not by maximising the score. A large difference "
         "means that the picture is displaced."
     ),
-    effort="There is no camera, so no method captures anything while it solves.",
+    cost="There is no camera, so no method captures anything while it solves.",
     seeds="A learned display has no noise: repeats differ only by the methods' own random numbers.",
 )
 
@@ -166,7 +166,7 @@ PREDICTION = replace(
         "that predictions are displaced."
     ),
     blur="The ranking can change between predictions with and without speckle.",
-    effort="A prediction takes no captures.",
+    cost="A prediction takes no captures.",
     seeds=(
         "The noise of a capture depends on target, display and repeat, not on the method: all methods predict the "
         "same captures, and differences are paired."
@@ -186,7 +186,7 @@ FOCUS = replace(
     ),
     caution="Targets of one scene are not independent: intervals over targets are too narrow, and p values too small.",
     picture="Each capture is taken at the plane of its target, registered, matched in intensity and sRGB-encoded",
-    effort=(
+    cost=(
         "Captures and seconds are those of one hologram: of one plane, or of all planes of a scene for a method that "
         "makes one hologram of them."
     ),
@@ -214,7 +214,7 @@ GIVEN = replace(
         '"Refined" allows each aligned capture a rigid motion of at most 2 px and 0.1 degree, estimated by correlation '
         "and not by maximising the score. A large difference means that the shared alignment does not fit the capture."
     ),
-    effort="The cost of the captures is unknown.",
+    cost="The cost of the captures is unknown.",
     seeds="Only the speckle of the floor is random; it depends on the target's name alone.",
 )
 

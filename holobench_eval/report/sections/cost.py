@@ -19,11 +19,11 @@ def _render(report: Report, _: Figures) -> Blocks:
     results, text = report.results, report.layout.text
     yield heading("Light" if report.layout.measure == FILES else "Captures, time and light")
     if report.layout.measure == FILES:
-        yield f"{text.effort} Match factors and brightness ratios are computed {text.compared}."
+        yield f"{text.cost} Match factors and brightness ratios are computed {text.compared}."
     else:
         memory = MEMORY_COLUMN in results.table
         sentences = [
-            text.effort,
+            text.cost,
             f"Seconds {'and memory ' * memory}are the first measurement on this machine; later runs keep it, so that "
             "the same command gives the same table.",
             timing(results, report.provenance.get("workers", 1)),

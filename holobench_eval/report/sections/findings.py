@@ -43,7 +43,7 @@ def findings(results: Results) -> list[tuple[str, list[str]]]:
                 *_significant(results, condition),
                 *_floor(results, condition, "floor_constant"),
                 *_floor(results, condition, "floor_speckle"),
-                *_blur(results, condition),
+                *_blur_sensitivity(results, condition),
             ],
         )
         for condition in results.conditions
@@ -184,7 +184,7 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
     return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]
 
 
-def _blur(results: Results, condition: str) -> list[str]:
+def _blur_sensitivity(results: Results, condition: str) -> list[str]:
     keys = results.blur_scores
     rankings = {score: results.ranking(condition, score.key) for score in keys}
     plain = rankings[keys[0]] if keys else []

@@ -138,11 +138,11 @@ def training_paragraph(layout: Layout, trainings: Sequence[Training]) -> str:
         f"on captures of a display before any target is seen. The {given.images} training images come from the dataset "
         f"{given.dataset}; {given.held_out} of them only monitor the training. All methods of the study "
         f"receive the same images{limit}. Training images are never scored: a study in which one is a target is "
-        f"refused. {_captures(trainings)}"
+        f"refused. {_captures_taken(trainings)}"
     )
 
 
-def _captures(trainings: Sequence[Training]) -> str:
+def _captures_taken(trainings: Sequence[Training]) -> str:
     counts = sorted(value for training in trainings if math.isfinite(value := training.number("captures")))
     if not counts:
         return "No training has been finished."
