@@ -58,11 +58,8 @@ def score_folders(
     What was computed before in ``output`` for the same files by the same code is taken from there. UserError for input
     that cannot be used, in one line; a capture that cannot be aligned is a hole in the report, with its reason.
     """
-    from ..report.build import write_report
+    from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
-    from ..report.data.results import Results
-    from ..report.data.tables import records_frame
-    from ..report.sections.description import Description
     from ..study import provenance
     from ..study.folders.files import read_folders
     from ..study.folders.scoring import Scoring, described
@@ -92,8 +89,7 @@ def score_folders(
         words += ["--baseline", baseline] if baseline else []
         description = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
         layout = _layout(folders, scoring.domain, values, baseline)
-        report = write_report(layout, records, output, known, description)
-        return report, Results(records_frame(records, layout), layout)
+        return write_report(layout, records, output, known, description)
 
 
 def _layout(folders: Folders, domain: str, values: str, baseline: str | None) -> Layout:

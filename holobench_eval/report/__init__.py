@@ -1,12 +1,14 @@
 """Reports: statistics over targets, tables, figures and report.md, all computed from the records of a study."""
 
-from .build import build_report, recompute_table, results_of, write_report
+from .build import build_report, recompute_table, write_report
 from .data.layout import Layout, layout_of
 from .data.results import Results
 from .data.tables import csv_text, read_records, records_frame, table_from_records
-from .sections.tables import headline_rows
+from .description import Description
+from .sections.results import headline_rows
 
 __all__ = [
+    "Description",
     "Layout",
     "Results",
     "build_report",
@@ -16,7 +18,6 @@ __all__ = [
     "read_records",
     "recompute_table",
     "records_frame",
-    "results_of",
     "table_from_records",
     "write_report",
 ]

@@ -90,7 +90,7 @@ def pictures(scored, tmp_path):
 
 def test_the_report_says_where_the_geometry_came_from_and_ranks(scored):
     _, text = scored
-    assert "The geometry comes from the images and not from fiducials" in text
+    assert "The geometry comes from the images, not from fiducials" in text
     assert "One shared alignment for 4 captures in one pose" in text
     assert "A second aligner" in text
     assert "None: every planned cell has a score." in text
@@ -164,7 +164,7 @@ def test_a_capture_of_another_picture_and_a_lacking_one_are_holes(pictures, quic
     text = run(pictures)
     assert "the target is not found in the capture" in text
     assert "no capture of 'astronaut' in the folder of clean" in text
-    assert "Refused, and without a score: 1 capture." in text
+    assert "Refused, without a score: 1 capture." in text
     assert "is the same picture as" in text
     cells = pd.read_csv(pictures / "out" / "records.csv")
     holes = cells[cells["state"] != "done"]

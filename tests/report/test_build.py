@@ -6,9 +6,9 @@ import pytest
 from skimage.io import imread
 
 from holobench_eval.report import write_report
-from holobench_eval.report.sections.description import Description, Display
+from holobench_eval.report.description import Description, Display
 from holobench_eval.study.store import Store
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 PROVENANCE = {
     "package": "0.1.0",
@@ -21,8 +21,8 @@ PROVENANCE = {
     "started": "2031-01-02T03:04:05+00:00",
     "ended": "2031-01-02T03:05:06+00:00",
 }
-TARGETS = made.TARGETS[1:4]
-LAYOUT = made.layout(targets=TARGETS)
+TARGETS = synthetic.TARGETS[1:4]
+LAYOUT = synthetic.layout(targets=TARGETS)
 DESCRIPTION = Description(
     displays=(Display("leto-aged", "Version 1. An aged panel.", ("crosstalk: width = 0.45",)),),
     config_file="configs/table3.yaml",
@@ -34,7 +34,7 @@ def minimal(records, **changes):
     """The records of one display and three methods, and the layout for them: little to draw."""
     kept = [r for r in records if r["cell"]["condition"] != "ideal" and r["label"] not in ("SGD", "HIL", "Oracle")]
     pairs = tuple((label, "leto-aged") for label in ("Double phase", "GS", "Wirtinger"))
-    return kept, made.layout(**({"targets": TARGETS, "pairs": pairs, "reported": {}} | changes))
+    return kept, synthetic.layout(**({"targets": TARGETS, "pairs": pairs, "reported": {}} | changes))
 
 
 def files(folder):
@@ -44,13 +44,13 @@ def files(folder):
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    return folder, made.study(folder, size=48, targets=TARGETS)
+    return folder, synthetic.study(folder, size=48, targets=TARGETS)
 
 
 @pytest.fixture(scope="module")
 def report(records):
     folder, found = records
-    return write_report(LAYOUT, found, folder, PROVENANCE, DESCRIPTION).read_text()
+    return write_report(LAYOUT, found, folder, PROVENANCE, DESCRIPTION)[0].read_text()
 
 
 def test_a_report_is_written_with_tables_and_every_figure(records, report):
@@ -111,15 +111,15 @@ def test_a_reader_finds_what_was_measured_and_how_to_do_it_again(report):
 def test_a_reader_is_told_what_was_at_work_beside_what_was_timed(records, tmp_path):
     kept, layout = minimal(records[1])
     noted = [record | {"memory_mib": 9.0, "alone": record["cell"]["target"] == TARGETS[0]} for record in kept]
-    text = write_report(layout, noted, tmp_path, PROVENANCE, DESCRIPTION).read_text()
+    text = write_report(layout, noted, tmp_path, PROVENANCE, DESCRIPTION)[0].read_text()
     assert "Seconds and memory are the first measurement on this machine" in text
-    assert "The seconds are of one hologram a row, computed with nothing beside it. Memory is" in text
+    assert "Seconds are those of one hologram per row, timed alone. Memory is" in text
 
 
 @pytest.mark.parametrize(("wanted", "missed"), [(None, True), (("psnr", "lpips_alex"), True), (("psnr",), False)])
 def test_lpips_is_missed_only_where_it_was_wanted(records, tmp_path, wanted, missed):
     kept, layout = minimal(records[1], metrics=wanted)
-    text = write_report(layout, kept, tmp_path, PROVENANCE, DESCRIPTION).read_text()
+    text = write_report(layout, kept, tmp_path, PROVENANCE, DESCRIPTION)[0].read_text()
     assert ("LPIPS is not in these tables" in text) == missed
 
 
@@ -133,8 +133,8 @@ def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
     kept, layout = minimal(found)
     stale, sheet = tmp_path / "figures" / "comparison-old-9.jpg", tmp_path / "figures" / "stages-leto-aged.png"
     for file in (stale, sheet):
-        made.save_picture(file, np.full((8, 8, 3), 0.5))
-    text = write_report(layout, kept, tmp_path, {}, Description()).read_text()
+        synthetic.save_picture(file, np.full((8, 8, 3), 0.5))
+    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert not stale.exists()
     assert "(figures/stages-leto-aged.png)" in text
 
@@ -142,32 +142,32 @@ def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
 def test_missing_thumbnails_are_said_and_stop_nothing(records, tmp_path):
     _, found = records
     kept, layout = minimal(found)
-    text = write_report(layout, kept, tmp_path, {}, Description()).read_text()
+    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert "There is no comparison figure" in text
-    assert "Thumbnails that were expected and are not there (3): target-chelsea.png" in text
+    assert "Missing thumbnails (3): target-chelsea.png" in text
     assert "No description of the displays was recorded." in text
     assert "The environment was not recorded." in text
 
     store = Store(tmp_path)
     for target in TARGETS:
-        made.save_picture(store.target_thumbnail(target), np.full((48, 48, 3), 0.5))
+        synthetic.save_picture(store.target_thumbnail(target), np.full((48, 48, 3), 0.5))
     one = kept[-1]
-    made.save_picture(store.folder / f"{made.digest(one['cell'])}.png", np.full((48, 48, 3), 0.4))
-    text = write_report(layout, kept, tmp_path, {}, Description()).read_text()
+    synthetic.save_picture(store.folder / f"{synthetic.digest(one['cell'])}.png", np.full((48, 48, 3), 0.4))
+    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert "(figures/comparison-leto-aged-1.jpg)" in text
-    assert "Thumbnails that were expected and are not there (7)" in text
+    assert "Missing thumbnails (7)" in text
 
 
 def test_hostile_names_stay_text(records, tmp_path):
     _, found = records
     evil = "<img src=x onerror=alert(1)> | **b** [l](javascript:1)"
     kept, layout = minimal(found, title=evil, baseline=evil)
-    layout = made.layout(
+    layout = synthetic.layout(
         **vars(layout) | {"pairs": (("Double phase", "leto-aged"), ("GS", "leto-aged"), (evil, "leto-aged"))}
     )
     renamed = [record | {"label": evil} if record["label"] == "Wirtinger" else record for record in kept]
     description = Description(config_text="```\n<script>\n```", config_file="x.yaml")
-    text = write_report(layout, renamed, tmp_path, {}, description).read_text()
+    text = write_report(layout, renamed, tmp_path, {}, description)[0].read_text()
     body = text.replace("```\n<script>\n```", "")
     assert "<img" not in body
     assert not re.search(r"(?<!\\)\]\(javascript", body)
@@ -184,7 +184,7 @@ def test_a_study_in_which_everything_failed_still_has_a_report(records, tmp_path
     _, found = records
     kept, layout = minimal(found)
     failed = [record | {"state": "failed", "reason": "no light", "scores": {}} for record in kept]
-    text = write_report(layout, failed, tmp_path, {}, Description()).read_text()
+    text = write_report(layout, failed, tmp_path, {}, Description())[0].read_text()
     assert "9 cells, 0 with a score, 9 without" in text
     assert text.count("no light") == len(kept)
 
@@ -193,6 +193,6 @@ def test_two_targets_are_reported_without_tests(records, tmp_path):
     _, found = records
     kept, layout = minimal(found, targets=TARGETS[:1] + TARGETS[2:])
     kept = [record for record in kept if record["cell"]["target"] != TARGETS[1]]
-    text = write_report(layout, kept, tmp_path, {}, Description()).read_text()
+    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
     assert "| Double phase – Wirtinger | leto-aged | 2 of 2 |" in text
     assert "| no test | no test |" in text

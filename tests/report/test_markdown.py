@@ -2,9 +2,8 @@ import re
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from markupsafe import Markup
 
-from holobench_eval.report.markdown import code, code_block, escape, table
+from holobench_eval.report.markdown import Markdown, blocks, bullets, code, code_block, escape, table
 
 ANY_TEXT = st.text(max_size=40)
 
@@ -29,7 +28,13 @@ def test_ordinary_text_stays_legible():
 
 
 def test_text_that_was_made_here_is_not_escaped_again():
-    assert str(escape(Markup("**n**"))) == "**n**"
+    assert str(escape(Markdown("**n**"))) == "**n**"
+
+
+def test_what_is_joined_or_formatted_into_markdown_is_escaped_once():
+    assert Markdown("**{}.** {}").format("a | b", Markdown("`c`")) == "**a \\| b.** `c`"
+    assert bullets(["*a*", Markdown("*b*")]) == "- \\*a\\*\n- *b*"
+    assert blocks(["a\nb", "", None, bullets([]), "<i>"]) == "a b\n\n&lt;i>"
 
 
 @given(st.lists(st.lists(ANY_TEXT, min_size=3, max_size=3), max_size=4))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from holobench_eval.report import Layout
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 ROWS: dict[str, tuple[str, float, int, int, float]] = {
     # label: registered name, gain over Wirtinger [dB], captures of the training, captures per target, seconds
@@ -24,7 +24,7 @@ ROWS: dict[str, tuple[str, float, int, int, float]] = {
     "online_camera_network": ("online_camera_network", 3.4, 64, 50, 12.0),
     "oracle": ("oracle", 10.8, 0, 0, 31.0),
 }
-TARGETS = made.TARGETS
+TARGETS = synthetic.TARGETS
 SEVERITY = {"leto-aged": 1.0, "ideal": 0.25}
 
 
@@ -42,16 +42,16 @@ def layout(**changes: Any) -> Layout:
     return Layout(**(given | changes))
 
 
-def record(label: str, target: str, condition: str, quality: float, **changes: Any) -> made.Record:
+def record(label: str, target: str, condition: str, quality: float, **changes: Any) -> synthetic.Record:
     """A done record of a row."""
     name, _, training, captures, seconds = ROWS[label]
     learned = {"sha256": f"{label:.4}", "captures": training, "seconds": 60.0 * training} if training else None
     given = {"captures": captures, "seconds": seconds, "learned": learned, "memory_mib": 10.0 + captures}
-    described = made.cell(name, target, condition, params={"row": label})
-    return made.record(label, described, {"psnr_linear": quality}, **(given | changes))
+    described = synthetic.cell(name, target, condition, params={"row": label})
+    return synthetic.record(label, described, {"psnr_linear": quality}, **(given | changes))
 
 
-def study() -> list[made.Record]:
+def study() -> list[synthetic.Record]:
     """A record for every row and target: targets differ by several dB, methods by the gains above."""
     rng, records = np.random.default_rng(5), []
     level = dict(zip(TARGETS, rng.normal(18, 3, len(TARGETS)), strict=True))

@@ -95,18 +95,18 @@ def ssim(image: Image, target: Image) -> float:
 
 
 def scores(image: Image, target: Image) -> dict[str, float]:
-    found = {}
+    values = {}
     for domain, power in (("linear", 1.0), ("amplitude", 0.5), ("srgb", 1 / 2.2)):
         a, b = image**power, target**power
-        found[f"psnr_{domain}"] = psnr(a, b)
-    found["ssim_linear"] = ssim(image, target)
+        values[f"psnr_{domain}"] = psnr(a, b)
+    values["ssim_linear"] = ssim(image, target)
     for width in (0.5, 1):
         blurred = [gaussian_filter(side, (width, width, 0)) for side in (image, target)]
-        found[f"psnr_linear_blur{width:g}"] = psnr(*blurred)
-    found["psnr_linear_refined"] = found["psnr_linear"] + 0.02
-    found["mofd_srgb"] = float(np.abs(image ** (1 / 2.2) - target ** (1 / 2.2)).mean())
+        values[f"psnr_linear_blur{width:g}"] = psnr(*blurred)
+    values["psnr_linear_refined"] = values["psnr_linear"] + 0.02
+    values["mofd_srgb"] = float(np.abs(image ** (1 / 2.2) - target ** (1 / 2.2)).mean())
     moved = {"refine_dx_px": 0.03, "refine_dy_px": -0.04, "refine_theta_deg": 0.0}
-    return found | moved | {"efficiency": 0.4, "brightness_ratio": 0.9, "scale_0": 1.1}
+    return values | moved | {"efficiency": 0.4, "brightness_ratio": 0.9, "scale_0": 1.1}
 
 
 def cell(method: str, target: str, condition: str, **changes: Any) -> dict[str, Any]:
@@ -130,13 +130,13 @@ def cell(method: str, target: str, condition: str, **changes: Any) -> dict[str, 
     return given | changes
 
 
-def record(label: str, described: dict[str, Any], found: dict[str, float], **changes: Any) -> Record:
+def record(label: str, described: dict[str, Any], values: dict[str, float], **changes: Any) -> Record:
     given = {
         "cell": described,
         "state": "done",
         "reason": "",
         "label": label,
-        "scores": found,
+        "scores": values,
         "captures": 50 if label == "HIL" else 0,
         "seconds": SECONDS.get(label),
         "registration_residual_px": None if described["condition"] == REFERENCE else 0.07,

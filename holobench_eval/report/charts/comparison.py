@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from .gallery import Column, Picture, Tile, error_map, halved, most_detailed
 from .style import new_figure, save_picture, style
 
-SMALLEST_TILE = 192
-"""Captures narrower than this many pixels are enlarged by a whole factor."""
+SMALLEST_TILE = 192  # captures narrower than this many pixels are enlarged by a whole factor
 
 GAP = 8
 CAPTION = 20
@@ -31,8 +30,7 @@ HEADER = 52
 SIDE = 30
 FOOTER = 74
 ERROR_COLOURS = "magma"
-CHARACTER = 6.6
-"""Width in pixels of an average character of the captions."""
+CHARACTER = 6.6  # width in pixels of an average character of the captions
 
 
 def tile_size(shape: tuple[int, ...]) -> tuple[int, int]:
@@ -49,7 +47,7 @@ class Page:
         self.pixels: Picture = np.ones((height, width, 3))
         self.figure: Figure = new_figure(width, height)
 
-    def place(self, left: int, top: int, size: tuple[int, int], picture: Picture) -> None:
+    def paste(self, left: int, top: int, size: tuple[int, int], picture: Picture) -> None:
         """Copy ``picture`` into a box of ``size`` (height, width) by nearest neighbour."""
         rows, columns = (np.arange(n) * have // n for n, have in zip(size, picture.shape[:2], strict=True))
         self.pixels[top : top + size[0], left : left + size[1]] = picture[rows[:, None], columns]
@@ -67,11 +65,11 @@ class Page:
         """A capture with its caption below, or why there is none."""
         tall, wide = size
         if tile.picture is None:
-            self.place(left, top, size, np.full((1, 1, 3), 0.93))
+            self.paste(left, top, size, np.full((1, 1, 3), 0.93))
             words = textwrap.fill(tile.note, int(wide / CHARACTER) - 2, max_lines=6, placeholder="...")
             self.text(left + wide / 2, top + tall / 2, words, fontsize=8, ha="center", va="center")
             return
-        self.place(left, top, size, tile.picture)
+        self.paste(left, top, size, tile.picture)
         self.text(left + wide / 2, top + tall + CAPTION / 2, tile.note, fontsize=8, ha="center", va="center")
 
     def text(self, x: float, y: float, words: str, **kwargs: Any) -> None:
@@ -126,10 +124,10 @@ def _draw_target(page: Page, corner: tuple[int, int], target: Picture) -> None:
     """The target, with a frame around the window that all tiles of its row enlarge."""
     left, top = corner
     tall, wide = tile_size(target.shape)
-    page.place(left, top, (tall, wide), target)
+    page.paste(left, top, (tall, wide), target)
     page.text(left + wide / 2, top + tall + CAPTION / 2, "frame: enlarged below", fontsize=8, ha="center", va="center")
     crop, factor = most_detailed(target), wide // target.shape[1]
-    page.place(left, top + tall + CAPTION, (tall // 2, wide // 2 - 1), crop.of(target))
+    page.paste(left, top + tall + CAPTION, (tall // 2, wide // 2 - 1), crop.of(target))
     page.outline(left + crop.left * factor, top + crop.top * factor, (crop.height * factor, crop.width * factor))
 
 
@@ -141,11 +139,11 @@ def _draw_tile(page: Page, corner: tuple[int, int], tile: Tile, target: Picture,
     if tile.picture is None:
         return
     below, half = top + tall + CAPTION, (tall // 2, wide // 2 - 1)
-    page.place(left, below, half, most_detailed(target).of(tile.picture))
+    page.paste(left, below, half, most_detailed(target).of(tile.picture))
     error = error_map(tile.picture, target)
     if tall == error.shape[0]:
         error = halved(error)
-    page.place(left + wide - half[1], below, half, _coloured(error, scale))
+    page.paste(left + wide - half[1], below, half, _coloured(error, scale))
 
 
 def _coloured(error: NDArray[np.float64], scale: Normalize) -> Picture:

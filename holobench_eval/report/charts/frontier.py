@@ -1,7 +1,7 @@
 """Charts of quality against what it cost: captures of the camera, or seconds.
 
 One panel per display. The baseline is a horizontal line, the floor of what a camera must be worth; the privileged
-method is another, the ceiling. Marks are named where they stand, and rows of one registered method are joined. Pale
+method is another, the oracle. Marks are named where they stand, and rows of one registered method are joined. Pale
 steps show the best quality for a cost, apart for methods with and without the camera for the scored image.
 """
 
@@ -16,32 +16,31 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
-from ..data.categories import CALIBRATED, OFFLINE, ONLINE, OPEN_LOOP, TRACKS
+from ..data.categories import CALIBRATED, CATEGORIES, OFFLINE, ONLINE, OPEN_LOOP
 from .labels import Names
-from .style import COLOURS, GREY, PALE, new_figure, save, style
+from .style import COLOURS, GREY, PALE, grid, save, stacked, style
 
-WIDTH = 900
 PANEL = 370
 FOOTER = 50
 MARKERS = {OPEN_LOOP: "o", CALIBRATED: "s", ONLINE: "D"}
+# Widths relative to that of the logarithmic part: between zero and the smallest cost, and between marks without any
+# cost, which stand side by side so that none hides another.
 ZERO_GAP = 0.14
-"""Width, relative to that of the logarithmic part, between the place of zero and the smallest cost."""
 SPREAD = 0.02
-"""The same, between marks without any cost, which stand side by side so that none hides another."""
+# Up to so many marks of a method each get a name; more are a curve, and the method's name stands at its end.
 NAMED_EACH = 2
-"""Up to so many marks of a method each get a name; more are a curve, and the method's name stands at its end."""
 
 
 @dataclass(frozen=True)
 class Mark:
     """A row of the study: ``cost`` along the axis, mean quality and its interval (NaN: none).
 
-    group: the registered method, whose rows are joined by a line and share its name; track: which marker.
+    group: the registered method, whose rows are joined by a line and share its name; category: which marker.
     """
 
     label: str
     group: str
-    track: str
+    category: str
     cost: float
     quality: float
     low: float
@@ -50,7 +49,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Line:
-    """A horizontal line: the baseline or the ceiling; ``low`` and ``high`` bound its band (NaN: none)."""
+    """A horizontal line: the baseline or the oracle; ``low`` and ``high`` bound its band (NaN: none)."""
 
     label: str
     quality: float
@@ -66,12 +65,12 @@ class Frontier:
     marks: tuple[Mark, ...]
     higher: bool = True
     floor: Line | None = None
-    ceiling: Line | None = None
+    oracle: Line | None = None
 
 
 @dataclass(frozen=True)
 class Costs:
-    """The axis of costs, equal in all panels: positions are decimal logarithms, and zero has a place of its own.
+    """The axis of costs, equal in all panels: positions are decimal logarithms, and zero has a position of its own.
 
     low, high: ends of the logarithmic part; free: labels of marks without any cost, side by side around ``zero``.
     """
@@ -83,10 +82,10 @@ class Costs:
     @classmethod
     def of(cls, marks: Sequence[Mark]) -> Costs:
         """The axis for some marks, at least one of them with a cost above zero."""
-        found = np.log10([mark.cost for mark in marks if mark.cost > 0])
-        left, right = (max(0.12, share * float(np.ptp(found))) for share in (0.06, 0.16))  # to the right stand names
+        logs = np.log10([mark.cost for mark in marks if mark.cost > 0])
+        left, right = (max(0.12, share * float(np.ptp(logs))) for share in (0.06, 0.16))  # to the right stand names
         free = tuple(dict.fromkeys(mark.label for mark in marks if mark.cost == 0))
-        return cls(float(found.min()) - left, float(found.max()) + right, free)
+        return cls(float(logs.min()) - left, float(logs.max()) + right, free)
 
     @property
     def width(self) -> float:
@@ -100,7 +99,7 @@ class Costs:
 
     @property
     def zero(self) -> float | None:
-        """The place of zero; None where every mark has a cost."""
+        """The position of zero; None where every mark has a cost."""
         return self.low - ZERO_GAP * self.width - self.half if self.free else None
 
     def position(self, mark: Mark) -> float:
@@ -136,9 +135,9 @@ class Costs:
 
 def _break(axes: Axes, position: float) -> None:
     """Two strokes across the lower spine: the axis is not to scale here."""
-    place = axes.get_xaxis_transform()
+    transform = axes.get_xaxis_transform()
     gap = 0.006 * (axes.get_xlim()[1] - axes.get_xlim()[0])
-    axes.plot([position - gap, position + gap], [0, 0], color="white", linewidth=3, clip_on=False, transform=place)
+    axes.plot([position - gap, position + gap], [0, 0], color="white", linewidth=3, clip_on=False, transform=transform)
     for side in (-gap, gap):
         axes.plot(
             [position + side],
@@ -147,7 +146,7 @@ def _break(axes: Axes, position: float) -> None:
             markersize=10,
             color="black",
             clip_on=False,
-            transform=place,
+            transform=transform,
             zorder=5,
         )
 
@@ -160,17 +159,14 @@ def draw_frontiers(path: Path, panels: Sequence[Frontier], axis: str, cost: str)
     costs = Costs.of([mark for panel in panels for mark in panel.marks])
     groups = list(dict.fromkeys(mark.group for panel in panels for mark in panel.marks))
     colours = {group: COLOURS[index % len(COLOURS)] for index, group in enumerate(groups)}
-    found = {mark.track for panel in panels for mark in panel.marks}
+    categories = {mark.category for panel in panels for mark in panel.marks}
     with style():
-        figure = new_figure(WIDTH, PANEL * len(panels) + FOOTER)
-        figure.set_layout_engine("constrained")
-        drawn = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+        figure, drawn = stacked([panel.condition for panel in panels], [PANEL] * len(panels), FOOTER)
         for axes, panel in zip(drawn, panels, strict=True):
-            axes.set_title(panel.condition, loc="left", weight="bold", parse_math=False)
-            _panel(axes, panel, costs, colours)
+            _draw_frontier(axes, panel, costs, colours)
             axes.set_ylabel(axis.replace(", of ", "\nof "))
         drawn[-1].set_xlabel(cost)
-        keys = [_key(track) for track in TRACKS if track in found]
+        keys = [_key(category) for category in CATEGORIES if category in categories]
         figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), frameon=False)
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # names are placed by the pixel, so that nothing may move any more
@@ -179,8 +175,8 @@ def draw_frontiers(path: Path, panels: Sequence[Frontier], axis: str, cost: str)
         save(figure, path)
 
 
-def _key(track: str) -> Line2D:
-    return Line2D([], [], linestyle="", marker=MARKERS[track], color=GREY, label=f"{track} track")
+def _key(category: str) -> Line2D:
+    return Line2D([], [], linestyle="", marker=MARKERS[category], color=GREY, label=f"{category} track")
 
 
 def _joined(panel: Frontier) -> list[list[Mark]]:
@@ -189,37 +185,37 @@ def _joined(panel: Frontier) -> list[list[Mark]]:
     return [sorted((m for m in panel.marks if m.group == group), key=lambda m: m.cost) for group in groups]
 
 
-def _front(panel: Frontier, tracks: Sequence[str], costs: Costs) -> list[tuple[float, float]]:
-    """Corners of the steps that the best of some tracks make: the quality that is to be had for a cost."""
+def _front(panel: Frontier, categories: Sequence[str], costs: Costs) -> list[tuple[float, float]]:
+    """Corners of the steps that the best of some categories make: the quality that is to be had for a cost."""
     sign = 1 if panel.higher else -1
     corners: list[tuple[float, float]] = []
-    for mark in sorted((m for m in panel.marks if m.track in tracks), key=lambda m: (m.cost, -sign * m.quality)):
+    for mark in sorted((m for m in panel.marks if m.category in categories), key=lambda m: (m.cost, -sign * m.quality)):
         best = corners[-1][1] if corners else -sign * np.inf
         if sign * mark.quality > sign * best:
             corners += [(costs.position(mark), best)] * bool(corners) + [(costs.position(mark), mark.quality)]
     return corners
 
 
-def _panel(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str, str]) -> None:
-    for line, dashes in ((panel.floor, (6, 3)), (panel.ceiling, (1.5, 2))):
+def _draw_frontier(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str, str]) -> None:
+    for line, dashes in ((panel.floor, (6, 3)), (panel.oracle, (1.5, 2))):
         if line is not None:
             axes.axhline(line.quality, color="black", linewidth=1.1, dashes=dashes, zorder=1)
             if np.isfinite(line.low):
                 axes.axhspan(line.low, line.high, color="black", alpha=0.07, linewidth=0, zorder=0)
-    for tracks in (OFFLINE, (ONLINE,)):
-        steps = _front(panel, tracks, costs)
+    for categories in (OFFLINE, (ONLINE,)):
+        steps = _front(panel, categories, costs)
         axes.plot([x for x, _ in steps], [y for _, y in steps], color=PALE, linewidth=2.2, zorder=1)
     for marks in _joined(panel):
-        places, colour = [costs.position(mark) for mark in marks], colours[marks[0].group]
-        if len(set(places)) > 1:
-            axes.plot(places, [mark.quality for mark in marks], color=colour, linewidth=1.4, zorder=2)
-        for place, mark in zip(places, marks, strict=True):
+        positions, colour = [costs.position(mark) for mark in marks], colours[marks[0].group]
+        if len(set(positions)) > 1:
+            axes.plot(positions, [mark.quality for mark in marks], color=colour, linewidth=1.4, zorder=2)
+        for position, mark in zip(positions, marks, strict=True):
             offsets = np.nan_to_num([[mark.quality - mark.low], [mark.high - mark.quality]])
             axes.errorbar(
-                place,
+                position,
                 mark.quality,
                 yerr=offsets,
-                fmt=MARKERS[mark.track],
+                fmt=MARKERS[mark.category],
                 color=colour,
                 markersize=6.5,
                 markeredgecolor="white",
@@ -230,22 +226,21 @@ def _panel(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str, str]) -
             )
     costs.show(axes)
     axes.margins(y=0.1)
-    axes.grid(color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    grid(axes)
 
 
 def _name_all(axes: Axes, panel: Frontier, costs: Costs) -> None:
     names, joined = Names(axes), _joined(panel)
-    lines = [line for line in (panel.floor, panel.ceiling) if line is not None]
+    lines = [line for line in (panel.floor, panel.oracle) if line is not None]
     for marks in joined:
         names.keep_clear_line([(costs.position(mark), mark.quality) for mark in marks])
         for mark in marks:
-            place = costs.position(mark)
-            names.keep_clear(place, mark.quality, 11)
+            position = costs.position(mark)
+            names.keep_clear(position, mark.quality, 11)
             if np.isfinite(mark.low):
-                names.keep_clear_line([(place, mark.low), (place, mark.high)])
-    for tracks in (OFFLINE, (ONLINE,)):
-        names.keep_clear_line(_front(panel, tracks, costs))
+                names.keep_clear_line([(position, mark.low), (position, mark.high)])
+    for categories in (OFFLINE, (ONLINE,)):
+        names.keep_clear_line(_front(panel, categories, costs))
     for line in lines:
         names.keep_clear_line([(end, line.quality) for end in axes.get_xlim()], width=2)
     for line in lines:

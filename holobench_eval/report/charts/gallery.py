@@ -13,8 +13,7 @@ from skimage.io import imread
 
 Picture = NDArray[np.float64]
 
-CROP_FRACTION = 4
-"""The enlarged window is a quarter of the picture in each direction."""
+CROP_FRACTION = 4  # the enlarged window is a quarter of the picture in each direction
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ def halved(picture: NDArray[np.float64]) -> NDArray[np.float64]:
     return means
 
 
-def error_ceiling(errors: Sequence[NDArray[np.float64]]) -> float:
+def error_limit(errors: Sequence[NDArray[np.float64]]) -> float:
     """The upper end of the shared error scale: the 99th percentile of all errors, rounded up to a tenth."""
     high = float(np.quantile(np.concatenate([error.ravel() for error in errors]), 0.99))
     return min(1.0, max(0.1, math.ceil(high * 10 - 1e-9) / 10))

@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from .style import GREY
 
 FONT = 8
-NEAR = 7.0
-"""Pixels between a mark and a name that touches it; names farther away get a line to their mark."""
+NEAR = 7.0  # pixels between a mark and a name that touches it; names farther away get a line to their mark
 REACHES = (NEAR, 14.0, 24.0, 38.0, 56.0, 80.0)
 DIRECTIONS = 16
+# What a square pixel of something covered, or of a name outside the axes, costs in pixels of distance.
 COVERED, OUTSIDE = 4.0, 50.0
-"""What a square pixel of something covered, or of a name outside the axes, costs in pixels of distance."""
 
-Place = tuple[float, float]
+Point = tuple[float, float]
 
 
 @dataclass
@@ -36,7 +35,7 @@ class Names:
     axes: Axes
     taken: list[Bbox] = field(default_factory=list)
 
-    def pixel(self, x: float, y: float) -> Place:
+    def pixel(self, x: float, y: float) -> Point:
         """Data coordinates in pixels."""
         across, up = self.axes.transData.transform((x, y))
         return float(across), float(up)
@@ -45,7 +44,7 @@ class Names:
         """Keep names off a square of ``size`` pixels around a place in data coordinates."""
         self.taken.append(_box(self.pixel(x, y), size, size))
 
-    def keep_clear_line(self, points: Sequence[Place], width: float = 3.0, step: float = 6.0) -> None:
+    def keep_clear_line(self, points: Sequence[Point], width: float = 3.0, step: float = 6.0) -> None:
         """Keep names off a line through places in data coordinates."""
         for start, end in itertools.pairwise(self.pixel(*point) for point in points):
             count = max(2, int(math.dist(start, end) / step))
@@ -56,11 +55,11 @@ class Names:
     def beside(self, text: str, x: float, y: float) -> None:
         """Name a mark: as near as nothing is covered, with a line to the mark where that is far."""
         at = self.pixel(x, y)
-        shown = self._write(text)
-        width, height = self._size(shown)
+        annotation = self._write(text)
+        width, height = self._size(annotation)
         cost = self._costs(width, height)
         reach, middle = min(_around(at, width, height), key=cost)
-        self._settle(shown, middle, width, height)
+        self._settle(annotation, middle, width, height)
         if reach > NEAR:
             edge = _nearest(at, _box(middle, width, height))
             line = self.axes.annotate(
@@ -75,8 +74,8 @@ class Names:
 
     def along(self, text: str, y: float) -> None:
         """Name a horizontal line, above or below it, where nothing is covered."""
-        shown = self._write(text)
-        width, height = self._size(shown)
+        annotation = self._write(text)
+        width, height = self._size(annotation)
         frame, level = self.axes.bbox, self.pixel(self.axes.get_xlim()[0], y)[1]
         room = frame.width - width - 8
         options = [
@@ -88,10 +87,10 @@ class Names:
             for above in (True, False)
         ]
         _, middle = min(options, key=self._costs(width, height))
-        self._settle(shown, middle, width, height)
+        self._settle(annotation, middle, width, height)
 
     def _write(self, text: str) -> Annotation:
-        shown = self.axes.annotate(
+        annotation = self.axes.annotate(
             text,
             xy=(0, 0),
             xycoords="figure pixels",
@@ -102,24 +101,24 @@ class Names:
             annotation_clip=False,
             zorder=6,
         )
-        shown.set_in_layout(False)
-        return shown
+        annotation.set_in_layout(False)
+        return annotation
 
-    def _size(self, shown: Annotation) -> tuple[float, float]:
-        box = shown.get_window_extent()
+    def _size(self, annotation: Annotation) -> tuple[float, float]:
+        box = annotation.get_window_extent()
         return float(box.width) + 2, float(box.height) + 1
 
-    def _settle(self, shown: Annotation, middle: Place, width: float, height: float) -> None:
-        shown.set_position(middle)
-        shown.xy = middle
+    def _settle(self, annotation: Annotation, middle: Point, width: float, height: float) -> None:
+        annotation.set_position(middle)
+        annotation.xy = middle
         self.taken.append(_box(middle, width, height))
 
-    def _costs(self, width: float, height: float) -> Callable[[tuple[float, Place]], float]:
+    def _costs(self, width: float, height: float) -> Callable[[tuple[float, Point]], float]:
         """What a box of that size costs at a (reach, middle), as things stand."""
         taken = np.array([box.extents for box in self.taken]).reshape(-1, 4)
         frame = np.array([self.axes.bbox.extents])
 
-        def cost(option: tuple[float, Place]) -> float:
+        def cost(option: tuple[float, Point]) -> float:
             reach, (x, y) = option
             box = np.array([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
             outside = width * height - _shared(box, frame)
@@ -128,7 +127,7 @@ class Names:
         return cost
 
 
-def _around(at: Place, width: float, height: float) -> Iterator[tuple[float, Place]]:
+def _around(at: Point, width: float, height: float) -> Iterator[tuple[float, Point]]:
     """(distance, middle) of boxes around a place, nearest first; the distance is from the place to the box's edge."""
     for reach in REACHES:
         for index in range(DIRECTIONS):
@@ -137,7 +136,7 @@ def _around(at: Place, width: float, height: float) -> Iterator[tuple[float, Pla
             yield reach, (at[0] + across * (reach + width / 2), at[1] + up * (reach + height / 2))
 
 
-def _box(middle: Place, width: float, height: float) -> Bbox:
+def _box(middle: Point, width: float, height: float) -> Bbox:
     x, y = middle
     return Bbox.from_extents(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
 
@@ -148,6 +147,6 @@ def _shared(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
     return float(size.clip(min=0).prod(axis=1).sum())
 
 
-def _nearest(at: Place, box: Bbox) -> Place:
+def _nearest(at: Point, box: Bbox) -> Point:
     """The point of a box that is nearest to a place."""
     return float(np.clip(at[0], box.x0, box.x1)), float(np.clip(at[1], box.y0, box.y1))

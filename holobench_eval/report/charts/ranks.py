@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,39 +12,13 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from ..data.ranks import Ranks
-from .style import COLOURS, GREY, new_figure, save, slugs, style
+from .style import COLOURS, GREY, WIDTH, grid, new_figure, save, style
 
-WIDTH, ROW, FRAME = 900, 34, 125
-NAME = 34
-"""Characters of a method's name in a line, of which there are two at most."""
-NARROWEST = 0.05
-"""Of a bar on the axis of Kendall's tau."""
+ROW, FRAME = 34, 125
+NAME = 34  # characters of a method's name in a line, of which there are two at most
+NARROWEST = 0.05  # of a bar on the axis of Kendall's tau
 SHADES = LinearSegmentedColormap.from_list("shares", [(0.0, "white"), (0.75, COLOURS[0]), (1.0, "#003A5D")])
-DARK = 0.45
-"""Share from which on figures in a cell are white."""
-
-
-def draw(every: Sequence[Ranks], folder: Path) -> Iterator[tuple[Path, str]]:
-    """Draw a figure for every display that has a ranking; (file, caption) of each."""
-    found = [ranks for ranks in every if ranks.told]
-    stems = slugs([ranks.swept.before for ranks in found])
-    for ranks in found:
-        path = folder / f"quality-ranks-{stems[ranks.swept.before]}.png"
-        draw_ranks(path, ranks)
-        yield path, _caption(ranks)
-
-
-def _caption(ranks: Ranks) -> str:
-    left = (
-        f"Ranks of the methods over {len(ranks.used)} draws of {ranks.swept.before}. Left: share of draws [%] in which "
-        "a method has a rank, methods in nominal order, the nominal rank framed."
-    )
-    if not len(ranks.taus):
-        return left
-    return (
-        f"{left} Right: draws by Kendall's tau-b of their ranking against the nominal one. Dot and bar: mean with its "
-        "95 % interval; dashed: unrelated."
-    )
+DARK = 0.45  # share from which on figures in a cell are white
 
 
 def draw_ranks(path: Path, ranks: Ranks) -> None:
@@ -67,13 +40,13 @@ def _shares(axes: Axes, ranks: Ranks) -> None:
         percent = 100 * shares[row, column]
         colour = "white" if shares[row, column] > DARK else "black"
         axes.text(column, row, f"{percent:.0f}" if percent >= 1 else "<1", ha="center", va="center", color=colour)
-    for row, place in enumerate(ranks.nominal_places):
+    for row, position in enumerate(ranks.nominal_positions):
         axes.add_patch(
-            Rectangle((place - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
+            Rectangle((position - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
         )
     names = [textwrap.fill(label, NAME, max_lines=2, placeholder="...") for label in ranks.methods]
     axes.set_yticks(range(count), names, parse_math=False, fontsize=8)
-    axes.set_xticks(range(count), [str(place) for place in range(1, count + 1)])
+    axes.set_xticks(range(count), [str(rank) for rank in range(1, count + 1)])
     axes.set_xticks(np.arange(count + 1) - 0.5, minor=True)
     axes.set_yticks(np.arange(count + 1) - 0.5, minor=True)
     axes.grid(which="minor", color="#E5E5E5", linewidth=0.6)
@@ -101,5 +74,4 @@ def _agreement(axes: Axes, ranks: Ranks) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.set_ylabel("draws")
     axes.set_xlabel("Kendall's tau-b against\nthe nominal ranking")
-    axes.grid(axis="y", color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    grid(axes, "y")

@@ -30,7 +30,7 @@ def draw_rows(path: Path, title: str, target: tuple[str, Picture], rows: Sequenc
         page = Page(SIDE + columns * (wide + GAP), HEADER + len(rows) * (tall + CAPTION + GAP))
         page.text(SIDE, 14, title, fontsize=9, weight="bold", va="center")
         page.text(SIDE + wide / 2, HEADER - 4, f"target: {target[0]}", ha="center", va="bottom")
-        page.place(SIDE, HEADER, (tall, wide), target[1])
+        page.paste(SIDE, HEADER, (tall, wide), target[1])
         for index, row in enumerate(rows):
             top = HEADER + index * (tall + CAPTION + GAP)
             label = textwrap.shorten(row.label, int(tall / CHARACTER), placeholder="...")

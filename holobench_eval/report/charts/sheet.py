@@ -28,8 +28,7 @@ from ...study.opening import open_bench
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1
 MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.035, "top": 0.925, "wspace": 0.46, "hspace": 0.27}
-STEPS = 60
-"""Of the hologram of the chart: it shows what the bench does, not what the method can."""
+STEPS = 60  # of the hologram of the chart: it shows what the bench does, not what the method can
 
 
 def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | None = None) -> Path:
@@ -79,10 +78,10 @@ def _picture(
     extent: tuple[float, float, float, float] | None = None,
     axes: tuple[str, str] = ("column [px]", "row [px]"),
 ) -> None:
-    shown = axis.imshow(image.numpy(), cmap=cmap, interpolation="nearest", extent=extent)
+    drawn = axis.imshow(image.numpy(), cmap=cmap, interpolation="nearest", extent=extent)
     axis.set_title(title)
     axis.set(xlabel=axes[0], ylabel=axes[1])
-    axis.figure.colorbar(shown, ax=axis, label=unit, fraction=0.046)
+    axis.figure.colorbar(drawn, ax=axis, label=unit, fraction=0.046)
 
 
 def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
@@ -117,13 +116,13 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
     height, width = bench.spec.shape
     ramp = (2 * torch.pi * 0.11 * torch.arange(width, dtype=torch.float32)).expand(height, width)
     level = torch.remainder(torch.round(ramp / (2 * torch.pi) * 2**bench.spec.bits), 2**bench.spec.bits)
-    shown = bench.profile.lut.phase(level, bench.spec.bits, bench.channels[GREEN].lut_gain, GREEN)
-    fine = bench.profile.crosstalk.apply(shown, bench.crosstalk)[:, height // 2]
+    phase = bench.profile.lut.phase(level, bench.spec.bits, bench.channels[GREEN].lut_gain, GREEN)
+    fine = bench.profile.crosstalk.apply(phase, bench.crosstalk)[:, height // 2]
     row = fine.reshape(bench.samples, bench.samples, width)[bench.samples // 2].T.reshape(-1)
     count = 30 * bench.samples
-    place = (torch.arange(count) - (bench.samples - 1) / 2) / bench.samples
+    columns = (torch.arange(count) - (bench.samples - 1) / 2) / bench.samples
     axis.step(torch.arange(30), torch.remainder(ramp[0, :30], 2 * torch.pi) / torch.pi, where="mid", label="commanded")
-    axis.plot(place, row[:count] / torch.pi, label="on the panel")
+    axis.plot(columns, row[:count] / torch.pi, label="on the panel")
     axis.set(title="a blaze after look-up table and crosstalk", xlabel="column [px]", ylabel="phase [pi rad]")
     axis.legend(fontsize=8)
 

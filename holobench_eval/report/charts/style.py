@@ -6,17 +6,19 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
 DPI = 100
-QUALITY = 82
-"""Of a JPEG."""
+WIDTH = 900  # pixels of most figures
+QUALITY = 82  # of a JPEG
 
 # Okabe & Ito's palette without its yellow, which is too faint for marks on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6A3D9A", "#7F5539")
@@ -46,6 +48,25 @@ def new_figure(width: int, height: int) -> Figure:
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
+
+
+def stacked(
+    titles: Sequence[str], heights: Sequence[int], footer: int, width: int = WIDTH
+) -> tuple[Figure, list[Axes]]:
+    """A column of panels with their titles; ``heights``, ``footer`` and ``width`` in pixels."""
+    ratios = list(heights) if len(set(heights)) > 1 else None
+    figure = new_figure(width, sum(heights) + footer)
+    figure.set_layout_engine("constrained")
+    panels = figure.subplots(len(titles), 1, squeeze=False, height_ratios=ratios)[:, 0]
+    for axes, title in zip(panels, titles, strict=True):
+        axes.set_title(title, loc="left", weight="bold", parse_math=False)
+    return figure, list(panels)
+
+
+def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
+    """Pale lines behind everything that is drawn."""
+    axes.grid(axis=axis, color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)
 
 
 def save(figure: Figure, path: Path) -> None:

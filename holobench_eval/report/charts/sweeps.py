@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from .style import COLOURS, GREY, new_figure, save, style
+from .style import COLOURS, GREY, grid, save, stacked, style
 
-WIDTH, PANEL, FOOTER = 900, 330, 60
+PANEL, FOOTER = 330, 60
 MARKS = "osD^vP*X"
 
 
@@ -30,13 +30,13 @@ class Curve:
 class Panel:
     """A sweep on one display.
 
-    places: of the points on the axis; ticks: their names where they are no numbers (None: numbers); nominal: where
+    positions: of the points on the axis; ticks: their names where they are no numbers (None: numbers); nominal: where
     nothing is changed, for a vertical line.
     """
 
     title: str
     axis: str
-    places: tuple[float, ...]
+    positions: tuple[float, ...]
     curves: tuple[Curve, ...]
     ticks: tuple[str, ...] | None = None
     nominal: float | None = None
@@ -48,30 +48,26 @@ def draw_sweep(path: Path, panels: Sequence[Panel], quality: str) -> None:
     looks = {label: (COLOURS[i % len(COLOURS)], MARKS[i % len(MARKS)]) for i, label in enumerate(labels)}
     rows = -(-len(labels) // 4)
     with style():
-        figure = new_figure(WIDTH, PANEL * len(panels) + FOOTER + 16 * rows)
-        figure.set_layout_engine("constrained")
-        drawn = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+        figure, drawn = stacked([panel.title for panel in panels], [PANEL] * len(panels), FOOTER + 16 * rows)
+        legend: dict[str, Artist] = {}
         for axes, panel in zip(drawn, panels, strict=True):
-            axes.set_title(panel.title, loc="left", weight="bold", parse_math=False)
-            _panel(axes, panel, looks)
+            _draw_curves(axes, panel, looks)
             axes.set_ylabel(quality.replace(", of ", "\nof "))
-        found: dict[str, Artist] = {}
-        for axes in drawn:
             handles, names = axes.get_legend_handles_labels()
-            found |= dict(zip(names, handles, strict=True))
-        figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=4, frameon=False)
+            legend |= dict(zip(names, handles, strict=True))
+        figure.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=4, frameon=False)
         save(figure, path)
 
 
-def _panel(axes: Axes, panel: Panel, looks: dict[str, tuple[str, str]]) -> None:
-    spread = np.ptp(panel.places) / 250 if len(panel.places) > 1 else 0.0
+def _draw_curves(axes: Axes, panel: Panel, looks: dict[str, tuple[str, str]]) -> None:
+    spread = np.ptp(panel.positions) / 250 if len(panel.positions) > 1 else 0.0
     for index, curve in enumerate(panel.curves):
         colour, mark = looks[curve.label]
-        places = np.array(panel.places) + (index - (len(panel.curves) - 1) / 2) * (
+        positions = np.array(panel.positions) + (index - (len(panel.curves) - 1) / 2) * (
             spread if panel.ticks is None else 0.07
         )
         axes.errorbar(
-            places,
+            positions,
             curve.mean,
             yerr=np.nan_to_num(np.array(curve.reach).T),
             color=GREY if curve.dashed else colour,
@@ -88,7 +84,6 @@ def _panel(axes: Axes, panel: Panel, looks: dict[str, tuple[str, str]]) -> None:
     if panel.nominal is not None:
         axes.axvline(panel.nominal, color="black", linewidth=0.8, linestyle=":")
     if panel.ticks is not None:
-        axes.set_xticks(panel.places, panel.ticks, parse_math=False)
+        axes.set_xticks(panel.positions, panel.ticks, parse_math=False)
     axes.set_xlabel(panel.axis)
-    axes.grid(color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    grid(axes)

@@ -13,18 +13,14 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from ...study.artifacts import Round
-from .style import COLOURS, PALE, new_figure, save, style
+from .style import COLOURS, PALE, WIDTH, grid, new_figure, save, style
 
-Rounds = tuple[str, tuple[Round, ...]]
-"""A training's name and its rounds."""
+Rounds = tuple[str, tuple[Round, ...]]  # a training's name and its rounds
 
-WIDTH = 900
 COLUMNS = 3
 A_PAGE = 6
-CHARACTER = 8.5
-"""Width in pixels of an average character of a panel's title."""
-CURVES = 12
-"""Up to so many trainings have a panel each; more are rows of one chart of their last rounds."""
+CHARACTER = 8.5  # width in pixels of an average character of a panel's title
+CURVES = 12  # up to so many trainings have a panel each; more are rows of one chart of their last rounds
 LINES = (
     ("predicted", "predicted picture, against the target", COLOURS[0], "o"),
     ("captured", "captured picture, against the target", COLOURS[1], "s"),
@@ -32,28 +28,28 @@ LINES = (
 )
 
 
-def draw_trainings(stem: Path, found: Sequence[Rounds]) -> list[tuple[Path, bool]]:
+def draw_trainings(stem: Path, trainings: Sequence[Rounds]) -> list[tuple[Path, bool]]:
     """Draw all trainings that have figures; the files, and whether each shows curves (or last rounds only).
 
     stem: the files' name without number and ending.
     """
-    shown = [(name, kept) for name, rounds in found if (kept := tuple(filter(_has_figures, rounds)))]
-    if not shown:
+    drawable = [(name, kept) for name, rounds in trainings if (kept := tuple(filter(_has_figures, rounds)))]
+    if not drawable:
         return []
-    if len(shown) > CURVES or all(len(rounds) == 1 for _, rounds in shown):
+    if len(drawable) > CURVES or all(len(rounds) == 1 for _, rounds in drawable):
         path = stem.with_name(f"{stem.name}-last.png")
-        last_rounds(path, [(name, rounds[-1:]) for name, rounds in shown])
+        last_rounds(path, [(name, rounds[-1:]) for name, rounds in drawable])
         return [(path, False)]
     drawn = []
-    for number, start in enumerate(range(0, len(shown), A_PAGE), start=1):
+    for number, start in enumerate(range(0, len(drawable), A_PAGE), start=1):
         path = stem.with_name(f"{stem.name}-{number}.png")
-        curves(path, shown[start : start + A_PAGE], _limits(shown))
+        curves(path, drawable[start : start + A_PAGE], _limits(drawable))
         drawn.append((path, True))
     return drawn
 
 
-def _has_figures(one: Round) -> bool:
-    return math.isfinite(one.captures) and any(math.isfinite(getattr(one, name)) for name, *_ in LINES)
+def _has_figures(step: Round) -> bool:
+    return math.isfinite(step.captures) and any(math.isfinite(getattr(step, name)) for name, *_ in LINES)
 
 
 @dataclass(frozen=True)
@@ -64,36 +60,37 @@ class _Limits:
     psnr: tuple[float, float]
 
 
-def _limits(shown: Sequence[Rounds]) -> _Limits:
-    values = np.array([getattr(one, name) for _, rounds in shown for one in rounds for name, *_ in LINES])
+def _limits(trainings: Sequence[Rounds]) -> _Limits:
+    values = np.array([getattr(step, name) for _, rounds in trainings for step in rounds for name, *_ in LINES])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     margin = max(0.5, 0.08 * (high - low))
-    most = max(one.captures for _, rounds in shown for one in rounds)
+    most = max(step.captures for _, rounds in trainings for step in rounds)
     return _Limits((0.0, most * 1.06 + 0.5), (low - margin, high + margin))
 
 
-def curves(path: Path, shown: Sequence[Rounds], limits: _Limits) -> None:
+def curves(path: Path, trainings: Sequence[Rounds], limits: _Limits) -> None:
     """A panel per training: the three figures against the captures taken, a mark per round."""
-    columns = min(COLUMNS, len(shown))
-    rows = -(-len(shown) // columns)
+    columns = min(COLUMNS, len(trainings))
+    rows = -(-len(trainings) // columns)
     with style():
         figure = new_figure(WIDTH, 60 + 270 * rows)
         figure.set_layout_engine("constrained")
         panels = figure.subplots(rows, columns, squeeze=False, sharey=True)
-        for place, axes in enumerate(panels.flat):
-            if place >= len(shown):
+        for index, axes in enumerate(panels.flat):
+            if index >= len(trainings):
                 axes.remove()
                 continue
-            _curve(axes, shown[place][1], limits)
+            name, steps = trainings[index]
+            _curve(axes, steps, limits)
             title = textwrap.fill(
-                shown[place][0],
+                name,
                 int(WIDTH / columns / CHARACTER),
                 max_lines=2,
                 placeholder="...",
                 break_on_hyphens=False,
             )
             axes.set_title(title, loc="left", weight="bold", parse_math=False)
-            if place % columns == 0:
+            if index % columns == 0:
                 axes.set_ylabel("PSNR on held-out images [dB]")
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(LINES), frameon=False)
@@ -101,36 +98,36 @@ def curves(path: Path, shown: Sequence[Rounds], limits: _Limits) -> None:
 
 
 def _curve(axes: Axes, rounds: tuple[Round, ...], limits: _Limits) -> None:
-    captures = [one.captures for one in rounds]
+    captures = [step.captures for step in rounds]
     for key, label, colour, marker in LINES:
-        axes.plot(captures, [getattr(one, key) for one in rounds], color=colour, marker=marker, label=label)
+        axes.plot(captures, [getattr(step, key) for step in rounds], color=colour, marker=marker, label=label)
     axes.set_xlabel("captures taken for training")
     axes.set_xlim(*limits.captures)
     axes.set_ylim(*limits.psnr)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-    axes.grid(color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    grid(axes)
 
 
-def last_rounds(path: Path, shown: Sequence[Rounds]) -> None:
+def last_rounds(path: Path, trainings: Sequence[Rounds]) -> None:
     """A row per training with the three figures after its last round."""
-    places = np.arange(len(shown))
+    heights = np.arange(len(trainings))
     with style():
-        figure = new_figure(WIDTH, 110 + 26 * len(shown))
+        figure = new_figure(WIDTH, 110 + 26 * len(trainings))
         figure.set_layout_engine("constrained")
         axes = figure.subplots()
-        last = [rounds[-1] for _, rounds in shown]
-        values = np.array([[getattr(one, key) for key, *_ in LINES] for one in last])
-        axes.hlines(places, np.nanmin(values, axis=1), np.nanmax(values, axis=1), color=PALE, linewidth=1.2)
+        last = [rounds[-1] for _, rounds in trainings]
+        values = np.array([[getattr(step, key) for key, *_ in LINES] for step in last])
+        axes.hlines(heights, np.nanmin(values, axis=1), np.nanmax(values, axis=1), color=PALE, linewidth=1.2)
         for column, (_, label, colour, marker) in enumerate(LINES):
-            axes.plot(values[:, column], places, linestyle="", color=colour, marker=marker, label=label)
-        names = [f"{_short(name)}, {one.captures:.0f} captures" for (name, _), one in zip(shown, last, strict=True)]
-        axes.set_yticks(places, names, parse_math=False)
-        axes.set_ylim(len(shown) - 0.5, -0.5)
+            axes.plot(values[:, column], heights, linestyle="", color=colour, marker=marker, label=label)
+        names = [
+            f"{_short(name)}, {step.captures:.0f} captures" for (name, _), step in zip(trainings, last, strict=True)
+        ]
+        axes.set_yticks(heights, names, parse_math=False)
+        axes.set_ylim(len(trainings) - 0.5, -0.5)
         axes.tick_params(axis="y", length=0)
         axes.set_xlabel("PSNR on held-out images after the last round [dB]")
-        axes.grid(axis="x", color="#E5E5E5", linewidth=0.6)
-        axes.set_axisbelow(True)
+        grid(axes, "x")
         axes.set_title("after the last round of training", loc="left", weight="bold")
         figure.legend(loc="outside lower center", ncols=len(LINES), frameon=False)
         save(figure, path)

@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container
 
 OPEN_LOOP = "open loop"
 CALIBRATED = "calibrated"
 ONLINE = "online"
-CEILING = "ceiling"
+ORACLE = "ceiling"
 GIVEN = "given"
 
-TRACKS = (OPEN_LOOP, CALIBRATED, ONLINE, CEILING, GIVEN)
-"""In the order of tables."""
-
+# In the order of tables.
+CATEGORIES = (OPEN_LOOP, CALIBRATED, ONLINE, ORACLE, GIVEN)
+# Methods that, as far as is known, never see a capture of the scored image: their holograms are ready before it.
 OFFLINE = (OPEN_LOOP, CALIBRATED, GIVEN)
-"""The tracks whose methods never see a capture of the scored image, as far as is known: their holograms are ready
-before it is shown."""
 
 _MEANINGS = {
     OPEN_LOOP: "knows the nominal optics and takes no captures at all.",
-    CALIBRATED: "was trained on captures of other images before any target was seen, and takes none of a scored "
-    "image; its captures are spent once, however many images follow.",
-    ONLINE: "sees, through the camera, captures of the very image that is scored while it solves; it spends captures "
-    "on every image, and needs the camera in front of the display for as long as the display is in use.",
-    CEILING: "may differentiate through the simulated bench, which no real method can, and is not ranked.",
-    GIVEN: "gave pictures alone; what it was given of the camera is not known.",
+    CALIBRATED: "is trained on captures of other images before any target is seen, and takes none of a scored image; "
+    "its captures are spent once, for any number of images.",
+    ONLINE: "captures the scored image itself while it solves; it spends captures on every image, and needs a camera "
+    "in front of the display in use.",
+    ORACLE: "may differentiate through the simulated bench, which no real method can, and is not ranked.",
+    GIVEN: "gave pictures only; its access to the camera is unknown.",
 }
 
 
-def meanings(found: Iterable[str]) -> list[tuple[str, str]]:
-    """(track, what it means) of the tracks that are there, in their order."""
-    there = set(found)
-    return [(track, _MEANINGS[track]) for track in TRACKS if track in there]
+def meanings(present: Container[str]) -> list[tuple[str, str]]:
+    """(category, what it means) of those that are present, in their order."""
+    return [(category, _MEANINGS[category]) for category in CATEGORIES if category in present]

@@ -11,8 +11,8 @@ from ...display.simulated.changes import draws
 from ...display.simulated.profile import load_profile
 from ...study.displays import changed, displays
 from ...study.focal_stacks import planes_of
-from .categories import CALIBRATED, CEILING, GIVEN, ONLINE, OPEN_LOOP
-from .text import FILES, Wording, from_files, plain, wording
+from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
+from .text import FILES, Text, plain, text_of
 
 if TYPE_CHECKING:
     from ...study.definition import Study
@@ -56,7 +56,7 @@ class Layout:
     targets: what every pair is measured on, in the order of the dataset; seed: of the study.
     baseline: label that every method is tested against (None: no such tests).
     headline: score key of the headline metric, such as ``psnr_linear``.
-    privileged: labels of methods that may differentiate through the bench; they are the ceiling, not competitors.
+    privileged: labels of methods that may differentiate through the bench; they are oracles, not competitors.
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
     note: a paragraph that the study wants beside its tables. measure: ``picture``, ``prediction``, ``focus`` or
@@ -93,12 +93,12 @@ class Layout:
     real: bool = False
     values: str = ""
 
-    def track(self, label: str) -> str:
-        """The track that a method competes in."""
+    def category(self, label: str) -> str:
+        """The category that a method competes in."""
         if self.measure == FILES:
             return GIVEN
         if label in self.privileged:
-            return CEILING
+            return ORACLE
         if label in self.camera:
             return ONLINE
         return CALIBRATED if label in self.trained else OPEN_LOOP
@@ -109,11 +109,14 @@ class Layout:
         return bool(self.trained or self.camera)
 
     @property
-    def wording(self) -> Wording:
+    def text(self) -> Text:
         """What is compared, in words."""
-        if self.measure == FILES:
-            return from_files(self.values)
-        return wording(self.measure, self.holograms.partition(" (")[0], self.learned_display is not None, self.real)
+        holograms = self.holograms.partition(" (")[0]
+        return text_of(self.measure, holograms, self.learned_display is not None, self.real, self.values)
+
+    def marked(self, label: str) -> str:
+        """A method's label, marked when it is the oracle."""
+        return f"{label}, ceiling (privileged)" if label in self.privileged else label
 
     def published(self, label: str, condition: str) -> Mapping[str, float]:
         """Published figures of a row, by metric."""
@@ -143,28 +146,28 @@ class Layout:
 def layout_of(study: Study) -> Layout:
     """The layout of a checked study. Reads its profiles and lists its dataset; computes nothing."""
     reported = study.reported
-    shown = displays(study)
-    names = {source: place.name for source, place in shown.items()}
+    conditions = displays(study)
+    names = {source: condition.name for source, condition in conditions.items()}
     methods = {entry.label: plugins.find("methods", entry.name, study.folder) for entry in study.methods}
 
-    def marked(attribute: str) -> frozenset[str]:
+    def labels_with(attribute: str) -> frozenset[str]:
         return frozenset(label for label, method in methods.items() if getattr(method, attribute, False))
 
-    trained = marked("trains")
+    trained = labels_with("trains")
     probe = study.holograms
     return Layout(
         title=study.title,
         pairs=tuple(
-            (entry.label, place.title)
+            (entry.label, condition.title)
             for entry in study.methods
             for source in entry.profiles
-            for place in changed(study, source, shown[source])
+            for condition in changed(study, source, conditions[source])
         ),
         targets=tuple(study.dataset.items()),
         seed=study.seed,
         headline=study.headline,
         baseline=study.baseline,
-        privileged=marked("privileged"),
+        privileged=labels_with("privileged"),
         reported=reported.rows if reported else {},
         reported_source=reported.source if reported else "",
         reported_beside=names[reported.beside] if reported and reported.beside else None,
@@ -175,32 +178,32 @@ def layout_of(study: Study) -> Layout:
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,
         training=_training_set(study) if trained or study.display.learned else None,
-        camera=marked("camera"),
-        sweeps=tuple(_sweeps(study, shown)),
+        camera=labels_with("camera"),
+        sweeps=tuple(_sweeps(study, conditions)),
         planes=planes_of(study.dataset, study.targets.dataset) if study.measure == "focus" else {},
         real=study.display.real,
-        stacked=marked("planes") if study.measure == "focus" else frozenset(),
+        stacked=labels_with("planes") if study.measure == "focus" else frozenset(),
     )
 
 
-def _sweeps(study: Study, shown: Mapping[str, Condition]) -> Iterator[Swept]:
+def _sweeps(study: Study, conditions: Mapping[str, Condition]) -> Iterator[Swept]:
     for kind in dict.fromkeys(sweep.condition for sweep in study.sweeps):
         same = tuple(sweep for sweep in study.sweeps if sweep.condition == kind)
-        for source, before in shown.items():
-            places = changed(replace(study, sweeps=same), source, before)[1:]
-            points = tuple((place.change[1], place.title) for place in places if place.change)
+        for source, before in conditions.items():
+            after = changed(replace(study, sweeps=same), source, before)[1:]
+            points = tuple((condition.change[1], condition.title) for condition in after if condition.change)
             if points:
                 drawn = _drawn(before, points) if kind == "draw" else ()
                 yield Swept(kind, before.name, points, drawn)
 
 
-def _drawn(place: Condition, points: tuple[tuple[float | str, str], ...]) -> tuple[dict[str, float], ...]:
+def _drawn(before: Condition, points: tuple[tuple[float | str, str], ...]) -> tuple[dict[str, float], ...]:
     """What was drawn at every point, without the parameters of stages that the display lacks."""
-    profile = load_profile(place.source, folder=place.folder)
-    every = draws.PARAMETERS.items()
-    felt = {name for name, one in every if one.put(profile, one.low) != one.put(profile, one.high)}
-    drawn = (draws.values(profile, int(index)) for index, _ in points)
-    return tuple({name: value for name, value in one.items() if name in felt} for one in drawn)
+    profile = load_profile(before.source, folder=before.folder)
+    ranges = draws.PARAMETERS.items()
+    effective = {name for name, drawn in ranges if drawn.put(profile, drawn.low) != drawn.put(profile, drawn.high)}
+    values = (draws.values(profile, int(index)) for index, _ in points)
+    return tuple({name: value for name, value in draw.items() if name in effective} for draw in values)
 
 
 def _training_set(study: Study) -> TrainingSet:

@@ -13,17 +13,16 @@ import numpy as np
 from scipy import stats
 
 from ...display.simulated.changes.draws import PARAMETERS
-from ..sections.findings import SIGNIFICANCE
 from .categories import OFFLINE
 from .layout import Swept
 from .results import Results
-from .statistics import FEWEST, Array, Estimate, bootstrap_mean, holm
+from .statistics import FEWEST, SIGNIFICANCE, Array, Estimate, bootstrap_mean, holm
 
+# Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take
+# the draws from all others.
 ENOUGH = 0.5
-"""Share of the draws in which a method needs a value for every target to be ranked, so that one that seldom has does
-not take the draws from all others."""
+# Parameters that are angles over a full turn: neither end of their range is more than the other.
 CIRCULAR = frozenset({"zero_phase"})
-"""Parameters that are angles over a full turn: neither end of their range is more than the other."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ class Ranks:
         better, NaN where a target has no score."""
         results, conditions = self.results, [self.swept.before, *(name for _, name in self.swept.points)]
         sign = 1 if results.headline.higher_is_better else -1
-        labels = [label for label in results.methods(conditions[0]) if results.layout.track(label) in OFFLINE]
+        labels = [label for label in results.methods(conditions[0]) if results.layout.category(label) in OFFLINE]
         return {
             label: sign * np.array([results.values(label, condition).mean() for condition in conditions])
             for label in labels
@@ -104,8 +103,8 @@ class Ranks:
     def methods(self) -> list[str]:
         """Those that are ranked, nominally best first: with every target nominally and in enough of the draws."""
         known = {label: np.isfinite(quality) for label, quality in self.quality.items()}
-        some = np.any([whole[1:] for whole in known.values()], axis=0) if known else np.zeros(0)
-        kept = [label for label, whole in known.items() if whole[0] and whole[1:].sum() >= ENOUGH * some.sum() > 0]
+        usable = np.any([draws[1:] for draws in known.values()], axis=0) if known else np.zeros(0)
+        kept = [label for label, draws in known.items() if draws[0] and draws[1:].sum() >= ENOUGH * usable.sum() > 0]
         return sorted(kept, key=lambda label: -self.quality[label][0])
 
     @cached_property
@@ -123,8 +122,8 @@ class Ranks:
         return [int(index) for index in np.flatnonzero(~np.isfinite(values).any(axis=0))]
 
     @property
-    def told(self) -> bool:
-        """Whether there is a ranking to speak of: two methods and a draw."""
+    def exists(self) -> bool:
+        """Whether there is a ranking: two methods and a draw."""
         return len(self.methods) > 1 and bool(self.used)
 
     @cached_property
@@ -138,29 +137,29 @@ class Ranks:
         return np.stack([self.quality[label][1:][self.used] for label in self.methods], axis=1)
 
     @cached_property
-    def nominal_places(self) -> Array:
+    def nominal_positions(self) -> Array:
         """``(methods,)`` from 1; equal means share the better place."""
-        return places(self.nominal)
+        return positions(self.nominal)
 
     @cached_property
-    def places(self) -> Array:
+    def positions(self) -> Array:
         """``(draws, methods)`` from 1; equal means share the better place."""
-        return places(self.drawn)
+        return positions(self.drawn)
 
     @cached_property
     def shares(self) -> Array:
-        """``(methods, places)`` share of draws in which a method has a place."""
-        return np.stack([(self.places == place).mean(axis=0) for place in range(1, len(self.methods) + 1)], axis=1)
+        """``(methods, positions)`` share of draws in which a method has a place."""
+        return np.stack([(self.positions == rank).mean(axis=0) for rank in range(1, len(self.methods) + 1)], axis=1)
 
     def first(self, label: str) -> Estimate:
         """Share of draws in which a method is first."""
-        return share(int((self.places[:, self.methods.index(label)] == 1).sum()), len(self.used))
+        return share(int((self.positions[:, self.methods.index(label)] == 1).sum()), len(self.used))
 
     @cached_property
     def taus(self) -> Array:
         """Kendall's tau-b of each draw's ranking against the nominal one; without draws in which all methods tie."""
-        found = np.array([stats.kendalltau(self.nominal, row).statistic for row in self.drawn])
-        return found[np.isfinite(found)]
+        taus = np.array([stats.kendalltau(self.nominal, row).statistic for row in self.drawn])
+        return taus[np.isfinite(taus)]
 
     @property
     def tau(self) -> Estimate:
@@ -170,7 +169,7 @@ class Ranks:
     @property
     def unchanged(self) -> int:
         """Draws in which every method has its nominal place."""
-        return int((self.places == self.nominal_places).all(axis=1).sum())
+        return int((self.positions == self.nominal_positions).all(axis=1).sum())
 
     @cached_property
     def features(self) -> list[Feature]:
@@ -178,14 +177,14 @@ class Ranks:
         if not self.swept.drawn:
             return []
         drawn = [self.swept.drawn[index] for index in self.used]
-        columns = {name: np.array([one[name] for one in drawn]) for name in drawn[0]}
+        columns = {name: np.array([draw[name] for draw in drawn]) for name in drawn[0]}
         return [feature for name, values in columns.items() for feature in _features(name, values)]
 
     @cached_property
     def pairs(self) -> list[Pair]:
         """Every pair of ranked methods, in the order of the nominal ranking."""
         numbers = itertools.combinations(range(len(self.methods)), 2)
-        every = [
+        pairs = [
             Pair(
                 self.methods[first],
                 self.methods[second],
@@ -194,8 +193,8 @@ class Ranks:
             )
             for first, second in numbers
         ]
-        causes = _causes([pair for pair in every if pair.flips], self.features)
-        return [replace(pair, cause=causes.get((pair.first, pair.second))) for pair in every]
+        causes = _causes([pair for pair in pairs if pair.flips], self.features)
+        return [replace(pair, cause=causes.get((pair.first, pair.second))) for pair in pairs]
 
     @property
     def tests(self) -> int:
@@ -203,10 +202,10 @@ class Ranks:
         return len(self.features) * sum(pair.flips > 0 for pair in self.pairs)
 
 
-def places(quality: Array) -> Array:
+def positions(quality: Array) -> Array:
     """Places from 1 along the last axis, the largest first; equal values share the better place."""
-    found: Array = stats.rankdata(-quality, method="min", axis=-1).astype(np.float64)
-    return found
+    ranks: Array = stats.rankdata(-quality, method="min", axis=-1).astype(np.float64)
+    return ranks
 
 
 def share(count: int, total: int) -> Estimate:
@@ -229,9 +228,9 @@ def _causes(pairs: Sequence[Pair], features: Sequence[Feature]) -> Mapping[tuple
     corrected = holm([p for *_, p in tried])
     causes: dict[tuple[str, str], Cause] = {}
     for (pair, feature, correlation, _), p in zip(tried, corrected, strict=True):
-        names, found = (pair.first, pair.second), Cause(feature, correlation, p)
+        names = pair.first, pair.second
         if p < SIGNIFICANCE and (names not in causes or abs(correlation) > abs(causes[names].correlation)):
-            causes[names] = found
+            causes[names] = Cause(feature, correlation, p)
     return causes
 
 
@@ -239,26 +238,16 @@ def _spearman(a: Array, b: Array) -> tuple[float, float]:
     """Spearman's correlation and its two-sided p value; NaN where one side is constant, or for too few draws."""
     if len(a) < FEWEST or np.ptp(a) == 0 or np.ptp(b) == 0:
         return math.nan, math.nan
-    found = stats.spearmanr(a, b)
+    test = stats.spearmanr(a, b)
     least = 2 / math.factorial(min(len(a), 100))  # of all orders: the approximation by Student's t goes down to zero
-    return float(found.statistic), max(float(found.pvalue), least)
+    return float(test.statistic), max(float(test.pvalue), least)
 
 
 def ranks(results: Results) -> list[Ranks]:
     """The rankings of every display of which a study has draws, those of all its sweeps together."""
-    drawn = [swept for swept in results.layout.sweeps if swept.kind == "draw"]
-    by_display: dict[str, list[Swept]] = {}
-    for swept in drawn:
-        by_display.setdefault(swept.before, []).append(swept)
-    return [
-        Ranks(
-            Swept(
-                "draw",
-                before,
-                tuple(point for swept in parts for point in swept.points),
-                tuple(values for swept in parts for values in swept.drawn),
-            ),
-            results,
-        )
-        for before, parts in by_display.items()
-    ]
+    merged: dict[str, Swept] = {}
+    for swept in results.layout.sweeps:
+        if swept.kind == "draw":
+            known = merged.get(swept.before, Swept("draw", swept.before, ()))
+            merged[swept.before] = replace(known, points=known.points + swept.points, drawn=known.drawn + swept.drawn)
+    return [Ranks(swept, results) for swept in merged.values()]

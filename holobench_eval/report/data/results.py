@@ -12,11 +12,14 @@ import pandas as pd
 
 from ...core.errors import UserError, suggest
 from ...study.plan import FLOORS, REFERENCE
-from .categories import CEILING, OFFLINE, TRACKS
+from .categories import CATEGORIES, OFFLINE, ORACLE
 from .layout import Layout
 from .scores import Score, parse
 from .statistics import Array, Estimate, PairedTest, bootstrap_mean, holm, paired_test
 from .tables import DONE, per_target, score_columns, table_from_records
+
+# Metrics of the main table besides the headline.
+LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd")
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,29 @@ class Results:
         return parse(self.layout.headline)
 
     @cached_property
+    def leading(self) -> list[Score]:
+        """The headline metric, those of what is in focus, then the usual ones in linear light, or their only domain."""
+        plain = [score for score in self.scores if not score.variant]
+        chosen = list(dict.fromkeys([self.headline, *(score for score in self.scores if score.in_focus)]))
+        for metric in LEADING:
+            same = sorted((s for s in plain if s.metric == metric), key=lambda s: s.domain not in ("linear", ""))
+            if same and same[0] not in chosen and not (metric == "mofd" and any("lpips" in s.metric for s in chosen)):
+                chosen.append(same[0])
+        return chosen
+
+    @cached_property
+    def blur_scores(self) -> list[Score]:
+        """The headline metric, of whole pictures, at each blur width, sharpest first; plain counts as width zero."""
+        same = [s for s in self.scores if (s.metric, s.domain) == (self.headline.metric, self.headline.domain)]
+        blurred = sorted((s for s in same if s.blur is not None), key=lambda s: s.blur or 0.0)
+        return [next(s for s in same if not s.variant), *blurred] if blurred else []
+
+    @cached_property
+    def done(self) -> pd.DataFrame:
+        """The records of methods with a score."""
+        return self.frame[(self.frame["state"] == DONE) & (self.frame["condition"] != REFERENCE)]
+
+    @cached_property
     def targets(self) -> list[str]:
         """Names of the targets, those of the dataset first and in its order."""
         return list(dict.fromkeys([*self.layout.targets, *self.frame["target"]]))
@@ -60,12 +86,12 @@ class Results:
 
     def methods(self, condition: str) -> list[str]:
         """Labels with a row under ``condition``, in the order of the table."""
-        return [label for label, place in self._rows if place == condition]
+        return [label for label, name in self._rows if name == condition]
 
     def lost(self, label: str, before: str, condition: str) -> Estimate | None:
         """Headline score before a change minus that after it, target by target, so that a loss is positive where higher
         is better; None without a complete pair of rows."""
-        rows = [name for name in (before, condition) if label in self.methods(name) and self.whole(label, name)]
+        rows = [name for name in (before, condition) if label in self.methods(name) and self.is_complete(label, name)]
         if len(rows) < 2:
             return None
         sign = 1 if self.headline.higher_is_better else -1
@@ -86,7 +112,7 @@ class Results:
 
     @cached_property
     def _groups(self) -> dict[tuple[str, str], pd.DataFrame]:
-        return {(str(label), str(place)): rows for (label, place), rows in self.frame.groupby(["method", "condition"])}
+        return {(str(label), str(name)): rows for (label, name), rows in self.frame.groupby(["method", "condition"])}
 
     def values(self, label: str, condition: str, key: str | None = None) -> Array:
         """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
@@ -100,57 +126,57 @@ class Results:
         """Every number of a method under a condition, a row for each of ``targets``."""
         return {pair: per_target(rows).reindex(self.targets) for pair, rows in self._groups.items()}
 
-    def whole(self, label: str, condition: str, key: str | None = None) -> bool:
+    def is_complete(self, label: str, condition: str, key: str | None = None) -> bool:
         """Whether a method has a value for every target: only then may its mean be compared."""
         return not np.isnan(self.values(label, condition, key)).any()
 
-    def complete(self, condition: str, key: str | None = None, tracks: Sequence[str] = OFFLINE) -> list[str]:
-        """Methods of the tracks with a value for every target: the only means that may be ranked together.
+    def complete(self, condition: str, key: str | None = None, categories: Sequence[str] = OFFLINE) -> list[str]:
+        """Methods of the categories with a value for every target: the only means that may be ranked together.
 
         Methods that see the camera for the scored image are not among the others, and are asked for by name.
         """
         return [
             label
             for label in self.methods(condition)
-            if self.layout.track(label) in tracks and self.whole(label, condition, key)
+            if self.layout.category(label) in categories and self.is_complete(label, condition, key)
         ]
 
-    def ranking(self, condition: str, key: str | None = None, tracks: Sequence[str] = OFFLINE) -> list[str]:
-        """Complete methods of the tracks, best mean first."""
+    def ranking(self, condition: str, key: str | None = None, categories: Sequence[str] = OFFLINE) -> list[str]:
+        """Complete methods of the categories, best mean first."""
         score = parse(key) if key else self.headline
         sign = -1 if score.higher_is_better else 1
         return sorted(
-            self.complete(condition, key, tracks),
+            self.complete(condition, key, categories),
             key=lambda label: sign * self.values(label, condition, key).mean(),
         )
 
     @cached_property
-    def tracks(self) -> list[str]:
-        """The tracks that have rows, in their order."""
-        found = {self.layout.track(label) for condition in self.conditions for label in self.methods(condition)}
-        return [track for track in TRACKS if track in found]
+    def categories(self) -> list[str]:
+        """The categories that have rows, in their order."""
+        present = {self.layout.category(label) for condition in self.conditions for label in self.methods(condition)}
+        return [category for category in CATEGORIES if category in present]
 
-    def ceiling(self, condition: str) -> str | None:
+    def oracle(self, condition: str) -> str | None:
         """The best complete privileged method."""
-        return next(iter(self.ranking(condition, tracks=(CEILING,))), None)
+        return next(iter(self.ranking(condition, categories=(ORACLE,))), None)
 
     def gain(self, label: str, condition: str) -> Estimate | None:
         """Headline score minus that of the baseline, target by target; None without a complete pair of rows."""
         baseline = self.layout.baseline
-        if baseline not in self.methods(condition) or not self.whole(baseline, condition):
+        if baseline not in self.methods(condition) or not self.is_complete(baseline, condition):
             return None
-        if not self.whole(label, condition):
+        if not self.is_complete(label, condition):
             return None
         return bootstrap_mean(self.values(label, condition) - self.values(baseline, condition))
 
-    def closed(self, label: str, condition: str) -> float:
-        """How much of the way from the baseline's mean to the ceiling's a method goes; NaN where there is no way.
+    def gap_closed(self, label: str, condition: str) -> float:
+        """The share of the gap between baseline and oracle that a method closes; NaN where there is no gap.
 
-        For PSNR, in dB: (method - baseline) / (ceiling - baseline). 0 is the baseline, 1 the ceiling.
+        For PSNR, in dB: (method - baseline) / (oracle - baseline). 0 is the baseline, 1 the oracle.
         """
-        ceiling = self.ceiling(condition)
+        oracle = self.oracle(condition)
         gained = self.gain(label, condition)
-        most = self.gain(ceiling, condition) if ceiling else None
+        most = self.gain(oracle, condition) if oracle else None
         sign = 1 if self.headline.higher_is_better else -1
         if gained is None or most is None or sign * most.mean <= 0:
             return float("nan")
@@ -174,8 +200,8 @@ class Results:
 
         The reference rows make them: for predictions, captures of one display.
         """
-        made_for = self.frame.loc[self.frame["condition"] == REFERENCE, "profile"]
-        return self.layout.measure != "prediction" or condition in set(made_for)
+        captured = self.frame.loc[self.frame["condition"] == REFERENCE, "profile"]
+        return self.layout.measure != "prediction" or condition in set(captured)
 
     @cached_property
     def holes(self) -> pd.DataFrame:

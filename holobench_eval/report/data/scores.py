@@ -7,8 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from ...metrics.catalogue import catalogue, direction
+from .statistics import Estimate
 
 DOMAINS = ("linear", "amplitude", "srgb", "stored")
 DOMAIN_NAMES = {"linear": "linear light", "amplitude": "amplitude", "srgb": "sRGB", "stored": "values as stored"}
@@ -69,6 +71,11 @@ class Score:
         return f"{self.title}{domain}{f' [{self.unit}]' if self.unit else ''}"
 
     @property
+    def heading(self) -> str:
+        """Of a column: title, domain, unit, and the direction where lower is better."""
+        return f"{self.axis}{'' if self.higher_is_better else ' (lower is better)'}"
+
+    @property
     def higher_is_better(self) -> bool:
         """The direction of the metric."""
         return direction(self.key) != "lower"
@@ -94,6 +101,18 @@ class Score:
         if np.isnan(low):
             return self.number(mean, signed)
         return f"{self.number(mean, signed)} [{self.number(low, signed)}, {self.number(high, signed)}]"
+
+    def estimate(self, estimate: Estimate, signed: bool = False) -> str:
+        """An estimate with its interval."""
+        return self.interval(estimate.mean, estimate.low, estimate.high, signed)
+
+    def mean_in(self, row: pd.Series) -> str:
+        """Mean of the score in a row of the table."""
+        return self.number(row[self.key])
+
+    def in_row(self, row: pd.Series) -> str:
+        """Mean and interval of the score in a row of the table."""
+        return self.interval(row[self.key], row[f"{self.key}_lo"], row[f"{self.key}_hi"])
 
     def better(self, a: float, b: float) -> bool:
         """Is ``a`` better than ``b``?"""

@@ -14,8 +14,9 @@ from ...core.seeds import seed
 
 RESAMPLES = 10_000
 LEVEL = 0.95
+SIGNIFICANCE = 0.05
+# Below this many targets no interval and no test is given: they would look like evidence and be none.
 FEWEST = 3
-"""Below this many targets no interval and no test is given: they would look like evidence and be none."""
 
 Array = NDArray[np.float64]
 
@@ -64,17 +65,17 @@ def bootstrap_mean(values: Sequence[float] | Array) -> Estimate:
     return Estimate(mean, float(low), float(high), n)
 
 
-def bootstrap_ratio(part: Array, whole: Array) -> Estimate:
+def bootstrap_ratio(numerator: Array, denominator: Array) -> Estimate:
     """Ratio of two means over the same targets, each ``(n,)``, and its percentile interval over resampled targets, with
     the expansion of ``bootstrap_mean``."""
-    n = part.size
-    ratio = float(part.mean() / whole.mean())
+    n = numerator.size
+    ratio = float(numerator.mean() / denominator.mean())
     if n < FEWEST:
         return Estimate(ratio, np.nan, np.nan, n)
     tail = _tail(n)
     chosen = _resamples(n)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = part[chosen].mean(axis=1) / whole[chosen].mean(axis=1)
+        ratios = numerator[chosen].mean(axis=1) / denominator[chosen].mean(axis=1)
     low, high = np.quantile(ratios, [tail, 1 - tail])
     return Estimate(ratio, float(low), float(high), n)
 
@@ -106,8 +107,8 @@ def wilcoxon(differences: Sequence[float] | Array) -> float:
 def holm(p_values: Sequence[float]) -> list[float]:
     """Holm 1979 step-down correction over one family of tests; NaN (no test made) stays NaN and is not counted."""
     p = np.asarray(p_values, dtype=np.float64)
-    made = np.flatnonzero(~np.isnan(p))
-    order = made[np.argsort(p[made], kind="stable")]
+    tested = np.flatnonzero(~np.isnan(p))
+    order = tested[np.argsort(p[tested], kind="stable")]
     corrected = np.full(p.shape, np.nan)
     factors = np.arange(order.size, 0, -1)
     corrected[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * factors))
@@ -130,11 +131,6 @@ class PairedTest:
     difference: Estimate
     p: float
     p_holm: float = float("nan")
-
-    @property
-    def smallest_p(self) -> float:
-        """The smallest p value that this many pairs can reach, 2 / 2^n."""
-        return min(1.0, 2.0 ** (1 - self.complete))
 
 
 def paired_test(condition: str, first: str, second: str, values: tuple[Array, Array]) -> PairedTest:

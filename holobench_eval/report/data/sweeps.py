@@ -12,10 +12,9 @@ from .layout import Swept
 from .results import Results
 from .statistics import Estimate, bootstrap_mean, bootstrap_ratio
 
-SMALL = 1.0
-"""dB; a mean loss up to this is called small. It is what the acceptance of a moved image is told by, too."""
+SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
+# Kinds whose points are other benches: they are asked for rankings and not for losses.
 RANKS = frozenset({"draw"})
-"""Kinds whose points are other benches, which are asked for rankings and not for losses."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +38,11 @@ class Sweep:
         return tuple(sorted(numbers, key=lambda point: float(point[0])))
 
     @property
+    def named_points(self) -> tuple[tuple[float | str, str], ...]:
+        """``points``, led by the unchanged display as ``before`` where the values are no numbers."""
+        return self.points if self.kind.numeric else (("before", self.swept.before), *self.points)
+
+    @property
     def values(self) -> dict[str, float | str]:
         """The value of every changed condition."""
         return {condition: value for value, condition in self.swept.points}
@@ -59,8 +63,8 @@ class Sweep:
 
     def losses(self, label: str) -> dict[str, Estimate]:
         """What every change cost, by condition; without those that lack a target."""
-        found = {condition: self.loss(label, condition) for _, condition in self.swept.points}
-        return {condition: loss for condition, loss in found.items() if loss is not None}
+        losses = ((condition, self.loss(label, condition)) for _, condition in self.swept.points)
+        return {condition: loss for condition, loss in losses if loss is not None}
 
     def worst(self, label: str) -> tuple[float | str, Estimate] | None:
         """The value that cost most, and what it cost."""
@@ -102,7 +106,7 @@ class Sweep:
         by straight lines between the points; empty where it never does. None where a difference is not known."""
         if self.kind.nominal is None or any(self.gain(label, condition) is None for _, condition in self.points):
             return None
-        found = []
+        crossings = []
         for side in (-1, 1):
             walk = sorted(
                 (side * (float(value) - self.kind.nominal), condition)
@@ -112,9 +116,9 @@ class Sweep:
             gains = [(reach, gained.mean) for reach, name in walk if (gained := self.gain(label, name)) is not None]
             for (near, above), (far, below) in itertools.pairwise(gains):
                 if above > 0 >= below:
-                    found.append(self.kind.nominal + side * (near + (far - near) * above / (above - below)))
+                    crossings.append(self.kind.nominal + side * (near + (far - near) * above / (above - below)))
                     break
-        return found
+        return crossings
 
     def small_range(self, label: str) -> tuple[float, float] | None:
         """The values around the nominal one up to which the mean changes by at most ``SMALL``; None without numbers."""

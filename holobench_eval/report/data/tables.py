@@ -17,7 +17,7 @@ import pandas as pd
 from ...core.errors import UserError
 from ...core.hashing import digest
 from ...study.plan import FLOORS, REFERENCE
-from .categories import CEILING
+from .categories import ORACLE
 from .layout import Layout
 from .scores import order_scores, parse
 from .statistics import bootstrap_mean
@@ -25,21 +25,19 @@ from .text import FILES
 
 TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
 LEARNED_COLUMN = "learned_sha256"
-TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)
-"""Of studies with a method that was trained; others have no such columns."""
-MEMORY_COLUMN = "memory_mib"
-STOPPED_COLUMN = "stopped"
-"""Of studies in which a solution's memory was measured, or the display stopped a method; others lack them."""
+TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)  # of studies that train a method
+MEMORY_COLUMN = "memory_mib"  # of studies that measured the memory of a solution
+STOPPED_COLUMN = "stopped"  # of studies in which the display stopped a method
+# Reports of earlier versions lack these two, and the columns that are computed from them. Alone: 1 where nothing else
+# was at work beside a solution, else 0.
 ALONE_COLUMN = "timed_alone"
-"""1 where nothing else was at work beside a solution, else 0; reports of earlier versions lack it."""
-TRACK_COLUMN = "track"
-"""Which reports of earlier versions lack, and with it the columns that are computed from it."""
+CATEGORY_COLUMN = "track"
 MEASURED_COLUMNS = ("captures", "seconds", "registration_residual_px", "saturated")
 IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol")
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
 _REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
-_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, ALONE_COLUMN, STOPPED_COLUMN, TRACK_COLUMN}
+_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, ALONE_COLUMN, STOPPED_COLUMN, CATEGORY_COLUMN}
 DONE = "done"
 
 
@@ -62,7 +60,7 @@ def _row(record: Mapping[str, Any], identity: str, layout: Layout) -> dict[str, 
         "state": record["state"],
         "reason": _one_line(record.get("reason", "")),
         STOPPED_COLUMN: _one_line(record.get("stopped", "")),
-        TRACK_COLUMN: "" if cell["condition"] == REFERENCE else layout.track(record["label"]),
+        CATEGORY_COLUMN: "" if cell["condition"] == REFERENCE else layout.category(record["label"]),
         "cell": identity,
         **{key: cell.get(key, "") for key in IDENTITY_COLUMNS[1:]},
     }
@@ -108,17 +106,17 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
     measured = [*MEASURED_COLUMNS, *known]
     training = TRAINING_COLUMNS if layout.trained else ()
     stopped = [STOPPED_COLUMN] if frame[STOPPED_COLUMN].any() else []
-    order = [*columns, *scores, *measured, *training, *stopped, TRACK_COLUMN, *IDENTITY_COLUMNS]
+    order = [*columns, *scores, *measured, *training, *stopped, CATEGORY_COLUMN, *IDENTITY_COLUMNS]
     frame = frame.reindex(columns=order)
     return _sorted(frame, layout)
 
 
 def row_order(frame: pd.DataFrame, layout: Layout) -> list[tuple[str, str]]:
     """(method, condition) of every row: planned pairs, pairs outside the plan by name, then the reference rows."""
-    found = set(zip(frame["method"], frame["condition"], strict=True))
-    floors = [(name, REFERENCE) for name in FLOORS if (name, REFERENCE) in found]
-    extra = sorted(found - set(layout.pairs) - set(floors))
-    return [*(pair for pair in layout.pairs if pair in found), *extra, *floors]
+    pairs = set(zip(frame["method"], frame["condition"], strict=True))
+    floors = [(name, REFERENCE) for name in FLOORS if (name, REFERENCE) in pairs]
+    extra = sorted(pairs - set(layout.pairs) - set(floors))
+    return [*(pair for pair in layout.pairs if pair in pairs), *extra, *floors]
 
 
 def _sorted(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
@@ -156,7 +154,7 @@ def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     rows = [_table_row(groups[pair], pair, scores, layout) for pair in row_order(frame, layout)]
     table = pd.DataFrame(rows)
     targets = len({*layout.targets, *frame["target"]})
-    return _ranked(table, targets, layout) if TRACK_COLUMN in table else table
+    return _ranked(table, targets, layout) if CATEGORY_COLUMN in table else table
 
 
 def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str], layout: Layout) -> dict[str, Any]:
@@ -175,8 +173,8 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
         row[LEARNED_COLUMN] = " ".join(sorted(set(done[LEARNED_COLUMN]) - {""}))
     if MEMORY_COLUMN in done:
         row[MEMORY_COLUMN] = done[MEMORY_COLUMN].median()  # a method's first solution also loads libraries
-    if TRACK_COLUMN in rows:
-        row |= {"total_captures": total_captures(done), TRACK_COLUMN: rows[TRACK_COLUMN].iloc[0], "rank": np.nan}
+    if CATEGORY_COLUMN in rows:
+        row |= {"total_captures": total_captures(done), CATEGORY_COLUMN: rows[CATEGORY_COLUMN].iloc[0], "rank": np.nan}
     published = layout.published(label, condition)
     return row | {f"reported_{name}": published.get(name, np.nan) for name in layout.reported_metrics}
 
@@ -200,15 +198,15 @@ def total_captures(done: pd.DataFrame) -> float:
 
 
 def _ranked(table: pd.DataFrame, targets: int, layout: Layout) -> pd.DataFrame:
-    """The table with the place of every row among those of its display and track, by its mean headline score.
+    """The table with the place of every row among those of its display and category, by its mean headline score.
 
-    Only rows with every target are ranked, and neither ceiling nor floor; equal means share the better place.
+    Only rows with every target are ranked, and neither oracle nor floor; equal means share the better place.
     """
     score = parse(layout.headline)
     if score.key in table:
-        whole = (table["n"] == targets) & table[score.key].notna() & ~table[TRACK_COLUMN].isin(("", CEILING))
-        groups = table[whole].groupby(["condition", TRACK_COLUMN])[score.key]
-        table.loc[whole, "rank"] = groups.rank(method="min", ascending=not score.higher_is_better)
+        ranked = (table["n"] == targets) & table[score.key].notna() & ~table[CATEGORY_COLUMN].isin(("", ORACLE))
+        groups = table[ranked].groupby(["condition", CATEGORY_COLUMN])[score.key]
+        table.loc[ranked, "rank"] = groups.rank(method="min", ascending=not score.higher_is_better)
     return table
 
 
@@ -230,7 +228,7 @@ def read_records(text: str) -> pd.DataFrame:
         raise UserError(
             f"records.csv lacks the columns {', '.join(sorted(lacking))}; it was written by another version"
         )
-    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, STOPPED_COLUMN, TRACK_COLUMN}
+    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, STOPPED_COLUMN, CATEGORY_COLUMN}
     for column in frame.columns:
         if column not in text_columns:
             try:

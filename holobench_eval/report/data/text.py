@@ -6,6 +6,7 @@ said how good a picture is, so everything that differs is here, side by side.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -33,15 +34,25 @@ def words(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def number(value: float) -> str:
+    """Four significant digits at most, no exponent for everyday sizes; a dash for NaN."""
+    return "–" if math.isnan(value) else f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+def p_value(p: float) -> str:
+    """``p = 0.031`` or ``p < 0.001``."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
+
+
 @dataclass(frozen=True)
-class Wording:
+class Text:
     """The words of one kind of study.
 
     scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
-    figures; each: what a method makes for one target. best, only: how the first of several, or the only, ranked method
-    is introduced; other: the same for another metric. procedure: what is done; caution: what the figures do not say;
+    figures; each: what a method makes for one target. best, only: what the first of several, or the only, ranked method
+    does; other: the same by another metric. procedure: what is done; caution: what the figures do not say;
     displays: what the displays are; floor, instead: the reference images and the heading of their column. looked_at:
-    heading of the pictures; picture: what a tile of the comparison is. geometry, blur, effort: first sentences of these
+    heading of the pictures; picture: what a tile of the comparison is. geometry, blur, cost: first sentences of these
     sections. seeds: what is random. compared: in which values pictures are matched and blurred; domains: what the
     domains of metrics mean.
     """
@@ -50,39 +61,39 @@ class Wording:
     truth: str = "target"
     axis: str = ""
     each: str = "hologram"
-    best: str = "Best of the {count} ranked methods"
-    only: str = "The only ranked method"
-    other: str = "By {metrics} the best is {label}, not {best}."
+    best: str = "ranks first of {count} methods"
+    only: str = "is the only ranked method"
+    other: str = "{label} ranks first by {metrics}, ahead of {best}."
     procedure: str = (
         "A method turns a target image into a phase pattern. The pattern is shown on a display, the display's image is "
         "captured, the capture is registered to the target, matched in intensity and scored."
     )
     caution: str = ""
     displays: str = (
-        "The displays are simulated benches. Listed are the nominal optics, which methods know, and each stage of the "
-        "bench that differs from an ideal one, which they do not, with the parameters of the profile file."
+        "The displays are simulated benches. Listed are the nominal optics, which methods know, and the parameters of "
+        "each stage that differs from an ideal bench, which methods do not know."
     )
     floor: str = (
-        "The same targets, scored against images that no method made, through the same intensity match and metrics."
+        "Images that no method made, scored against the same targets with the same intensity match and metrics."
     )
     instead: str = "shown instead of a capture"
     compared: str = "in linear light"
     domains: str = (
-        "Linear: light intensity in [0, 1], as the sensor measures it. Amplitude: its square root. sRGB: as a monitor "
-        "would be given it; perceptual metrics are defined there."
+        "Linear: light intensity in [0, 1], as the sensor measures it. Amplitude: its square root. sRGB: encoded "
+        "for a monitor; perceptual metrics are defined on it."
     )
     looked_at: str = "Captures to look at"
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
     geometry: str = (
-        'Registration is frozen before any method\'s image is seen. "Refined" lets each capture move rigidly by at '
-        "most 2 px and 0.1 degree, found by correlation and never by maximising the score; a large difference means "
-        "that the geometry drifted."
+        'Registration is frozen before any method\'s image is captured. "Refined" allows each capture a rigid motion '
+        "of at most 2 px and 0.1 degree, estimated by correlation and not by maximising the score. A large difference "
+        "means that the geometry drifted."
     )
-    blur: str = "Methods that trade speckle for sharpness can change places."
-    effort: str = "Captures are camera captures that a method used to solve one target."
+    blur: str = "The ranking can change between methods that trade speckle for sharpness."
+    cost: str = "Captures are those that a method took to solve one target."
     seeds: str = (
-        "The noise of a capture depends on target, display and repeat and not on the method, so all methods meet the "
-        "same noise and differences are paired."
+        "The noise of a capture depends on target, display and repeat, not on the method: all methods meet the same "
+        "noise, and differences are paired."
     )
 
     def floor_name(self, name: str) -> str:
@@ -98,30 +109,30 @@ class Wording:
         }[name]
 
 
-PICTURE = Wording()
+PICTURE = Text()
 
 ON_A_NETWORK = replace(
     PICTURE,
     scored="predicted capture",
     procedure=(
-        "A method turns a target image into a phase pattern. No display shows it: what a trained, frozen network "
-        "predicts of its capture is matched in intensity and scored."
+        "A method turns a target image into a phase pattern. No display shows it: a trained, frozen network predicts "
+        "its capture, and the prediction is matched in intensity and scored."
     ),
     caution=(
-        "The scores say how well a method exploits the network, which may expect what no display would show. What a "
-        "bench makes of the same holograms is another study."
+        "The scores measure how well a method exploits the network, which may predict what no display would show. "
+        "Whether a bench shows the same is a question for another study."
     ),
-    displays="The display is a trained network, held as it is; there is no bench, no camera and no noise.",
+    displays="The display is a trained, frozen network; there is no bench, no camera and no noise.",
     instead="in the place of a predicted capture",
     looked_at="Predicted captures to look at",
     picture="Each predicted capture is matched in intensity and sRGB-encoded",
     geometry=(
-        'The network predicts in the frame of the target. "Refined" lets each predicted capture move rigidly by at '
-        "most 2 px and 0.1 degree, found by correlation and never by maximising the score; a large difference means "
-        "that the picture is displaced."
+        'The network predicts in the frame of the target. "Refined" allows each predicted capture a rigid motion of '
+        "at most 2 px and 0.1 degree, estimated by correlation and not by maximising the score. A large difference "
+        "means that the picture is displaced."
     ),
-    effort="There is no camera, so that no method captures anything while it solves.",
-    seeds="A learned display has no noise, so that repeats differ by the methods' own random numbers alone.",
+    cost="There is no camera, so no method captures anything while it solves.",
+    seeds="A learned display has no noise: repeats differ only by the methods' own random numbers.",
 )
 
 PREDICTION = replace(
@@ -130,36 +141,35 @@ PREDICTION = replace(
     truth="capture",
     axis=", of predictions against captures",
     each="prediction",
-    best="Of the {count} ranked methods the captures are predicted most closely by",
-    only="The only ranked method",
-    other="By {metrics} the closest predictions are those of {label}, not of {best}.",
+    best="predicts the captures most closely of {count} methods",
+    other="{label} predicts most closely by {metrics}, ahead of {best}.",
     procedure=(
-        "Here trained methods predict what a camera captures of a phase pattern. The patterns are holograms of the "
-        "targets by {holograms}, the same for all methods. Each is shown on the display and captured, and the capture "
-        "is registered to its target. A method is given the phase pattern; its prediction is matched in intensity to "
-        "the capture and scored against the capture."
+        "Trained methods predict the capture of a phase pattern. The patterns are holograms of the targets by "
+        "{holograms}, the same for all methods. Each pattern is shown on the display, captured, and registered to its "
+        "target. A method receives the pattern; its prediction is matched in intensity to the capture and scored "
+        "against it."
     ),
     caution=(
-        "A high score means that the capture was foreseen, flaws included. It says nothing about how good a picture "
-        "is, and no method's own holograms are shown."
+        "A high score means that the capture was predicted, flaws included. It does not measure picture quality: no "
+        "method's own holograms are shown."
     ),
-    floor="The same captures, scored against images that no method predicted, through the same match and metrics.",
+    floor="Images that no method predicted, scored against the same captures with the same match and metrics.",
     instead="in the place of a prediction",
     looked_at="Predictions to look at",
     picture=(
-        'In the column "capture" stands what was captured of the hologram by {holograms}, registered and matched to '
-        "the target; each prediction is matched in intensity to it; all are sRGB-encoded"
+        'The column "capture" shows the capture of the hologram by {holograms}, registered and matched to the target; '
+        "each prediction is matched to it in intensity; all are sRGB-encoded"
     ),
     geometry=(
-        'Captures are registered before anything is predicted. "Refined" lets each prediction move rigidly by at most '
-        "2 px and 0.1 degree, found by correlation and never by maximising the score; a large difference means that "
-        "predictions are displaced."
+        'Captures are registered before anything is predicted. "Refined" allows each prediction a rigid motion of at '
+        "most 2 px and 0.1 degree, estimated by correlation and not by maximising the score. A large difference means "
+        "that predictions are displaced."
     ),
-    blur="Predictions that leave out speckle can change places with those that show it.",
-    effort="A prediction takes no captures.",
+    blur="The ranking can change between predictions with and without speckle.",
+    cost="A prediction takes no captures.",
     seeds=(
-        "The noise of a capture depends on target, display and repeat and not on the method, so all methods predict "
-        "the same captures and differences are paired."
+        "The noise of a capture depends on target, display and repeat, not on the method: all methods predict the "
+        "same captures, and differences are paired."
     ),
 )
 
@@ -167,19 +177,18 @@ PREDICTION = replace(
 FOCUS = replace(
     PICTURE,
     procedure=(
-        "The targets are focal stacks: a scene with depth as an eye sees it that focuses on one plane after another, "
-        "with depth-of-field blur. A method turns the picture of a plane into a phase pattern for the display's own "
-        "distance; the display adds the phase of a lens, which moves the picture to its plane, and the camera stands "
-        "there and is registered anew (dynamic global focus). A method that makes one hologram of all planes of a "
-        "scene is given all their pictures; no lens is added, and the camera goes from plane to plane. A capture is "
-        'matched in intensity over the whole picture and scored; scores "in focus" are of what is in focus at its '
-        "plane."
+        "The targets are focal stacks: pictures of a scene with depth, focused on one plane after another, with "
+        "depth-of-field blur. A method turns the picture of a plane into a phase pattern for the display's own "
+        "distance. The display adds the phase of a lens, which moves the picture to its plane; the camera stands there "
+        "and is registered anew (dynamic global focus). A method that makes one hologram of all planes of a scene "
+        "receives all their pictures; no lens is added, and the camera moves from plane to plane. A capture is matched "
+        'in intensity over the whole picture and scored. Scores "in focus" cover what is in focus at its plane.'
     ),
-    caution="Targets of one scene are not independent, so that intervals and tests over targets are too narrow.",
+    caution="Targets of one scene are not independent: intervals over targets are too narrow, and p values too small.",
     picture="Each capture is taken at the plane of its target, registered, matched in intensity and sRGB-encoded",
-    effort=(
-        "Captures are camera captures that a method used for one hologram, and seconds are those of one hologram: of "
-        "one plane, or of all planes of a scene for a method that makes one of them."
+    cost=(
+        "Captures and seconds are those of one hologram: of one plane, or of all planes of a scene for a method that "
+        "makes one hologram of them."
     ),
 )
 
@@ -192,64 +201,54 @@ _COMPARED = {
 
 GIVEN = replace(
     PICTURE,
-    best="Of the {count} methods with a capture of every target the best is",
-    only="The only method with a capture of every target",
+    best="ranks first of {count} methods with a capture of every target",
+    only="is the only method with a capture of every target",
     procedure=(
-        "Photographs of a display and the pictures that it was to show were given as files; what made the photographs, "
-        "and what was done to them afterwards, is not known. No fiducials were photographed: the geometry comes from "
-        "the pictures themselves, each capture being aligned with its target. On the pixels of its target a capture is "
-        "matched in intensity and scored."
+        "Photographs of a display and their target pictures were given as files; how the photographs were taken and "
+        "processed is unknown. No fiducials were photographed: each capture is aligned with its target from the "
+        "pictures alone. A capture is matched in intensity and scored on the pixels of its target."
     ),
-    floor="The same targets, scored against images that nobody photographed, through the same match and metrics.",
+    floor="Images that nobody photographed, scored against the same targets with the same match and metrics.",
     picture="Each capture is aligned with its target and matched in intensity",
     geometry=(
-        '"Refined" lets each aligned capture move rigidly by at most 2 px and 0.1 degree, found by correlation and '
-        "never by maximising the score; a large difference means that the common alignment does not fit the capture."
+        '"Refined" allows each aligned capture a rigid motion of at most 2 px and 0.1 degree, estimated by correlation '
+        "and not by maximising the score. A large difference means that the shared alignment does not fit the capture."
     ),
-    effort="What the captures cost to make is not known.",
-    seeds="Nothing is random but the speckle of the floor, which depends on the target's name alone.",
+    cost="The cost of the captures is unknown.",
+    seeds="Only the speckle of the floor is random; it depends on the target's name alone.",
 )
 
 
-def from_files(values: str) -> Wording:
-    """The words for pictures that were given as files; values: how they were read."""
-    if values != "stored":
-        return replace(GIVEN, compared=_COMPARED[values])
-    return replace(
-        GIVEN,
-        compared=_COMPARED[values],
-        domains=(
-            "Values as stored: the numbers in the files over their full scale, without any decoding. If the pictures "
-            "are sRGB, as most are, equal differences of values are not equal differences of light, and these scores "
-            "must not stand beside those in linear light. Perceptual metrics take the values for display-encoded "
-            "pictures, as they are defined."
-        ),
-    )
-
-
+AS_STORED = (
+    "Values as stored: the numbers in the files over their full scale, without decoding. If the pictures are sRGB, as "
+    "most are, equal differences of values are not equal differences of light: do not compare these scores with those "
+    "in linear light. Perceptual metrics take the values as display-encoded, as they are defined."
+)
 REAL = (
-    "The display is a real bench that was photographed. Listed are its nominal optics, which methods know; what "
-    "separates it from them nobody knows."
+    "The display is a real bench. Listed are its nominal optics, which methods know; its deviations from them are "
+    "unknown."
 )
 REAL_SEEDS = (
-    "The noise of a photograph is the camera's own, so that the same study photographed again gives other numbers; "
-    "methods are shown in mixed order, so that a slow drift favours none."
+    "The noise of a photograph is the camera's own: the same study photographed again gives other numbers. Methods are "
+    "shown in mixed order, so that a slow drift favours none."
 )
 
 
-def wording(measure: str, holograms: str, on_a_network: bool, real: bool = False) -> Wording:
-    """The words for a measure; holograms: the method whose captures are predicted; real: whether the display exists."""
-    words = _of_measure(measure, holograms, on_a_network)
-    return replace(words, displays=REAL, seeds=REAL_SEEDS) if real else words
+_BY_MEASURE = {"picture": PICTURE, "prediction": PREDICTION, "focus": FOCUS, FILES: GIVEN}
 
 
-def _of_measure(measure: str, holograms: str, on_a_network: bool) -> Wording:
-    if measure == "prediction":
-        return replace(
-            PREDICTION,
-            procedure=PREDICTION.procedure.replace("{holograms}", holograms),
-            picture=PREDICTION.picture.replace("{holograms}", holograms),
-        )
-    if measure == "focus":
-        return FOCUS
-    return ON_A_NETWORK if on_a_network else PICTURE
+def text_of(
+    measure: str, holograms: str = "", on_a_network: bool = False, real: bool = False, values: str = "stored"
+) -> Text:
+    """The words for a measure.
+
+    holograms: the method whose captures are predicted; real: whether the display exists; values: how pictures were read
+    that were given as files.
+    """
+    text = ON_A_NETWORK if on_a_network and measure == "picture" else _BY_MEASURE[measure]
+    if measure == FILES:
+        text = replace(text, compared=_COMPARED[values], domains=AS_STORED if values == "stored" else text.domains)
+    if real:
+        text = replace(text, displays=REAL, seeds=REAL_SEEDS)
+    procedure, picture = (words.replace("{holograms}", holograms) for words in (text.procedure, text.picture))
+    return replace(text, procedure=procedure, picture=picture)

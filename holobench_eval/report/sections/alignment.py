@@ -2,51 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
+from ...study.folders import alignment_name
 from ...study.plan import REFERENCE
 from ..data.results import Results
 from ..data.scores import Score, parse
 from ..data.tables import DONE
-from ..markdown import table
+from ..data.text import FILES
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Figures, Report, Section
 
-AGREE = 0.2
-"""dB of the headline PSNR by which two aligners may differ before the report warns."""
-UNTOLD = "–"
+AGREE = 0.2  # dB of the headline PSNR by which two aligners may differ before the report warns
+UNKNOWN = "–"
+FIGURES = 8  # pictures of alignments in the report; the others are beside it
 
 Records = Sequence[Mapping[str, Any]]
 
 
+def _render(report: Report, figures: Figures) -> Blocks:
+    yield heading("Alignment")
+    yield bullets(sentences(report.results, report.records))
+    yield _captures_table(report.results, report.records)
+    yield from figures
+
+
 def sentences(results: Results, records: Records) -> list[str]:
     """What a reader has to know of the geometry before the scores are believed."""
-    found = _captures(records)
-    kinds = [record["cell"]["geometry"]["kind"] for record in found]
+    kinds = [record["cell"]["geometry"]["kind"] for record in _captures(records)]
     shared, own, none = (kinds.count(kind) for kind in ("shared", "own", "none"))
-    told = [
-        "The geometry comes from the images and not from fiducials: features or templates propose where a target lies "
-        "in its capture, and the enhanced correlation coefficient refines the homography. No score takes part."
+    lines = [
+        "The geometry comes from the images, not from fiducials: features or templates locate a target in its capture, "
+        "and the enhanced correlation coefficient refines the homography. No score is used."
     ]
     if shared:
-        told.append(
-            f"One shared alignment for {_count(shared)} in one pose: their own alignments agree within a pixel and "
-            "were averaged, so that none has an alignment better fitted to it than another. A capture that gave "
-            "none of its own is among them only where the shared one fits it."
+        lines.append(
+            f"One shared alignment for {_count(shared)} in one pose: the mean of their own alignments, which agree "
+            "within a pixel, so that none is better fitted than another. A capture without an alignment of its own is "
+            "included only if the shared one fits it."
         )
     if own:
-        told.append(
+        lines.append(
             f"An alignment of its own for {_count(own)}: no other capture of its size agrees with it within a pixel. "
-            "Each has an error of its own, which counts in its score."
+            "Its error affects its score."
         )
     if none:
-        told.append(f"Refused, and without a score: {_count(none)}.")
-    return [*told, *filter(None, [agreement(results)])]
+        lines.append(f"Refused, without a score: {_count(none)}.")
+    return [*lines, *filter(None, [agreement(results)])]
 
 
-def table_of(results: Results, records: Records) -> Markup:
+def _captures_table(results: Results, records: Records) -> Markdown:
     """Each capture's alignment, and the headline metric by another algorithm's."""
     score = _doubled(results)
     rows = []
@@ -61,7 +70,7 @@ def table_of(results: Results, records: Records) -> Markup:
                 *(
                     [f"{geometry['correlation']:.3f}", f"{scale:.3f}", f"{turn:.1f}", "yes" if mirrored else "no"]
                     if geometry["kind"] != "none"
-                    else [UNTOLD] * 4
+                    else [UNKNOWN] * 4
                 ),
                 *(_pair(scores, score) if score else []),
             ]
@@ -98,24 +107,23 @@ def agreement(results: Results) -> str:
 
     The first one fixes circles of a fiducial grid, or features of the pictures; the second correlates blocks.
     """
-    frame, score = results.frame, _doubled(results)
-    done = frame[(frame["state"] == DONE) & (frame["condition"] != REFERENCE)]
-    if not len(done):
+    done, score = results.done, _doubled(results)
+    if done.empty:
         return ""
-    if score is None:
-        return "Warning: the second aligner has no opinion of any capture."
-    differences = done[f"{score.key}_second"] - done[score.key]
-    names = done["method"] + ", " + done["target"].astype(str)
-    apart = {name: value for name, value in zip(names, differences, strict=True) if np.isfinite(value)}
-    silent = f" It has no opinion of {_count(len(done) - len(apart))}." if len(apart) < len(done) else ""
+    apart: dict[str, float] = {}
+    if score is not None:
+        differences = done[f"{score.key}_second"] - done[score.key]
+        names = done["method"] + ", " + done["target"].astype(str)
+        apart = {name: value for name, value in zip(names, differences, strict=True) if np.isfinite(value)}
+    silent = f" It cannot judge {_count(len(done) - len(apart))}." if len(apart) < len(done) else ""
     if not apart:
-        return "Warning: the second aligner has no opinion of any capture."
+        return "Warning: the second aligner cannot judge any capture."
     most = max(apart.values(), key=abs)
     beyond = [f"{name}: {value:+.2f} dB" for name, value in apart.items() if abs(value) > AGREE]
     if not beyond:
         return (
             f"A second aligner, which shares no algorithm with the first, agrees within {AGREE} dB on "
-            f"{_count(len(apart))}; it differs by {most:+.2f} dB at most.{silent}"
+            f"{_count(len(apart))}; its largest difference is {most:+.2f} dB.{silent}"
         )
     return (
         f"Warning: a second aligner, which shares no algorithm with the first, gives scores that differ by more than "
@@ -131,7 +139,7 @@ def _pair(scores: Mapping[str, float], score: Score) -> list[str]:
         score.number(first),
         score.number(second),
         score.number(second - first, signed=True),
-        UNTOLD if np.isnan(apart) else f"{apart:.2f}",
+        UNKNOWN if np.isnan(apart) else f"{apart:.2f}",
     ]
 
 
@@ -144,3 +152,25 @@ def _pose(geometry: Mapping[str, Any]) -> tuple[float, bool, float]:
     mirrored = bool(np.linalg.det(linear) < 0)
     down = linear[:, 1]  # a mirror from left to right leaves it
     return float(np.degrees(np.arctan2(-down[0], down[1]))), mirrored, float(np.sqrt(abs(np.linalg.det(linear))))
+
+
+def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+    """The first pictures of captures that were aligned with their targets; they were drawn when these were scored."""
+    done = report.results.frame[report.results.frame["state"] == DONE]
+    drawn = [
+        (path, method, target)
+        for method, target in zip(done["method"], done["target"], strict=True)
+        if (path := report.figures / alignment_name(method, target)).is_file()
+    ]
+    more = f" {len(drawn) - FIGURES} more are in `{report.figures.name}/`." if len(drawn) > FIGURES else ""
+    for path, method, target in drawn[:FIGURES]:
+        yield (
+            path,
+            f"{method}, {target}: the outline of the target on the capture, a dot at the target's upper left corner; "
+            f"and squares of the target and of the aligned, matched capture in turn.{more}",
+        )
+
+
+SECTIONS = (
+    Section("alignment", 140, _render, applies=lambda report: report.layout.measure == FILES, figures=_figures),
+)

@@ -9,48 +9,66 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from markupsafe import Markup
-
 from ...display.estimates import QUANTITIES
-from ..markdown import escape, table
-from .training import Trained
+from ..data.trainings import Training
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Figures, Report, Section
 
 COLOURS = ("red", "green", "blue")
-MOST = 1e12
-"""No quantity is anywhere near; a larger number in a stranger's file is no estimate."""
+MOST = 1e12  # no quantity is anywhere near; a larger number in a stranger's file is no estimate
 Row = Mapping[str, Any]
 
 
-def diagnoses(found: Sequence[Trained]) -> list[tuple[str, Markup, str]]:
-    """Of every training that tells something: whose and of which display, the table, and a sentence on the errors."""
-    told = []
-    for one in found:
-        rows = estimates(one)
-        if rows:
-            whose = one.name if one.name.endswith(f" on {one.display}") else f"{one.name} on {one.display}"
-            told.append((whose, _table(rows), _verdict(rows)))
-    return told
+def _render(report: Report, _: Figures) -> Blocks:
+    estimated, lacking = diagnoses(report.trainings), missing(report.trainings)
+    if estimated:
+        yield heading("Diagnosis", 3)
+        yield (
+            "Display parameters as the learned models estimate them, in forms that captures determine; in brackets the "
+            "ground truth of the simulated bench, which no method sees. The stated error holds for a model that was "
+            "trained on patterns that reach every level of the panel."
+        )
+    for whose, rows, verdict in estimated:
+        yield Markdown("**{}.** {}").format(whose, verdict)
+        yield rows
+    if lacking:
+        yield (
+            "Effects of the benches that the learned models cannot represent, so that no values of their parameters "
+            "describe the display exactly:"
+        )
+        yield bullets(lacking)
 
 
-def missing(found: Sequence[Trained]) -> list[Markup]:
+def diagnoses(trainings: Sequence[Training]) -> list[tuple[str, Markdown, str]]:
+    """Of every training with estimates: whose and of which display, the table, and a sentence on the errors."""
+    return [
+        (
+            item.name if item.name.endswith(f" on {item.display}") else f"{item.name} on {item.display}",
+            _table(rows),
+            _verdict(rows),
+        )
+        for item in trainings
+        if (rows := estimates(item))
+    ]
+
+
+def missing(trainings: Sequence[Training]) -> list[str]:
     """For every display, what lies outside the form of the models that were trained on it."""
     lists: dict[tuple[str, tuple[str, ...]], list[str]] = {}
-    for one in found:
-        texts = one.record.provenance.get("missing") if one.record else None
+    for item in trainings:
+        texts = item.fact("missing")
         if isinstance(texts, list) and all(isinstance(text, str) for text in texts):
-            lists.setdefault((one.display, tuple(texts)), []).extend(one.labels)
+            lists.setdefault((item.display, tuple(texts)), []).extend(item.labels)
     return [
-        escape(
-            f"{display} has, and the form of the model of {', '.join(dict.fromkeys(labels))} has not: "
-            f"{'; '.join(texts) if texts else 'nothing'}."
-        )
+        f"{display} contains {'effects' if texts else 'no effect'} that {', '.join(dict.fromkeys(labels))} cannot "
+        f"represent{': ' * bool(texts)}{'; '.join(texts)}."
         for (display, texts), labels in lists.items()
     ]
 
 
-def estimates(one: Trained) -> list[Row]:
+def estimates(training: Training) -> list[Row]:
     """The estimates of a training; what is no list of them in a stranger's file is none."""
-    rows = one.record.provenance.get("estimates") if one.record else None
+    rows = training.fact("estimates")
     if not isinstance(rows, list):
         return []
     return [row for row in rows if isinstance(row, dict) and _legible(row)]
@@ -65,7 +83,7 @@ def _known(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST  # not for NaN
 
 
-def _table(rows: Sequence[Row]) -> Markup:
+def _table(rows: Sequence[Row]) -> Markdown:
     """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth."""
     colours = sorted({row["colour"] for row in rows if isinstance(row.get("colour"), int)})
     columns: list[int | None] = [*colours, *([None] if any(row.get("colour") is None for row in rows) else [])]
@@ -107,9 +125,12 @@ def difference(row: Row) -> float:
 def _verdict(rows: Sequence[Row]) -> str:
     judged = [row for row in rows if _known(row.get("truth")) and _known(row.get("error"))]
     if not judged:
-        return "None of these has a truth and a stated error to be compared with."
+        return "None of these has a ground truth and a stated error to compare with."
     outside = [row for row in judged if abs(difference(row)) > row["error"]]
     if not outside:
         return f"All {len(judged)} numbers are within their stated errors."
     named = ", ".join(dict.fromkeys(row["name"].replace("_", " ") for row in outside))
     return f"{len(judged) - len(outside)} of {len(judged)} numbers are within their stated errors; outside: {named}."
+
+
+SECTIONS = (Section("diagnosis", 110, _render),)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -10,15 +11,22 @@ from ...study.plan import REFERENCE
 from ..data.categories import CALIBRATED, ONLINE
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES, Score
-from ..data.statistics import FEWEST, PairedTest
-from ..data.text import words
+from ..data.statistics import FEWEST, SIGNIFICANCE, PairedTest
+from ..data.text import p_value, words
+from ..markdown import bullets, heading
+from ..section import Blocks, Figures, Report, Section
 
-SIGNIFICANCE = 0.05
 
-
-def p_value(p: float) -> str:
-    """``p = 0.031`` or ``p < 0.001``."""
-    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
+def _render(report: Report, _: Figures) -> Blocks:
+    text = report.layout.text
+    yield heading("Findings")
+    yield (
+        f'Computed from the records of this study. The headline metric is "{report.results.headline.axis}"{text.axis}; '
+        f"intervals are 95 %. {text.caution}"
+    )
+    for title, sentences in findings(report.results):
+        yield heading(title, 3)
+        yield bullets(sentences)
 
 
 def findings(results: Results) -> list[tuple[str, list[str]]]:
@@ -31,11 +39,11 @@ def findings(results: Results) -> list[tuple[str, list[str]]]:
                 *_best_online(results, condition),
                 *_incomplete(results, condition),
                 *_other_metrics(results, condition),
-                *_ceiling(results, condition),
+                *_oracle(results, condition),
                 *_significant(results, condition),
                 *_floor(results, condition, "floor_constant"),
                 *_floor(results, condition, "floor_speckle"),
-                *_blur(results, condition),
+                *_blur_sensitivity(results, condition),
             ],
         )
         for condition in results.conditions
@@ -55,52 +63,51 @@ def _margin(score: Score, test: PairedTest) -> str:
 
 
 def _best(results: Results, condition: str) -> list[str]:
-    ranking, said = results.ranking(condition), results.layout.wording
+    ranking, text = results.ranking(condition), results.layout.text
     if not ranking:
         return ["No method has a score for every target, so none is ranked."]
-    among = said.best.format(count=len(ranking)) if len(ranking) > 1 else said.only
-    if ONLINE in results.tracks:
-        among = f"Without the camera for the scored image, {among[0].lower()}{among[1:]}"
-    return _leading(results, condition, ranking, among)
+    predicate = text.best.format(count=len(ranking)) if len(ranking) > 1 else text.only
+    return _leading(results, condition, ranking, predicate, "without" if ONLINE in results.categories else "")
 
 
 def _best_online(results: Results, condition: str) -> list[str]:
-    """The first of the track whose methods see the camera for the scored image."""
-    ranking = results.ranking(condition, tracks=(ONLINE,))
+    """The first of the category whose methods see the camera for the scored image."""
+    ranking = results.ranking(condition, categories=(ONLINE,))
     if not ranking:
         return []
-    among = f"best of the {len(ranking)} ranked methods" if len(ranking) > 1 else "the only ranked method"
-    return _leading(results, condition, ranking, f"With the camera for the scored image (online track), {among}")
+    predicate = f"ranks first of {len(ranking)} methods" if len(ranking) > 1 else "is the only ranked method"
+    return _leading(results, condition, ranking, f"{predicate} of the online track", "with")
 
 
-def _leading(results: Results, condition: str, ranking: Sequence[str], among: str) -> list[str]:
+def _leading(
+    results: Results, condition: str, ranking: Sequence[str], predicate: str, camera: Literal["", "with", "without"]
+) -> list[str]:
     """What the first of a ranking scores, and by how much it differs from the baseline (the baseline: from the next).
 
-    among: who was ranked, the beginning of the sentence.
+    predicate: what the first one does; camera: for the scored image, where that makes a difference.
     """
     score, baseline, best = results.headline, results.layout.baseline, ranking[0]
     row = results.row(best, condition)
-    value = score.interval(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
     over = f"over {row['n']} target{'' if row['n'] == 1 else 's'}"
-    sentence = f"{among}: {best}, {score.title} {value}{f' {score.unit}' if score.unit else ''} {over}"
-    if best == baseline:
-        compared, intro = list(ranking[1:2]), "; it is the baseline, and from it the next,"
-    else:
-        compared, intro = [best], f"; against the baseline {baseline}, which has"
+    seen = f", {camera} the camera for the scored image" if camera else ""
+    subject = f"The baseline {best}" if best == baseline else best
+    value = f"{score.in_row(row)}{f' {score.unit}' if score.unit else ''}"
+    sentence = f"{subject} {predicate}{seen}: {score.title} {value} {over}."
+    compared = ranking[1:2] if best == baseline else [best]
     for test in results.against_baseline:
         if test.condition == condition and test.second in compared and test.complete:
             if best == baseline:
-                return [f"{sentence}{intro} {test.second}, differs by {_margin(score, test)}."]
+                return [f"{sentence} {test.second} follows at {_margin(score, test)}."]
             other = score.with_unit(results.row(test.first, condition)[score.key])
-            return [f"{sentence}{intro} {other}: {_margin(score, test)}."]
-    return [f"{sentence}."]
+            return [f"{sentence} Difference from the baseline {baseline} ({other}): {_margin(score, test)}."]
+    return [sentence]
 
 
 def _incomplete(results: Results, condition: str) -> list[str]:
     plain = [label for label in results.methods(condition) if label not in results.layout.privileged]
-    holes = [label for label in plain if not results.whole(label, condition)]
+    holes = [label for label in plain if not results.is_complete(label, condition)]
     counts = [f"{label} ({int(results.row(label, condition)['n'])} of {len(results.targets)})" for label in holes]
-    return [f"Not ranked, since they lack targets: {', '.join(counts)}."] if holes else []
+    return [f"Not ranked, because targets are missing: {', '.join(counts)}."] if holes else []
 
 
 def _other_metrics(results: Results, condition: str) -> list[str]:
@@ -111,11 +118,11 @@ def _other_metrics(results: Results, condition: str) -> list[str]:
             ranking = results.ranking(condition, score.key)
             if len(ranking) > 1 and best and ranking[0] != best[0]:
                 others.setdefault(ranking[0], []).append(f"{score.title} ({DOMAIN_NAMES[score.domain]})")
-    other = results.layout.wording.other
+    other = results.layout.text.other
     return [other.format(metrics=words(names), label=label, best=best[0]) for label, names in others.items()]
 
 
-def _ceiling(results: Results, condition: str) -> list[str]:
+def _oracle(results: Results, condition: str) -> list[str]:
     ranking, score = results.ranking(condition), results.headline
     sentences = []
     for label in results.methods(condition):
@@ -123,39 +130,39 @@ def _ceiling(results: Results, condition: str) -> list[str]:
         if label in results.layout.privileged and ranking and np.isfinite(value):
             gap = float(np.nanmean(results.values(label, condition) - results.values(ranking[0], condition)))
             sentences.append(
-                f"The ceiling {label} (privileged: it may differentiate through the bench) scores "
+                f"The privileged method {label}, an oracle that may differentiate through the bench, scores "
                 f"{score.with_unit(value)}, {score.with_unit(gap, signed=True)} from {ranking[0]}."
             )
-    for track in (CALIBRATED, ONLINE):
-        best = results.ranking(condition, tracks=(track,))[:1]
-        closed = [value for label in best if np.isfinite(value := results.closed(label, condition))]
+    for category in (CALIBRATED, ONLINE):
+        best = results.ranking(condition, categories=(category,))[:1]
+        closed = [value for label in best if np.isfinite(value := results.gap_closed(label, condition))]
         if closed:
             sentences.append(
-                f"Of the way from the baseline {results.layout.baseline} to the ceiling, the best method of the "
-                f"{track} track, {best[0]}, goes {100 * closed[0]:z.0f} %."
+                f"{best[0]}, the best method of the {category} track, closes {100 * closed[0]:z.0f} % of the gap "
+                f"between {results.layout.baseline} and the oracle."
             )
     return sentences
 
 
 def _significant(results: Results, condition: str) -> list[str]:
     tests = [test for test in results.against_baseline if test.condition == condition]
-    made = [test for test in tests if np.isfinite(test.p)]
+    tested = [test for test in tests if np.isfinite(test.p)]
     if not tests:
         return []
-    if not made:
+    if not tested:
         return [f"No test against the baseline: fewer than {FEWEST} complete pairs."]
-    clear = [test.second for test in made if test.p_holm < SIGNIFICANCE]
-    most = max(test.complete for test in made)
-    smallest = min(1.0, len(made) * 2.0 ** (1 - most))
+    clear = [test.second for test in tested if test.p_holm < SIGNIFICANCE]
+    most = max(test.complete for test in tested)
+    smallest = min(1.0, len(tested) * 2.0 ** (1 - most))
     caution = (
-        f"With {most} pairs and {len(made)} comparisons no corrected p can be below {smallest:.2g}, so this test could "
-        f"not have shown any difference."
+        f"With {most} pairs and {len(tested)} comparisons no corrected p can be below {smallest:.2g}, so this test "
+        f"cannot show a difference."
         if smallest >= SIGNIFICANCE
-        else f"The smallest corrected p that {most} pairs and {len(made)} comparisons allow is {smallest:.2g}."
+        else f"The smallest corrected p that {most} pairs and {len(tested)} comparisons allow is {smallest:.2g}."
     )
     return [
-        f"Different from the baseline {made[0].first} at p < {SIGNIFICANCE} after Holm: "
-        f"{words(clear) if clear else 'none'} ({len(clear)} of {len(made)}). {caution}"
+        f"Different from the baseline {tested[0].first} at p < {SIGNIFICANCE} after Holm: "
+        f"{words(clear) if clear else 'none'} ({len(clear)} of {len(tested)}). {caution}"
     ]
 
 
@@ -171,21 +178,14 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
     verdict = (
         f"not better on average: {words(below)}"
         if below
-        else f"all of the {len(known)} with a score are better on average"
+        else f"all scored methods ({len(known)}) are better on average"
     )
-    named = results.layout.wording.floor_name(floor)
+    named = results.layout.text.floor_name(floor)
     return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]
 
 
-def blur_keys(results: Results) -> list[Score]:
-    """The headline metric, of whole pictures, at each blur width, sharpest first; plain counts as width zero."""
-    same = [s for s in results.scores if (s.metric, s.domain) == (results.headline.metric, results.headline.domain)]
-    blurred = sorted((s for s in same if s.blur is not None), key=lambda s: s.blur or 0.0)
-    return [next(s for s in same if not s.variant), *blurred] if blurred else []
-
-
-def _blur(results: Results, condition: str) -> list[str]:
-    keys = blur_keys(results)
+def _blur_sensitivity(results: Results, condition: str) -> list[str]:
+    keys = results.blur_scores
     rankings = {score: results.ranking(condition, score.key) for score in keys}
     plain = rankings[keys[0]] if keys else []
     if len(plain) < 2:
@@ -214,8 +214,9 @@ def _across_conditions(results: Results) -> list[str]:
     orders = {name: [label for label in ranking if label in shared] for name, ranking in rankings.items()}
     distinct = {tuple(order) for order in orders.values()}
     if len(distinct) == 1:
-        return [
-            f"The {len(shared)} methods ranked under every display have the same order on all {len(orders)} of them."
-        ]
+        return [f"The {len(shared)} methods ranked on every display have the same order on all {len(orders)} displays."]
     listed = "; ".join(f"{name}: {' > '.join(order)}" for name, order in orders.items())
     return [f"The order of methods depends on the display: {listed}."]
+
+
+SECTIONS = (Section("findings", 10, _render, applies=lambda report: bool(report.results.conditions)),)

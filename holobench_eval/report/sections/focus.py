@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from markupsafe import Markup
 
 from ..data.results import Results
-from ..data.scores import Score
 from ..data.statistics import Array, bootstrap_mean
-from ..data.text import words
-from ..markdown import escape, table
-from .tables import label, number
+from ..data.text import number, words
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Figures, Report, Section
+
+
+def _render(report: Report, _: Figures) -> Blocks:
+    yield heading("Plane by plane")
+    yield (
+        f"{report.results.headline.axis}, mean over scenes. Planes are given in mm from the image distance of the "
+        "full panel, positive away from the panel, and scale with the panel. A scene takes one hologram per plane, or "
+        "one of all planes."
+    )
+    for condition in report.results.conditions:
+        yield heading(condition, 3)
+        yield by_plane(report.results, condition)
+        yield bullets(sentences(report.results, condition))
 
 
 def planes(results: Results) -> list[float]:
@@ -18,66 +29,54 @@ def planes(results: Results) -> list[float]:
     return sorted({plane for _, plane in results.layout.planes.values()})
 
 
-def scenes(results: Results) -> int:
-    """How many scenes there are."""
-    return len({scene for scene, _ in results.layout.planes.values()})
-
-
-def by_plane(results: Results, condition: str) -> Markup:
-    """Mean over scenes at every plane, and seconds; empty for a study without planes or scores."""
-    if not results.layout.planes:
-        return Markup("")
-    score, every = results.headline, planes(results)
-    columns = ["method", "hologram of", *(f"{plane:g} mm" for plane in every), "all planes"]
+def by_plane(results: Results, condition: str) -> Markdown:
+    """Mean over scenes at every plane, and seconds."""
+    score, distances = results.headline, planes(results)
+    columns = ["method", "hologram of", *(f"{plane:g} mm" for plane in distances), "all planes"]
     rows = []
     for name in results.methods(condition):
-        values, whole = results.values(name, condition), name in results.layout.stacked
-        estimates = [bootstrap_mean(_at(results, values, plane)) for plane in every]
+        values, stacked = results.values(name, condition), name in results.layout.stacked
+        estimates = [bootstrap_mean(_at(results, values, plane)) for plane in distances]
         seconds = float(results.row(name, condition)["seconds"])
         rows.append(
             [
-                label(results, name),
-                "all planes" if whole else "one plane",
-                *(score.interval(one.mean, one.low, one.high) for one in estimates),
+                results.layout.marked(name),
+                "all planes" if stacked else "one plane",
+                *map(score.estimate, estimates),
                 score.number(float(np.mean(values))),
                 number(seconds),
-                number(seconds * (1 if whole else len(every))),
+                number(seconds * (1 if stacked else len(distances))),
             ]
         )
     return table([*columns, "seconds a hologram", "seconds a scene"], rows)
 
 
-def sentences(results: Results, condition: str) -> list[Markup]:
+def sentences(results: Results, condition: str) -> list[str]:
     """What one hologram of all planes costs and gains against the baseline's, moved from plane to plane by a lens."""
     baseline, names = results.layout.baseline, results.methods(condition)
-    wanted = [name for name in names if name in results.layout.stacked]
     if baseline not in names or baseline in results.layout.stacked:
         return []
-    told = [_compared(results, condition, str(baseline), name) for name in wanted]
-    return [escape(sentence) for sentence in told if sentence]
+    stacked = [name for name in names if name in results.layout.stacked]
+    return [sentence for name in stacked if (sentence := _compared(results, condition, str(baseline), name))]
 
 
 def _compared(results: Results, condition: str, baseline: str, name: str) -> str:
-    score, every = results.headline, planes(results)
-    first, second = (results.values(one, condition) for one in (baseline, name))
-    if not np.isfinite(second - first).all():
+    score, count = results.headline, len(planes(results))
+    gained = results.values(name, condition) - results.values(baseline, condition)
+    if not np.isfinite(gained).all():
         return ""
-    seconds, other = (float(results.row(one, condition)["seconds"]) for one in (name, baseline))
-    estimate = bootstrap_mean(second - first)
-    difference = score.interval(estimate.mean, estimate.low, estimate.high, signed=True)
+    seconds, other = (float(results.row(label, condition)["seconds"]) for label in (name, baseline))
+    estimate = bootstrap_mean(gained)
+    difference = score.estimate(estimate, signed=True)
     unit = f" {score.unit}" if score.unit else ""
     where = " in focus" if score.in_focus else ""
     return (
-        f"{name} makes one hologram of all {len(every)} planes and need not know where the eye looks. It takes "
-        f"{number(seconds)} s, {number(seconds / other)} times what {baseline} takes for one plane and "
-        f"{number(seconds / other / len(every))} times what {baseline} takes for all of them. Against {baseline} moved "
-        f"by a lens it {_turned(score, estimate.mean)}{where}: {difference}{unit} over all planes; "
-        f"{_each(results, second - first)}."
+        f"{name} makes one hologram of all {count} planes, whichever one the eye looks at. It takes "
+        f"{number(seconds)} s: {number(seconds / other)} times the time of {baseline} for one plane, "
+        f"{number(seconds / other / count)} times that for all planes. Compared with {baseline}, refocused by a lens, "
+        f"it {'gains' if score.better(estimate.mean, 0.0) else 'loses'}{where}: {difference}{unit} over all "
+        f"planes; {_each(results, gained)}."
     )
-
-
-def _turned(score: Score, difference: float) -> str:
-    return "gains" if score.better(difference, 0.0) else "loses"
 
 
 def _each(results: Results, difference: Array) -> str:
@@ -90,3 +89,6 @@ def _each(results: Results, difference: Array) -> str:
 def _at(results: Results, values: Array, plane: float) -> Array:
     """Those of ``(targets,)`` values that belong to a plane, a value per scene."""
     return values[[results.layout.planes[target][1] == plane for target in results.targets]]
+
+
+SECTIONS = (Section("focus", 70, _render, applies=lambda report: bool(report.layout.planes)),)

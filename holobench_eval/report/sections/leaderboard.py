@@ -2,44 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
-import pandas as pd
-from markupsafe import Markup
 
-from ..data.categories import ONLINE, TRACKS, meanings
+from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
+from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
 from ..data.results import Results
-from ..data.tables import DONE, MEMORY_COLUMN, STOPPED_COLUMN
-from ..markdown import table
-from .tables import MEMORY, interval, label, number
+from ..data.tables import DONE, MEMORY_COLUMN, total_captures
+from ..data.text import number, words
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Figures, Report, Section
+from .cost import MEMORY
+
+FEWEST_TIMED = 4  # computing time gets a chart from so many timed methods on
 
 
-def wanted(results: Results) -> bool:
-    """Whether a study has costs besides computing time to set against quality."""
-    return results.layout.spends_captures
+def _render(report: Report, figures: Figures) -> Blocks:
+    results, tables = report.results, report.by_display(leaderboard)
+    if tables:
+        yield heading("Quality and what it cost")
+        yield "Methods compete in tracks, by their access to the camera:"
+        yield bullets(
+            Markdown("**{}**: {}").format(category, meaning) for category, meaning in meanings(results.categories)
+        )
+        yield reading(results)
+        yield tables
+    yield from figures
 
 
-def tracks(results: Results) -> list[tuple[str, str]]:
-    """(track, what it means in words) of the study's tracks."""
-    return meanings(results.tracks)
-
-
-def order(results: Results, condition: str) -> list[str]:
-    """Methods track by track, best mean first; those that lack targets last in their track."""
-
-    def place(name: str) -> tuple[int, float]:
-        rank = results.row(name, condition)["rank"]
-        return TRACKS.index(results.layout.track(name)), np.inf if np.isnan(rank) else rank
-
-    return sorted(results.methods(condition), key=place)
-
-
-def leaderboard(results: Results, condition: str) -> Markup:
-    """The table of a display; empty for a study without captures, or whose records are of an earlier version."""
-    if not wanted(results) or "rank" not in results.table:
-        return Markup("")
-    each = results.layout.wording.each
-    closed = {name: results.closed(name, condition) for name in results.methods(condition)}
-    way = ["way to the ceiling [%]"] if np.isfinite(list(closed.values())).any() else []
+def leaderboard(results: Results, condition: str) -> Markdown | None:
+    """The table of a display; none for a study without captures, or whose records are of an earlier version."""
+    if not results.layout.spends_captures or "rank" not in results.table:
+        return None
+    each, names = results.layout.text.each, _order(results, condition)
+    closed = {name: results.gap_closed(name, condition) for name in names}
+    gap = ["way to the ceiling [%]"] if np.isfinite(list(closed.values())).any() else []
     columns = {
         "total_captures": "total captures",
         "training_captures": "captures for training",
@@ -50,20 +50,30 @@ def leaderboard(results: Results, condition: str) -> Markup:
     }
     known = {key: heading for key, heading in columns.items() if key in results.table}
     rows = []
-    for name in order(results, condition):
+    for name in names:
         row = results.row(name, condition)
         rows.append(
             [
-                results.layout.track(name),
+                results.layout.category(name),
                 "–" if np.isnan(row["rank"]) else f"{row['rank']:.0f}",
-                label(results, name),
+                results.layout.marked(name),
                 f"{row['n']:.0f} of {len(results.targets)}",
-                interval(row, results.headline),
-                *([_percent(closed[name])] if way else []),
+                results.headline.in_row(row),
+                *([_percent(closed[name])] if gap else []),
                 *(number(row[key]) for key in known),
             ]
         )
-    return table(["track", "rank", "method", "n", results.headline.axis, *way, *known.values()], rows)
+    return table(["track", "rank", "method", "n", results.headline.axis, *gap, *known.values()], rows)
+
+
+def _order(results: Results, condition: str) -> list[str]:
+    """Methods category by category, best mean first; those that lack targets last in their category."""
+
+    def position(name: str) -> tuple[int, float]:
+        rank = results.row(name, condition)["rank"]
+        return CATEGORIES.index(results.layout.category(name)), np.inf if np.isnan(rank) else rank
+
+    return sorted(results.methods(condition), key=position)
 
 
 def _percent(share: float) -> str:
@@ -72,36 +82,141 @@ def _percent(share: float) -> str:
 
 def reading(results: Results) -> str:
     """How the columns of the leaderboard are to be read."""
-    each = results.layout.wording.each
+    each = results.layout.text.each
     sentences = [
-        "Ranks go by the mean of the headline, within a display and a track; a method that lacks a target has none.",
-        "Total captures are all that the row took: those of its training, and those of every target.",
-        f"Seconds of training are spent once, seconds per {each} for every image.",
+        "Ranks order the means of the headline within a display and a track; a method that lacks a target has no rank.",
+        "Total captures are those of the training and of every target.",
+        f"Seconds of training are spent once, seconds per {each} on every image.",
     ]
-    if results.layout.baseline and any(results.ceiling(condition) for condition in results.conditions):
+    if results.layout.baseline and any(results.oracle(condition) for condition in results.conditions):
         sentences.append(
-            f"The way to the ceiling is 0 % for the baseline {results.layout.baseline} and 100 % for the best "
-            "privileged method, by means of the headline."
+            f'"Way to the ceiling" is the share of the gap between the baseline {results.layout.baseline} and the '
+            "oracle, the best privileged method, that a method closes, by means of the headline."
         )
-    if ONLINE in results.tracks:
+    if ONLINE in results.categories:
         sentences.append(
-            "Methods that see the camera for the scored image compete in a track of their own: with a camera at hand "
-            "for every image more is possible, and it says nothing about a display that has none."
+            "Methods that capture the scored image compete in a track of their own: a camera for every image makes "
+            "more possible, and their scores do not apply to a display without one."
         )
     return " ".join(sentences)
 
 
-def stopped(results: Results, condition: str) -> list[str]:
-    """A sentence for every method that the display ended on this display, with the reason it gave."""
-    if STOPPED_COLUMN not in results.frame:
-        return []
-    frame = results.frame
-    ended = frame[(frame["condition"] == condition) & (frame["state"] == DONE) & (frame[STOPPED_COLUMN] != "")]
-    return [
-        f"Stopped by the display, {name}: {reason}, on {_targets(cells, results)}. Its best hologram so far was scored."
-        for (name, reason), cells in ended.groupby(["method", STOPPED_COLUMN], sort=False)
+Spent = Callable[[Results, str, str], float]  # what a method spent under a condition
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What quality is drawn against: the figure's file, the axis with its unit, and the words of the caption."""
+
+    file: str
+    spent: Spent
+    axis: str
+    words: str
+
+
+def draw(results: Results, folder: Path) -> Iterator[tuple[Path, str]]:
+    """Draw quality against captures and seconds, where the study has enough of them; (file, caption) of each."""
+    each = f"computing time per {results.layout.text.each}"
+    captures = Cost(
+        "quality-captures.png",
+        _captures,
+        "captures in total, of training and of all targets (logarithmic; zero left of the break)",
+        "all captures of a row: those of its training once, and those of every target",
+    )
+    seconds = Cost("quality-time.png", _seconds, f"{each} [s] (logarithmic)", each)
+    for cost, wanted in ((captures, _spends_captures), (seconds, _times_enough)):
+        panels = [panel for condition in results.conditions if (panel := _frontier(results, condition, cost)).marks]
+        if panels and wanted(results, [mark for panel in panels for mark in panel.marks]):
+            path = folder / cost.file
+            draw_frontiers(path, panels, f"{results.headline.axis}{results.layout.text.axis}", cost.axis)
+            yield path, _caption(results, panels, cost)
+
+
+def _captures(results: Results, name: str, condition: str) -> float:
+    cells = results.cells(name, condition)
+    return total_captures(cells[cells["state"] == DONE])
+
+
+def _seconds(results: Results, name: str, condition: str) -> float:
+    """NaN without any, since there is no logarithm of zero."""
+    return float(results.row(name, condition)["seconds"]) or float("nan")
+
+
+def _spends_captures(results: Results, marks: list[Mark]) -> bool:
+    return results.layout.spends_captures and any(mark.cost > 0 for mark in marks)
+
+
+def _times_enough(_: Results, marks: list[Mark]) -> bool:
+    return len({mark.label for mark in marks}) >= FEWEST_TIMED
+
+
+def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
+    """A display's panel; a method that lacks a target has no mean to compare, and is not in it."""
+    registered = results.frame.drop_duplicates("method").set_index("method")["name"]
+    marks = tuple(
+        Mark(
+            label=name,
+            group=str(registered[name]),
+            category=results.layout.category(name),
+            cost=spent,
+            quality=float(results.values(name, condition).mean()),
+            **_ends(results, name, condition),
+        )
+        for name in results.methods(condition)
+        if results.layout.category(name) != ORACLE and results.is_complete(name, condition)
+        if np.isfinite(spent := cost.spent(results, name, condition))
+    )
+    baseline, oracle = results.layout.baseline, results.oracle(condition)
+    floor = baseline if baseline in results.methods(condition) and results.is_complete(baseline, condition) else None
+    return Frontier(
+        condition,
+        marks,
+        higher=results.headline.higher_is_better,
+        floor=_line(results, floor, condition, "baseline", band=False) if floor else None,
+        oracle=_line(results, oracle, condition, "ceiling", band=True) if oracle else None,
+    )
+
+
+def _ends(results: Results, name: str, condition: str) -> dict[str, float]:
+    """Ends of the bar of a method: of its mean difference to the baseline, moved to its mean; else of the mean."""
+    gained = results.gain(name, condition)
+    if gained is None:
+        row, key = results.row(name, condition), results.headline.key
+        return {"low": float(row[f"{key}_lo"]), "high": float(row[f"{key}_hi"])}
+    mean = float(results.values(name, condition).mean())
+    if name == results.layout.baseline:
+        return {"low": float("nan"), "high": float("nan")}
+    return {"low": mean + gained.low - gained.mean, "high": mean + gained.high - gained.mean}
+
+
+def _line(results: Results, name: str, condition: str, role: str, band: bool) -> Line:
+    mean = float(results.values(name, condition).mean())
+    ends = _ends(results, name, condition) if band else {}
+    return Line(f"{role}: {name}, {results.headline.with_unit(mean)}", mean, **ends)
+
+
+def _caption(results: Results, panels: list[Frontier], cost: Cost) -> str:
+    """What is drawn, what the bars are, and who is missing."""
+    online = ", separately for methods with and without the camera for the scored image"
+    sentences = [
+        f"{results.headline.axis}{results.layout.text.axis}, against {cost.words}.",
+        "Lines join the rows of one registered method.",
+        f"Pale steps: the best quality for a cost{online * (ONLINE in results.categories)}.",
     ]
+    if any(panel.floor for panel in panels):
+        sentences.append(
+            "Bars: 95 % interval of the paired mean difference to the baseline; a bar clear of the baseline's line is "
+            "a difference. The tables hold the intervals of the means themselves."
+        )
+    else:
+        sentences.append("Bars: 95 % interval of the mean over targets.")
+    if any(panel.oracle for panel in panels):
+        sentences.append("The upper line is the oracle, with its interval as a band.")
+    rows = [(name, condition) for condition in results.conditions for name in results.methods(condition)]
+    lacking = sorted({name for name, condition in rows if not results.is_complete(name, condition)})
+    if lacking:
+        sentences.append(f"Omitted where a target is missing: {words(lacking)}.")
+    return " ".join(sentences)
 
 
-def _targets(cells: pd.DataFrame, results: Results) -> str:
-    return f"{cells['target'].nunique()} of {len(results.targets)} targets"
+SECTIONS = (Section("leaderboard", 40, _render, figures=lambda report: draw(report.results, report.figures)),)

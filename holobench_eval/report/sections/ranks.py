@@ -2,54 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
 
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
+from ..charts.ranks import draw_ranks
+from ..charts.style import slugs
 from ..data.ranks import CIRCULAR, Cause, Feature, Pair, Ranks, share
-from ..data.statistics import Estimate
-from ..data.text import words
-from ..markdown import escape, table
-from .findings import SIGNIFICANCE, p_value
+from ..data.statistics import SIGNIFICANCE, Estimate
+from ..data.text import p_value, words
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Figures, Report, Section
 
+# Parameters of which there is more, and not a larger one.
 COUNTED = frozenset({"crosstalk", "flicker", "fringes", "astigmatism", "coma", "zero_order", "specks"})
-"""Parameters of which there is more, and not a larger one."""
 NOTHING = "none of the parameters"
 
 
-def heading(ranks: Ranks) -> str:
-    """Which display, and how many draws of it."""
-    return f"{ranks.swept.before}, {len(ranks.swept.points)} draws"
-
-
-def introduction() -> Markup:
-    """How draws are made, and what the numbers mean."""
-    return escape(
+def _render(report: Report, figures: Figures) -> Blocks:
+    yield heading("Rank stability")
+    yield (
         f"A draw is another bench of the same kind: {MODEL}. Methods know the nominal optics alone, or were trained on "
-        "the nominal display, and the same holograms are shown on every draw. Methods are ranked by their mean over "
-        "targets. Brackets hold 95 % intervals over draws: other benches, the same images. Shares: Wilson's interval."
+        "the nominal display; the same holograms are shown on every draw. Ranks order the means over targets. Brackets "
+        "hold 95 % intervals over draws (other benches, the same images); those of shares are Wilson's."
     )
+    for ranks in report.ranks:
+        yield heading(f"{ranks.swept.before}, {len(ranks.swept.points)} draws", 3)
+        yield bullets(sentences(ranks))
+        if ranks.exists:
+            yield methods(ranks)
+        if ranks.exists and (pairs := flips(ranks)):
+            yield Markdown("Pairs of methods whose order changes, {}:").format(report.results.headline.axis)
+            yield pairs
+        if drawn := _ranges(ranks):
+            yield "Parameters that were drawn:"
+            yield drawn
+    yield from figures
 
 
-def methods(ranks: Ranks) -> Markup:
+def methods(ranks: Ranks) -> Markdown:
     """Where each method stands, nominally and over the draws."""
     columns = ["method", "nominal rank", "first in [% of draws]", "mean rank", "best rank", "worst rank"]
     rows = []
     for index, label in enumerate(ranks.methods):
-        places = ranks.places[:, index]
+        column = ranks.positions[:, index]
         first = percent(ranks.first(label))
-        ends = (f"{places.min():.0f}", f"{places.max():.0f}")
-        rows.append([label, f"{ranks.nominal_places[index]:.0f}", first, f"{places.mean():.1f}", *ends])
+        ends = (f"{column.min():.0f}", f"{column.max():.0f}")
+        rows.append([label, f"{ranks.nominal_positions[index]:.0f}", first, f"{column.mean():.1f}", *ends])
     return table(columns, rows)
 
 
-def flips(ranks: Ranks) -> Markup:
+def flips(ranks: Ranks) -> Markdown | None:
     """The pairs whose order is the other way in some draw, most often first; empty where there is none."""
     flipping = sorted((pair for pair in ranks.pairs if pair.flips), key=lambda pair: -pair.flips)
     if not flipping:
-        return Markup("")
+        return None
     score = ranks.results.headline
     unit = f" [{score.unit}]" if score.unit else ""
     columns = ["nominally better", "than", f"nominally by{unit}", f"over draws by{unit}"]
@@ -58,12 +67,12 @@ def flips(ranks: Ranks) -> Markup:
 
 
 def _flip(ranks: Ranks, pair: Pair) -> list[str]:
-    score, lead = ranks.results.headline, pair.lead
+    score = ranks.results.headline
     return [
         pair.first,
         pair.second,
         score.number(pair.nominal, signed=True),
-        score.interval(lead.mean, lead.low, lead.high, signed=True),
+        score.estimate(pair.lead, signed=True),
         percent(pair.flipped),
         favours(pair, pair.cause) if pair.cause else NOTHING,
     ]
@@ -94,30 +103,30 @@ def more(feature: Feature) -> str:
 
 def sentences(ranks: Ranks) -> list[str]:
     """What the draws say, from their numbers alone."""
-    if not ranks.told:
+    if not ranks.exists:
         return [*left_out(ranks), "No ranking: no draw has two methods with a score for every target."]
     return [*left_out(ranks), *_agreement(ranks), _winner(ranks), *_pairs(ranks)]
 
 
 def left_out(ranks: Ranks) -> list[str]:
     """Methods and draws that are in no number, and why."""
-    told = []
+    lines = []
     unranked = [label for label in ranks.quality if label not in ranks.methods]
     if unranked:
-        told.append(
-            "Not ranked, since they lack targets on the nominal display or in more than half of the draws: "
+        lines.append(
+            "Not ranked, because targets are missing on the nominal display or in more than half of the draws: "
             f"{words(unranked)}."
         )
     empty = set(ranks.empty)
     partly = [index for index in range(len(ranks.swept.points)) if index not in empty and index not in ranks.used]
     if empty and ranks.used:
-        told.append(
+        lines.append(
             f"{_draws(ranks, sorted(empty))}: no ranked method has a score for every target there, as where the camera "
-            "cannot be registered (see Holes). What follows holds for benches on which it can."
+            "cannot be registered (see Holes). The results hold for benches on which it can be registered."
         )
     if partly and ranks.used:
-        told.append(f"{_draws(ranks, partly)}: a ranked method lacks a target there.")
-    return told
+        lines.append(f"{_draws(ranks, partly)}: a ranked method lacks a target there.")
+    return lines
 
 
 def _draws(ranks: Ranks, indices: Sequence[int]) -> str:
@@ -135,51 +144,87 @@ def _agreement(ranks: Ranks) -> list[str]:
     interval = f" [{mean.low:.2f}, {mean.high:.2f}]" if np.isfinite(mean.low) else ""
     return [
         f"{what}: median {np.median(taus):.2f}, mean {mean.mean:.2f}{interval}, lowest {taus.min():.2f}, over "
-        f"{len(taus)} draws. The {len(ranks.methods)} methods have their nominal order in {ranks.unchanged} of "
-        f"{count}."
+        f"{len(taus)} draws. The {len(ranks.methods)} methods keep their nominal order in {ranks.unchanged} of "
+        f"{count} draws."
     ]
 
 
 def _winner(ranks: Ranks) -> str:
-    counts = {label: int((ranks.places[:, index] == 1).sum()) for index, label in enumerate(ranks.methods)}
-    winners = [label for label, place in zip(ranks.methods, ranks.nominal_places, strict=True) if place == 1]
-    told = [f"{label} in {counts[label]} of {len(ranks.used)} ({percent(ranks.first(label))} %)" for label in winners]
-    sentence = f"First on the nominal display, and over the draws: {words(told)}"
+    counts = {label: int((ranks.positions[:, index] == 1).sum()) for index, label in enumerate(ranks.methods)}
+    winners = [label for label, rank in zip(ranks.methods, ranks.nominal_positions, strict=True) if rank == 1]
+    firsts = [f"{counts[label]} of {len(ranks.used)} draws ({percent(ranks.first(label))} %)" for label in winners]
+    pairs = zip(winners, firsts, strict=True)
+    sentence = f"First on the nominal display: {words([f'{label}, also first in {share}' for label, share in pairs])}"
     others = sorted((label for label in counts if label not in winners and counts[label]), key=lambda x: -counts[x])
     if not others:
-        return f"{sentence}. No other method is ever first."
-    return f"{sentence}. Others that are first: {words([f'{label} in {counts[label]}' for label in others])}."
+        return f"{sentence}. No other method is first in any draw."
+    return f"{sentence}. Also first in some draws: {words([f'{label} in {counts[label]}' for label in others])}."
 
 
 def _pairs(ranks: Ranks) -> list[str]:
     flipping = [pair for pair in ranks.pairs if pair.flips]
-    still, every = len(ranks.pairs) - len(flipping), len(ranks.pairs)
+    pairs = len(ranks.pairs)
+    still = pairs - len(flipping)
     most = 100 * share(0, len(ranks.used)).high
-    told = [
-        f"{still} of {every} pairs of methods have their nominal order in every draw; such a pair may still be the "
-        f"other way on up to {most:.0f} % of benches (upper end of the interval)."
+    lines = [
+        f"{still} of {pairs} pairs of methods keep their nominal order in every draw; such a pair may still be "
+        f"reversed on up to {most:.0f} % of benches (upper end of the interval)."
         if still
-        else f"None of the {every} pairs of methods has its nominal order in every draw."
+        else f"None of the {pairs} pairs of methods keeps its nominal order in every draw."
     ]
     if flipping and ranks.tests:
         known = sum(pair.cause is not None for pair in flipping)
-        told.append(
-            f"Of the {len(flipping)} pairs that are the other way in some draw, {known} go with a parameter: "
-            "Spearman's correlation over draws between its value and the difference of the two means, "
-            f"p < {SIGNIFICANCE} after Holm over all {ranks.tests} that were tried; the strongest is named. The others "
-            f"go with {NOTHING} as clearly: with several at once, with the random patterns, or with chance."
+        lines.append(
+            f"Of the {len(flipping)} pairs that are reversed in some draw, {known} correlate with a parameter "
+            "(Spearman's correlation over draws between its value and the difference of the two means, "
+            f"p < {SIGNIFICANCE} after Holm over all {ranks.tests} tests); the table names the strongest. The others "
+            "depend on several parameters at once, on the random patterns, or on chance."
         )
-    return told
+    return lines
 
 
-def ranges(ranks: Ranks) -> Markup:
+def _ranges(ranks: Ranks) -> Markdown | None:
     """What was drawn of the draws that are ranked, within which range, and where that comes from."""
     ranked = [ranks.swept.drawn[index] for index in ranks.used] if ranks.swept.drawn else []
-    drawn = {name: [one[name] for one in ranked] for name in (ranked or [{}])[0]}
     rows = []
-    for name, values in drawn.items():
-        one = PARAMETERS[name]
-        shown = [f"{low:.3g} to {high:.3g}" for low, high in ((one.low, one.high), (min(values), max(values)))]
+    for name in (ranked or [{}])[0]:
+        parameter, values = PARAMETERS[name], [draw[name] for draw in ranked]
+        limits = f"{parameter.low:.3g} to {parameter.high:.3g}"
+        drawn = f"{min(values):.3g} to {max(values):.3g}"
         turn = "; a full turn" if name in CIRCULAR else ""
-        rows.append([one.words, one.unit or "–", *shown, f"{one.source}{turn}"])
-    return table(["parameter", "unit", "range", "drawn", "source of the range"], rows) if rows else Markup("")
+        rows.append([parameter.words, parameter.unit or "–", limits, drawn, f"{parameter.source}{turn}"])
+    return table(["parameter", "unit", "range", "drawn", "source of the range"], rows) if rows else None
+
+
+def draw(rankings: Sequence[Ranks], folder: Path) -> Iterator[tuple[Path, str]]:
+    """Draw a figure for every display that has a ranking; (file, caption) of each."""
+    existing = [ranks for ranks in rankings if ranks.exists]
+    stems = slugs([ranks.swept.before for ranks in existing])
+    for ranks in existing:
+        path = folder / f"quality-ranks-{stems[ranks.swept.before]}.png"
+        draw_ranks(path, ranks)
+        yield path, _caption(ranks)
+
+
+def _caption(ranks: Ranks) -> str:
+    left = (
+        f"Ranks of the methods over {len(ranks.used)} draws of {ranks.swept.before}. Left: share of draws [%] in which "
+        "a method has each rank; methods in nominal order, nominal ranks framed."
+    )
+    if not len(ranks.taus):
+        return left
+    return (
+        f"{left} Right: draws by Kendall's tau-b of their ranking against the nominal one. Dot and bar: mean and "
+        "95 % interval; dashed: unrelated."
+    )
+
+
+SECTIONS = (
+    Section(
+        "rank stability",
+        60,
+        _render,
+        applies=lambda report: bool(report.ranks),
+        figures=lambda report: draw(report.ranks, report.figures),
+    ),
+)

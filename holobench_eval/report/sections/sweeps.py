@@ -2,67 +2,89 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
 
-from ..data.categories import ONLINE
+from ..charts.rows import Row, draw_rows
+from ..charts.sweeps import Curve, Panel, draw_sweep
+from ..data.categories import OFFLINE, ONLINE
 from ..data.results import Results
 from ..data.statistics import Estimate
 from ..data.sweeps import SMALL, Sweep
 from ..data.text import words
-from ..markdown import escape, table
-from . import tables as sections
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Figures, Report, Section
 
+# What Chakravarthula et al. 2020, Section 7.2, say of their method, by kind of change, and how far a sweep has to go to
+# tell (None: two of a kind).
 PAPER = {
-    "camera_shift_x": ("the quality stays stable when the camera moves by up to 4 cm", 40.0),
-    "camera_shift_y": ("the quality stays stable when the camera moves by up to 4 cm", 40.0),
-    "drift": ("there is no significant change in quality over three months", 90.0),
-    "sensor": ("captures of two cameras are consistent", None),
+    "camera_shift_x": ("The quality stays stable when the camera moves by up to 4 cm", 40.0),
+    "camera_shift_y": ("The quality stays stable when the camera moves by up to 4 cm", 40.0),
+    "drift": ("There is no significant change in quality over three months", 90.0),
+    "sensor": ("Captures of two cameras are consistent", None),
 }
-"""What Chakravarthula et al. 2020, Section 7.2, say of their method, by kind of change, and how far a sweep has to go
-to tell (None: two of a kind)."""
-REMEDIES = {"eye": ("corrected_eye", "known_eye")}
-"""Kinds whose changes others are meant to undo."""
+REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
+MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
+MOST_ROWS = 4
 
 
-def shown(value: float | str) -> str:
+def _render(report: Report, figures: Figures) -> Blocks:
+    results, sweeps = report.results, report.sweeps
+    yield heading("Changes of the displays")
+    yield (
+        "Methods are prepared on the display before the change, and their holograms are shown on it after the change. "
+        "A method that captures the scored image solves under the change. A loss is the paired difference to the score "
+        "before the change, positive where the picture got worse. Slopes are least-squares lines through zero, one on "
+        "each side of the unchanged display."
+    )
+    yield claims(results, sweeps)
+    for sweep in sweeps:
+        if sweep.methods:
+            words = sweep.kind.words
+            yield heading(f"{words[0].upper()}{words[1:]}: {sweep.swept.before}", 3)
+            yield _introduction(sweep)
+            yield Markdown("{}:").format(results.headline.axis)
+            yield scores(sweep)
+            yield losses(sweep)
+            yield bullets(sentences(sweep, sweeps))
+    yield from figures
+
+
+def value_text(value: float | str) -> str:
     """A value as in a config."""
     return f"{value:g}" if isinstance(value, float) else value
 
 
-def heading(sweep: Sweep) -> str:
-    """What is changed, and on which display."""
-    return f"{sweep.kind.words[0].upper()}{sweep.kind.words[1:]}: {sweep.swept.before}"
-
-
-def introduction(sweep: Sweep) -> Markup:
+def _introduction(sweep: Sweep) -> str:
     """The stages that change, and what is assumed."""
     stages = words([stage.replace("_", " ") for stage in sweep.kind.stages])
-    seen = "The camera is registered anew." if sweep.kind.moves else "The registration of before holds."
-    return escape(f"Changes: {stages}. Model: {sweep.kind.model}. {seen}")
+    seen = "The camera is registered anew." if sweep.kind.moves else "The registration from before the change is kept."
+    return f"Changes: {stages}. Model: {sweep.kind.model}. {seen}"
 
 
-def scores(sweep: Sweep) -> Markup:
+def scores(sweep: Sweep) -> Markdown:
     """Mean of the headline metric at every value."""
     score = sweep.results.headline
-    unit = f" {sweep.kind.unit}" if sweep.kind.unit else ""
-    points = sweep.points if sweep.kind.numeric else (("before", sweep.swept.before), *sweep.points)
-    columns = ["method", *(f"{shown(value)}{unit}" if value != "before" else "before" for value, _ in points)]
     rows = [
-        [named(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in points)]
+        [_marked(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in sweep.named_points)]
         for label in sweep.methods
     ]
-    return table(columns, rows)
+    return table(["method", *(_with_unit(sweep, value) for value, _ in sweep.named_points)], rows)
 
 
-def named(results: Results, name: str) -> str:
-    """A label, marked for the ceiling and for methods that see the changed display while they solve."""
-    return f"{name} (online)" if results.layout.track(name) == ONLINE else sections.label(results, name)
+def _with_unit(sweep: Sweep, value: float | str) -> str:
+    unit = f" {sweep.kind.unit}" if sweep.kind.unit and value != "before" else ""
+    return f"{value_text(value)}{unit}"
 
 
-def losses(sweep: Sweep) -> Markup:
+def _marked(results: Results, name: str) -> str:
+    """A label, marked for the oracle and for methods that see the changed display while they solve."""
+    return f"{name} (online)" if results.layout.category(name) == ONLINE else results.layout.marked(name)
+
+
+def losses(sweep: Sweep) -> Markdown | None:
     """What the worst change cost each method, the slope, and what is left above the baseline."""
     score, kind, baseline = sweep.results.headline, sweep.kind, sweep.results.layout.baseline
     unit = f" [{score.unit}]" if score.unit else ""
@@ -78,12 +100,16 @@ def losses(sweep: Sweep) -> Markup:
         value, loss = worst
         condition = dict(sweep.swept.points)[value]
         gained = sweep.gain(label, condition) if label != baseline else None
-        row = [named(sweep.results, label), f"{shown(value)} {kind.unit}".strip(), _interval(sweep, loss)]
+        row = [
+            _marked(sweep.results, label),
+            f"{value_text(value)} {kind.unit}".strip(),
+            score.estimate(loss, signed=True),
+        ]
         row += [_slope(slope) for slope in slopes]
-        row += [_interval(sweep, gained) if gained else "–"]
+        row += [score.estimate(gained, signed=True) if gained else "–"]
         row += [_break_even(sweep, label)] if kind.numeric else []
         rows.append(row)
-    return table(columns, rows) if rows else Markup("")
+    return table(columns, rows) if rows else None
 
 
 def _slope(slope: Estimate | None) -> str:
@@ -93,49 +119,43 @@ def _slope(slope: Estimate | None) -> str:
     return f"{slope.mean:+.3g}{ends}"
 
 
-def _interval(sweep: Sweep, estimate: Estimate) -> str:
-    return sweep.results.headline.interval(estimate.mean, estimate.low, estimate.high, signed=True)
-
-
 def _break_even(sweep: Sweep, label: str) -> str:
     """Where an advantage ends; in words where there is none or it does not end."""
     if label == sweep.results.layout.baseline:
         return "–"
-    before, found = sweep.gain(label, sweep.swept.before), sweep.break_even(label)
-    if before is None or found is None:
+    before, ends = sweep.gain(label, sweep.swept.before), sweep.break_even(label)
+    if before is None or ends is None:
         return "–"
     if before.mean <= 0:
         return "not above it before"
-    return words([f"{value:.3g} {sweep.kind.unit}".strip() for value in found]) if found else "nowhere in this range"
+    return words([f"{value:.3g} {sweep.kind.unit}".strip() for value in ends]) if ends else "nowhere in this range"
 
 
-def sentences(sweep: Sweep, every: Sequence[Sweep]) -> list[str]:
-    """What the sweep shows, from its numbers alone."""
-    told = []
-    if sweep.swept.kind == "refocus":
-        told += _stated_range(sweep)
-    for remedy in every:
+def sentences(sweep: Sweep, sweeps: Sequence[Sweep]) -> list[str]:
+    """What the sweep shows, from its numbers alone; sweeps: all of the study."""
+    lines = _stated_range(sweep) if sweep.swept.kind == "refocus" else []
+    for remedy in sweeps:
         if remedy.swept.kind in REMEDIES.get(sweep.swept.kind, ()) and remedy.swept.before == sweep.swept.before:
-            told += _recovered(sweep, remedy)
-    return told
+            lines += _recovered(sweep, remedy)
+    return lines
 
 
 def _stated_range(sweep: Sweep) -> list[str]:
     ranges: dict[tuple[float, float], list[str]] = {}
     for label in sweep.methods:
-        found = sweep.small_range(label)
-        if found is not None:
-            ranges.setdefault(found, []).append(label)
+        ends = sweep.small_range(label)
+        if ends is not None:
+            ranges.setdefault(ends, []).append(label)
     unit = f" {sweep.kind.unit}" if sweep.kind.unit else ""
     return [
-        f"Within {SMALL:g} {sweep.results.headline.unit} of the score before the change from {low:g} to "
-        f"{high:g}{unit}: {words(labels)}."
+        f"From {low:g} to {high:g}{unit} the score changes by at most {SMALL:g} {sweep.results.headline.unit}: "
+        f"{words(labels)}."
         for (low, high), labels in ranges.items()
     ]
 
 
 def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
-    told = []
+    lines = []
     for label in sweep.methods:
         parts = [
             f"{value}: {100 * share.mean:.0f} %"
@@ -143,11 +163,11 @@ def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
             for value, share in sweep.recovered(label, remedy).items()
         ]
         if parts:
-            told.append(f"Recovered of the loss by {remedy.swept.kind}, {label}: {'; '.join(parts)}.")
-    return told
+            lines.append(f"Share of the loss that {remedy.swept.kind} recovers for {label}: {'; '.join(parts)}.")
+    return lines
 
 
-def claims(results: Results, every: Sequence[Sweep]) -> str:
+def claims(results: Results, sweeps: Sequence[Sweep]) -> str:
     """One paragraph: the paper's three claims of robustness for its method, and what these sweeps say of each.
 
     Empty where the paper's method, or every one of the three changes, is missing, and for a headline that is not in dB.
@@ -155,31 +175,32 @@ def claims(results: Results, every: Sequence[Sweep]) -> str:
     if results.headline.unit != "dB":
         return ""
     labels = list(dict.fromkeys(results.frame.loc[results.frame["name"] == "hil", "method"]))
-    told = []
-    for sweep in every:
-        for label in labels:
-            if label in sweep.methods and sweep.swept.kind in PAPER:
-                told.append(_claim(sweep, label))
-    if not told:
+    verdicts = [
+        _claim(sweep, label)
+        for sweep in sweeps
+        for label in labels
+        if label in sweep.methods and sweep.swept.kind in PAPER
+    ]
+    if not verdicts:
         return ""
-    rule = f"A claim is said to hold where the mean loss is at most {SMALL:g} dB at every value."
-    return f"Chakravarthula et al. 2020 (Section 7.2) show pictures for three claims. {rule} {' '.join(told)}"
+    rule = f"A claim holds here if the mean loss is at most {SMALL:g} dB at every value."
+    return f"Chakravarthula et al. 2020 (Section 7.2) support three claims with pictures. {rule} {' '.join(verdicts)}"
 
 
 def _claim(sweep: Sweep, label: str) -> str:
     score, baseline = sweep.results.headline, sweep.results.layout.baseline
-    said, far = PAPER[sweep.swept.kind]
-    whole = len(sweep.losses(label)) == len(sweep.swept.points)
+    claim, far = PAPER[sweep.swept.kind]
+    complete = len(sweep.losses(label)) == len(sweep.swept.points)
     reached = len(sweep.swept.points) > 1 if far is None else max(abs(float(v)) for v, _ in sweep.swept.points) >= far
     worst = sweep.worst(label)
-    if not (whole and reached) or worst is None:
-        lacking = "the sweep does not go so far" if whole else "some points have no score"
-        return f"On {sweep.swept.before}, whether {said} for {label} cannot be told ({sweep.kind.words}): {lacking}."
+    if not (complete and reached) or worst is None:
+        lacking = "the sweep does not go far enough" if complete else "some points have no score"
+        return f'"{claim}" cannot be judged for {label} on {sweep.swept.before} ({sweep.kind.words}): {lacking}.'
     value, loss = worst
-    verdict = "holds here" if loss.mean <= SMALL else "does not hold here"
-    where = f"{sweep.kind.words}, {shown(value)} {sweep.kind.unit}".rstrip(" ,")
+    verdict = "holds" if loss.mean <= SMALL else "does not hold"
+    where = f"{sweep.kind.words}, {value_text(value)} {sweep.kind.unit}".rstrip(" ,")
     sentence = (
-        f"On {sweep.swept.before}, that {said} {verdict} for {label}: at worst ({where}) it loses "
+        f'"{claim}" {verdict} for {label} on {sweep.swept.before}: its largest loss ({where}) is '
         f"{score.interval(loss.mean, loss.low, loss.high)} {score.unit}"
     )
     if label == baseline:
@@ -190,6 +211,90 @@ def _claim(sweep: Sweep, label: str) -> str:
     if gained is None or before is None or other is None:
         return f"{sentence}."
     return (
-        f"{sentence}, {baseline} {score.number(other.mean)}, and its lead over {baseline} goes from "
+        f"{sentence}, that of {baseline} there {score.number(other.mean)}, and its lead over {baseline} goes from "
         f"{score.number(before.mean, signed=True)} to {score.number(gained.mean, signed=True)} {score.unit}."
     )
+
+
+def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+    """Curves of every kind of change, and rows of pictures of the target in the middle of their ranking by quality."""
+    results, drawable = report.results, [sweep for sweep in report.sweeps if sweep.methods]
+    thumbnails = report.thumbnails
+    for kind in dict.fromkeys(sweep.swept.kind for sweep in drawable):
+        same = [sweep for sweep in drawable if sweep.swept.kind == kind]
+        change = same[0].kind.words
+        path = report.figures / f"quality-sweep-{kind}.png"
+        draw_sweep(path, [_panel(sweep) for sweep in same], f"{results.headline.axis}{report.layout.text.axis}")
+        yield (
+            path,
+            f"{results.headline.axis} along a change: {change}. Mean over targets; bars, slightly offset: 95 % "
+            "interval of the paired mean difference to the unchanged display. Dashed: the baseline.",
+        )
+        if not thumbnails.targets:
+            continue
+        ordered = thumbnails.by_quality(results.conditions[0])
+        target = ordered[len(ordered) // 2]
+        for sweep in same:
+            stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in sweep.swept.before)
+            path = report.figures / f"sweep-{kind}-{stem}.jpg"
+            rows = _rows(report, sweep, target)
+            draw_rows(path, f"{sweep.swept.before}: {change}", (target, thumbnails.targets[target]), rows)
+            yield path, f"Captures of {target} on {sweep.swept.before} along a change: {change}."
+
+
+def _panel(sweep: Sweep) -> Panel:
+    kind, points = sweep.kind, sweep.named_points
+    curves = []
+    for label in sweep.methods:
+        means = tuple(sweep.mean(label, condition).mean for _, condition in points)
+        reaches = tuple(_reach(sweep, label, condition) for _, condition in points)
+        curves.append(Curve(label, means, reaches, dashed=label == sweep.results.layout.baseline))
+    return Panel(
+        title=sweep.swept.before,
+        axis=f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}",
+        positions=tuple(float(value) if kind.numeric else float(index) for index, (value, _) in enumerate(points)),
+        curves=tuple(curves),
+        ticks=None if kind.numeric else tuple(value_text(value) for value, _ in points),
+        nominal=kind.nominal,
+    )
+
+
+def _reach(sweep: Sweep, label: str, condition: str) -> tuple[float, float]:
+    """How far the interval of the mean difference to the unchanged display reaches down and up."""
+    loss = sweep.loss(label, condition) if condition != sweep.swept.before else None
+    if loss is None:
+        return 0.0, 0.0
+    ends = loss.high - loss.mean, loss.mean - loss.low
+    return ends if sweep.results.headline.higher_is_better else (ends[1], ends[0])
+
+
+def _rows(report: Report, sweep: Sweep, target: str) -> list[Row]:
+    """A row of captures for each of the chosen methods."""
+    points = sweep.named_points
+    if len(points) > MOST_VALUES:
+        picks = np.linspace(0, len(points) - 1, MOST_VALUES).round().astype(int)
+        points = tuple(points[index] for index in picks)
+    return [
+        Row(
+            label,
+            tuple((_with_unit(sweep, value), report.thumbnails.tile(label, name, target)) for value, name in points),
+        )
+        for label in _chosen(sweep)
+    ]
+
+
+def _chosen(sweep: Sweep) -> list[str]:
+    """At most ``MOST_ROWS`` methods: the baseline, the paper's, then the best of the others on the display before the
+    change, without the oracle."""
+    results, before = sweep.results, sweep.swept.before
+    registered = results.frame.drop_duplicates("method").set_index("method")["name"]
+    first = [label for label in sweep.methods if label == results.layout.baseline]
+    paper = [label for label in sweep.methods if registered[label] == "hil"]
+    ranked = results.ranking(before, categories=(*OFFLINE, ONLINE))
+    others = [label for label in ranked if label in sweep.methods]
+    return list(dict.fromkeys([*first, *paper, *others]))[:MOST_ROWS]
+
+
+SECTIONS = (
+    Section("sweeps", 50, _render, applies=lambda report: any(s.methods for s in report.sweeps), figures=_figures),
+)

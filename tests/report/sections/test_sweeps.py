@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holobench_eval.report.build import write_report
+from holobench_eval.report import Description, write_report
 from holobench_eval.report.data.layout import Layout, Swept
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.sweeps import Sweep, sweeps
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.report.sections import sweeps as section_sweeps
-from holobench_eval.report.sections.description import Description
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 TARGETS = ("a", "b", "c", "d")
 DAYS = (30.0, 60.0, 90.0)
@@ -43,7 +42,7 @@ def layout() -> Layout:
         for kind, values in kinds.items()
     )
     conditions = ["leto-aged", *(name for one in swept for _, name in one.points)]
-    return made.layout(
+    return synthetic.layout(
         pairs=tuple((label, condition) for label in NAMES for condition in conditions),
         targets=TARGETS,
         privileged=frozenset(),
@@ -52,16 +51,16 @@ def layout() -> Layout:
     )
 
 
-def records() -> list[made.Record]:
+def records() -> list[synthetic.Record]:
     found = []
     points = [("", 0.0, "leto-aged")]
     points += [(one.kind, value, name) for one in layout().sweeps for value, name in one.points]
     for label, name in NAMES.items():
         for target in TARGETS:
             for kind, value, condition in points:
-                described = made.cell(name, target, condition, profile="leto-aged")
+                described = synthetic.cell(name, target, condition, profile="leto-aged")
                 scores = {"psnr_linear": psnr(label, target, kind, value)}
-                found.append(made.record(label, described, scores))
+                found.append(synthetic.record(label, described, scores))
     return found
 
 
@@ -118,8 +117,10 @@ def test_what_a_remedy_gets_back_is_told_as_a_share(results: Results) -> None:
 
 def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> None:
     told = section_sweeps.claims(results, sweeps(results))
-    assert "three months does not hold here for HIL" in told
-    assert "4 cm for HIL cannot be told (camera moved sideways): the sweep does not go so far" in told
+    assert 'three months" does not hold for HIL' in told
+    assert (
+        '4 cm" cannot be judged for HIL on leto-aged (camera moved sideways): the sweep does not go far enough' in told
+    )
     assert "goes from +4.00 to -5.00 dB" in told
     without = Results(results.frame[results.frame["name"] != "hil"], replace(layout(), pairs=()))
     assert section_sweeps.claims(without, sweeps(without)) == ""
@@ -135,12 +136,12 @@ def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Res
     assert drift.slope("HIL", 1) is None
     assert drift.break_even("HIL") is None
     assert of(holed, "camera_shift_x").slope("HIL", 1) is not None
-    assert "three months for HIL cannot be told" in section_sweeps.claims(holed, sweeps(holed))
+    assert 'three months" cannot be judged for HIL' in section_sweeps.claims(holed, sweeps(holed))
     assert "–" in section_sweeps.scores(drift)
 
 
 def test_a_report_with_sweeps_has_curves_and_tables(tmp_path: Path, results: Results) -> None:
-    path = write_report(layout(), records(), tmp_path, {}, Description())
+    path, _ = write_report(layout(), records(), tmp_path, {}, Description())
     text = path.read_text()
     assert "## Changes of the displays" in text
     assert "### Drift since calibration: leto-aged" in text

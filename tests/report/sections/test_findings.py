@@ -5,7 +5,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.sections.findings import findings
 from holobench_eval.study.plan import REFERENCE
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 TARGETS = tuple(f"t{index}" for index in range(8))
 NOISE = np.array([0.0, 0.3, -0.2, 0.1, 0.4, -0.1, 0.2, -0.3])
@@ -19,10 +19,10 @@ def results_of(scores, targets=TARGETS, **changes):
         for index, target in enumerate(targets):
             found = {key: float(values[index]) for key, values in columns.items() if not np.isnan(values[index])}
             state = {"state": "done"} if found else {"state": "failed", "reason": "lost"}
-            records.append(made.record(label, made.cell(label, target, condition), found, **state))
+            records.append(synthetic.record(label, synthetic.cell(label, target, condition), found, **state))
     labels = tuple((label, "bench") for label in scores if not label.startswith("floor_"))
     given = {"pairs": labels, "targets": targets, "baseline": "old", "reported": {}, "privileged": frozenset()}
-    layout = made.layout(**(given | changes))
+    layout = synthetic.layout(**(given | changes))
     return Results(records_frame(records, layout), layout)
 
 
@@ -36,22 +36,23 @@ def sentences(results):
 
 def test_the_best_method_is_named_with_its_margin_interval_and_p():
     text = sentences(results_of({"old": psnr(17.0), "new": {"psnr_linear": 19.0 + 2 * NOISE}}))["bench"]
-    assert "Best of the 2 ranked methods: new, PSNR 19.10" in text
-    assert "+2.05 dB [" in text
+    assert "new ranks first of 2 methods: PSNR 19.10" in text
+    assert "Difference from the baseline old (17.05 dB): +2.05 dB [" in text
     assert "8 of 8 targets, p = 0.008 after Holm" in text
     assert "at p < 0.05 after Holm: new (1 of 1)" in text
 
 
 def test_when_the_baseline_wins_the_next_method_is_compared_with_it():
     text = sentences(results_of({"old": psnr(20.0), "mid": psnr(19.0), "low": psnr(15.0)}))["bench"]
-    assert "it is the baseline, and from it the next, mid, differs by -1.00 dB" in text
+    assert "The baseline old ranks first of 3 methods: PSNR 20.05" in text
+    assert "mid follows at -1.00 dB [" in text
 
 
-def test_a_privileged_method_is_the_ceiling_and_never_the_best():
+def test_a_privileged_method_is_the_oracle_and_never_the_best():
     scores = {"old": psnr(17.0), "new": psnr(18.0), "oracle": psnr(30.0)}
     text = sentences(results_of(scores, privileged=frozenset({"oracle"})))["bench"]
-    assert "Best of the 2 ranked methods: new" in text
-    assert "The ceiling oracle" in text
+    assert "new ranks first of 2 methods" in text
+    assert "The privileged method oracle, an oracle that may differentiate" in text
     assert "+12.00 dB from new" in text
 
 
@@ -63,16 +64,16 @@ def test_a_method_that_does_not_beat_a_constant_image_is_named():
 def test_a_method_with_a_hole_is_not_ranked_and_said_so():
     lucky = {"psnr_linear": np.where(np.arange(8) == 3, np.nan, 25.0)}
     text = sentences(results_of({"old": psnr(17.0), "new": psnr(18.0), "lucky": lucky}))["bench"]
-    assert "Best of the 2 ranked methods: new" in text
-    assert "Not ranked, since they lack targets: lucky (7 of 8)" in text
+    assert "new ranks first of 2 methods" in text
+    assert "Not ranked, because targets are missing: lucky (7 of 8)" in text
 
 
 def test_a_baseline_without_a_score_is_not_compared_with():
     text = sentences(results_of({"old": {"psnr_linear": np.full(8, np.nan)}, "new": psnr(18.0)}))["bench"]
-    assert "new, PSNR 18.05" in text
-    assert "against the baseline" not in text.partition(". ")[0]
+    assert "new is the only ranked method: PSNR 18.05" in text
+    assert "Difference from the baseline" not in text
     assert "–" not in text
-    assert "Not ranked, since they lack targets: old (0 of 8)" in text
+    assert "Not ranked, because targets are missing: old (0 of 8)" in text
 
 
 def test_a_ranking_that_blur_flips_is_reported_with_the_width():
@@ -89,7 +90,7 @@ def test_a_stable_ranking_is_reported_as_stable():
 
 def test_a_metric_that_disagrees_with_the_headline_is_named():
     scores = {"old": psnr(17) | {"mofd_srgb": 0.1 + NOISE / 100}, "new": psnr(18) | {"mofd_srgb": 0.3 + NOISE / 100}}
-    assert "By MOFD (sRGB) the best is old, not new." in sentences(results_of(scores))["bench"]
+    assert "old ranks first by MOFD (sRGB), ahead of new." in sentences(results_of(scores))["bench"]
 
 
 def test_two_targets_give_no_test_and_say_so():
@@ -101,7 +102,7 @@ def test_two_targets_give_no_test_and_say_so():
 
 def test_a_test_that_could_not_have_shown_anything_says_so():
     text = sentences(results_of({"old": psnr(17.0), "new": psnr(18.0)}, targets=TARGETS[:4]))["bench"]
-    assert "could not have shown any difference" in text
+    assert "this test cannot show a difference" in text
 
 
 def test_every_pair_is_tested_and_corrected_within_its_display():
@@ -128,4 +129,4 @@ def test_a_floor_without_a_score_is_not_spoken_of():
     assert results.floors == ["floor_speckle"]
     text = sentences(results)["bench"]
     assert "constant" not in text
-    assert "pure speckle scores 9.05 dB; all of the 1 with a score are better on average" in text
+    assert "pure speckle scores 9.05 dB; all scored methods (1) are better on average" in text

@@ -3,69 +3,48 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..data.layout import Layout
 from ..data.scores import Score
-from .style import COLOURS, GREY, PALE, new_figure, save, style
+from .style import COLOURS, GREY, PALE, WIDTH, grid, save, stacked, style
 
-WIDTH = 900
-METHOD_WIDTH = 115
-"""Pixels that a method's name has below the per-target chart."""
-LABELLED_TARGETS = 14
-"""Lines of the per-target chart carry their target's name up to this many; beyond, names would overlap."""
+METHOD_WIDTH = 115  # pixels that a method's name has below the per-target chart
+LABELLED_TARGETS = 14  # lines of the per-target chart carry their target's name up to this many; more would overlap
 
 
 @dataclass(frozen=True)
 class Chart:
     """What all charts share.
 
-    score: the headline metric; methods: labels in order; privileged: those that are the
-    ceiling; floors: what the floor scores, by its description; of: added to the metric's name on an axis.
+    score: the headline metric; methods: labels in order; floors: what the floor scores, by its description.
     """
 
     score: Score
+    layout: Layout
     methods: tuple[str, ...]
-    privileged: frozenset[str]
     floors: Mapping[str, float]
-    of: str = ""
 
     @property
     def axis(self) -> str:
         """The metric's title, domain and unit, for an axis."""
-        return f"{self.score.axis}{self.of}"
+        return f"{self.score.axis}{self.layout.text.axis}"
 
-    def _place(self, label: str) -> int:
-        """Index among the methods of the same kind, ceilings or not."""
-        kind = label in self.privileged
-        return [method for method in self.methods if (method in self.privileged) == kind].index(label)
+    def is_oracle(self, label: str) -> bool:
+        """Whether a method may differentiate through the bench."""
+        return label in self.layout.privileged
 
     def colour(self, label: str) -> str:
-        """The method's colour, the same in every chart; ceilings are grey."""
-        return GREY if label in self.privileged else COLOURS[self._place(label) % len(COLOURS)]
-
-    def name(self, label: str) -> str:
-        """The method's label, marked when it is the ceiling."""
-        return f"{label}, ceiling (privileged)" if label in self.privileged else label
-
-
-def _panels(
-    conditions: Sequence[str], heights: Sequence[int], footer: int, width: int = WIDTH
-) -> tuple[Figure, list[Axes]]:
-    """A column of panels, one per condition, each titled; ``heights``, ``footer`` and ``width`` in pixels."""
-    figure = new_figure(width, sum(heights) + footer)
-    figure.set_layout_engine("constrained")
-    panels = figure.subplots(len(conditions), 1, squeeze=False, gridspec_kw={"height_ratios": list(heights)})
-    for axes, condition in zip(panels[:, 0], conditions, strict=True):
-        axes.set_title(condition, loc="left", weight="bold", parse_math=False)
-    return figure, list(panels[:, 0])
+        """The method's colour, the same in every chart; oracles are grey."""
+        competitors = [method for method in self.methods if not self.is_oracle(method)]
+        return GREY if self.is_oracle(label) else COLOURS[competitors.index(label) % len(COLOURS)]
 
 
 def _offsets(rows: pd.DataFrame, score: str) -> NDArray[np.float64]:
@@ -78,13 +57,13 @@ def _offsets(rows: pd.DataFrame, score: str) -> NDArray[np.float64]:
 def quality_bars(path: Path, table: pd.DataFrame, chart: Chart) -> None:
     """Mean of the headline metric with its interval, a panel per condition, floors as vertical lines."""
     score = chart.score.key
-    shown = table[table["method"].isin(chart.methods) & np.isfinite(table[score])]
-    conditions = list(dict.fromkeys(shown["condition"]))
-    groups = {condition: shown[shown["condition"] == condition] for condition in conditions}
+    rows = table[table["method"].isin(chart.methods) & np.isfinite(table[score])]
+    conditions = list(dict.fromkeys(rows["condition"]))
+    groups = {condition: rows[rows["condition"] == condition] for condition in conditions}
     with style():
         heights = [60 + 30 * len(groups[condition]) for condition in conditions]
-        figure, panels = _panels(conditions, heights, footer=90)
-        limit = float(np.nanmax(shown[[score, f"{score}_hi"]].to_numpy())) * 1.3
+        figure, panels = stacked(conditions, heights, footer=90)
+        limit = float(np.nanmax(rows[[score, f"{score}_hi"]].to_numpy())) * 1.3
         for axes, condition in zip(panels, conditions, strict=True):
             _bars(axes, groups[condition], chart)
             for (_, value), dash in zip(chart.floors.items(), ("--", ":"), strict=False):
@@ -102,19 +81,19 @@ def quality_bars(path: Path, table: pd.DataFrame, chart: Chart) -> None:
 
 def _bars(axes: Axes, rows: pd.DataFrame, chart: Chart) -> None:
     score = chart.score.key
-    labels, places = list(rows["method"]), np.arange(len(rows))
+    labels, heights = list(rows["method"]), np.arange(len(rows))
     offsets = _offsets(rows, score)
-    bars = axes.barh(places, rows[score], height=0.62, color=[chart.colour(label) for label in labels])
+    bars = axes.barh(heights, rows[score], height=0.62, color=[chart.colour(label) for label in labels])
     for bar, label in zip(bars, labels, strict=True):
-        if label in chart.privileged:
+        if chart.is_oracle(label):
             bar.set(facecolor="white", edgecolor=GREY, hatch="////")
-    axes.errorbar(rows[score], places, xerr=offsets, fmt="none", ecolor="black", elinewidth=1.2, capsize=3)
-    for place, (mean, low, high, end) in enumerate(
+    axes.errorbar(rows[score], heights, xerr=offsets, fmt="none", ecolor="black", elinewidth=1.2, capsize=3)
+    for height, (mean, low, high, end) in enumerate(
         zip(rows[score], rows[f"{score}_lo"], rows[f"{score}_hi"], rows[score] + offsets[1], strict=True)
     ):
         words = chart.score.interval(mean, low, high)
-        axes.annotate(words, (end, place), (7, 0), textcoords="offset points", va="center", fontsize=8)
-    axes.set_yticks(places, [chart.name(label) for label in labels], parse_math=False)
+        axes.annotate(words, (end, height), (7, 0), textcoords="offset points", va="center", fontsize=8)
+    axes.set_yticks(heights, [chart.layout.marked(label) for label in labels], parse_math=False)
     axes.invert_yaxis()
     axes.tick_params(axis="y", length=0)
 
@@ -126,28 +105,27 @@ def target_dots(path: Path, values: Mapping[str, pd.DataFrame], chart: Chart) ->
     """
     with style():
         width = max(WIDTH, 150 + METHOD_WIDTH * max(frame.shape[1] for frame in values.values()))
-        figure, panels = _panels(list(values), [340] * len(values), footer=20, width=width)
+        figure, panels = stacked(list(values), [340] * len(values), footer=20, width=width)
         for axes, frame in zip(panels, values.values(), strict=True):
             _dots(axes, frame, chart)
         save(figure, path)
 
 
 def _dots(axes: Axes, frame: pd.DataFrame, chart: Chart) -> None:
-    places = np.arange(frame.shape[1])
+    columns = np.arange(frame.shape[1])
     for _, row in frame.iterrows():
-        axes.plot(places, row.to_numpy(), color=PALE, linewidth=0.9, zorder=1)
-    for place, label in zip(places, frame.columns, strict=True):
-        column = frame[label].dropna()
-        face = "white" if label in chart.privileged else chart.colour(label)
-        axes.scatter(np.full(len(column), place), column, s=26, color=face, edgecolor=chart.colour(label), zorder=2)
-        if len(column):
-            axes.hlines(column.mean(), place - 0.22, place + 0.22, color="black", linewidth=2.2, zorder=3)
-    names = [textwrap.fill(chart.name(str(label)), 16, break_long_words=False) for label in frame.columns]
-    axes.set_xticks(places, names, parse_math=False)
+        axes.plot(columns, row.to_numpy(), color=PALE, linewidth=0.9, zorder=1)
+    for column, label in zip(columns, frame.columns, strict=True):
+        values = frame[label].dropna()
+        face = "white" if chart.is_oracle(label) else chart.colour(label)
+        axes.scatter(np.full(len(values), column), values, s=26, color=face, edgecolor=chart.colour(label), zorder=2)
+        if len(values):
+            axes.hlines(values.mean(), column - 0.22, column + 0.22, color="black", linewidth=2.2, zorder=3)
+    names = [textwrap.fill(chart.layout.marked(str(label)), 16, break_long_words=False) for label in frame.columns]
+    axes.set_xticks(columns, names, parse_math=False)
     axes.set_ylabel(chart.axis.replace(", of ", "\nof "))
-    axes.grid(axis="y", color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.set_xlim(-0.5, len(places) - 0.5)
+    grid(axes, "y")
+    axes.set_xlim(-0.5, len(columns) - 0.5)
     if len(frame) <= LABELLED_TARGETS:
         _name_lines(axes, frame)
 

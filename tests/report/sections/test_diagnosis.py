@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
-from markupsafe import Markup
 
 from holobench_eval.display.estimates import estimate, joined
+from holobench_eval.report.data.trainings import Training
 from holobench_eval.report.sections.diagnosis import diagnoses, difference, missing
-from holobench_eval.report.sections.training import Trained
 from holobench_eval.study.artifacts import TrainingRecord
 
 FOUND = [
@@ -24,12 +23,12 @@ TRUTH = [
 ]
 
 
-def trained(**facts: object) -> Trained:
+def trained(**facts: object) -> Training:
     record = TrainingRecord({"description": {"profile": "leto-aged"}, **facts}, ())
-    return Trained("parametric", ("parametric",), "leto-aged", record)
+    return Training("parametric", ("parametric",), "leto-aged", record)
 
 
-def lines(text: Markup) -> list[list[str]]:
+def lines(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
 
 
@@ -49,7 +48,7 @@ def test_estimates_that_are_all_right_are_said_to_be() -> None:
     ((_, _, verdict),) = diagnoses([trained(estimates=joined(FOUND[:6], TRUTH))])
     assert verdict == "All 6 numbers are within their stated errors."
     ((_, _, verdict),) = diagnoses([trained(estimates=joined(FOUND, []))])
-    assert verdict.startswith("None of these has a truth")
+    assert verdict.startswith("None of these has a ground truth")
 
 
 def test_a_difference_of_phases_goes_the_shorter_way() -> None:
@@ -59,10 +58,8 @@ def test_a_difference_of_phases_goes_the_shorter_way() -> None:
 
 def test_methods_that_lack_the_same_are_told_once() -> None:
     both = [trained(missing=["flicker | strong", "noise"]), trained(missing=["flicker | strong", "noise"])]
-    assert missing(both) == [
-        "leto-aged has, and the form of the model of parametric has not: flicker \\| strong; noise."
-    ]
-    assert "has not: nothing." in missing([trained(missing=[])])[0]
+    assert missing(both) == ["leto-aged contains effects that parametric cannot represent: flicker | strong; noise."]
+    assert missing([trained(missing=[])]) == ["leto-aged contains no effect that parametric cannot represent."]
 
 
 @pytest.mark.parametrize(
@@ -81,7 +78,7 @@ def test_methods_that_lack_the_same_are_told_once() -> None:
 def test_provenance_of_strangers_shows_nothing_and_stops_nothing(facts: dict[str, object]) -> None:
     assert diagnoses([trained(**facts)]) == []
     assert missing([trained(**facts)]) == []
-    unknown = Trained("x", ("x",), "y", None)
+    unknown = Training("x", ("x",), "y", None)
     assert (diagnoses([unknown]), missing([unknown])) == ([], [])
 
 

@@ -5,7 +5,7 @@ from holobench_eval.report.charts.comparison import HEADER, SIDE, draw_compariso
 from holobench_eval.report.charts.gallery import (
     Column,
     Tile,
-    error_ceiling,
+    error_limit,
     error_map,
     halved,
     load_picture,
@@ -13,7 +13,7 @@ from holobench_eval.report.charts.gallery import (
     spread,
 )
 from holobench_eval.report.charts.style import slugs
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 
 def noise(size, seed=0):
@@ -43,9 +43,9 @@ def test_an_error_map_drawn_at_half_size_keeps_its_mean():
 
 
 def test_the_error_scale_is_a_round_number_above_most_errors():
-    assert error_ceiling([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
-    assert error_ceiling([np.zeros((4, 4))]) == pytest.approx(0.1)
-    assert error_ceiling([np.ones((4, 4))]) == 1.0
+    assert error_limit([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
+    assert error_limit([np.zeros((4, 4))]) == pytest.approx(0.1)
+    assert error_limit([np.ones((4, 4))]) == 1.0
 
 
 def test_targets_of_a_large_study_are_spread_from_first_to_last():
@@ -77,7 +77,7 @@ def test_an_absent_capture_leaves_a_note_in_its_place(tmp_path):
 
 
 def test_gray_thumbnails_are_read_as_colour(tmp_path):
-    made.save_picture(tmp_path / "gray.png", np.full((8, 8), 0.5))
+    synthetic.save_picture(tmp_path / "gray.png", np.full((8, 8), 0.5))
     assert load_picture(tmp_path / "gray.png").shape == (8, 8, 3)
     assert load_picture(tmp_path / "absent.png") is None
 

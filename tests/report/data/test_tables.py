@@ -7,11 +7,11 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, read_records, recompute_table, records_frame, table_from_records
-from holobench_eval.report.sections.tables import timing
+from holobench_eval.report.sections.cost import timing
 from holobench_eval.study.plan import FLOORS, REFERENCE
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
-PLAIN = made.layout(
+PLAIN = synthetic.layout(
     pairs=(("b", "bench"), ("a", "bench")), targets=("t2", "t1"), baseline="b", reported={}, privileged=frozenset()
 )
 
@@ -19,7 +19,9 @@ PLAIN = made.layout(
 def rows(values, label="a", repeats=1, **changes):
     """Done records of a method, a value of psnr_linear per target and repeat."""
     return [
-        made.record(label, made.cell(label, target, "bench", repeat=repeat), {"psnr_linear": value + repeat}, **changes)
+        synthetic.record(
+            label, synthetic.cell(label, target, "bench", repeat=repeat), {"psnr_linear": value + repeat}, **changes
+        )
         for target, value in values.items()
         for repeat in range(repeats)
     ]
@@ -31,26 +33,28 @@ def row_of(table, label):
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
-    return made.study(tmp_path_factory.mktemp("study"), size=32, targets=made.TARGETS[:3])
+    return synthetic.study(tmp_path_factory.mktemp("study"), size=32, targets=synthetic.TARGETS[:3])
 
 
 def test_equal_records_give_equal_bytes_in_any_order(records):
     shuffled = random.Random(0).sample(records, len(records))
-    frame, again = (records_frame(order, made.layout()) for order in (records, shuffled))
+    frame, again = (records_frame(order, synthetic.layout()) for order in (records, shuffled))
     assert csv_text(frame) == csv_text(again)
-    assert csv_text(table_from_records(frame, made.layout())) == csv_text(table_from_records(again, made.layout()))
+    assert csv_text(table_from_records(frame, synthetic.layout())) == csv_text(
+        table_from_records(again, synthetic.layout())
+    )
 
 
 def test_table_computed_from_the_written_records_has_the_same_bytes(records):
-    frame = records_frame(records, made.layout())
-    written = csv_text(table_from_records(frame, made.layout()))
-    assert recompute_table(csv_text(frame), made.layout()) == written
+    frame = records_frame(records, synthetic.layout())
+    written = csv_text(table_from_records(frame, synthetic.layout()))
+    assert recompute_table(csv_text(frame), synthetic.layout()) == written
 
 
 def test_rows_follow_the_config_and_end_with_the_floor(records):
-    table = table_from_records(records_frame(records, made.layout()), made.layout())
+    table = table_from_records(records_frame(records, synthetic.layout()), synthetic.layout())
     found = list(zip(table["method"], table["condition"], strict=True))
-    assert found == [*made.layout().pairs, *((name, REFERENCE) for name in FLOORS)]
+    assert found == [*synthetic.layout().pairs, *((name, REFERENCE) for name in FLOORS)]
 
 
 def test_targets_keep_the_order_of_the_dataset():
@@ -59,7 +63,7 @@ def test_targets_keep_the_order_of_the_dataset():
 
 
 def test_a_failed_cell_is_counted_and_is_in_no_mean(records):
-    table = table_from_records(records_frame(records, made.layout()), made.layout())
+    table = table_from_records(records_frame(records, synthetic.layout()), synthetic.layout())
     row = table[(table["method"] == "GS") & (table["condition"] == "leto-aged")].iloc[0]
     assert (row["n"], row["failed"]) == (2, 1)
 
@@ -98,7 +102,9 @@ ALONE = {"t1": (5.0, False), "t2": (3.0, True)}
 
 def timed(label="a", alone=ALONE):
     return [
-        made.record(label, made.cell(label, target, "bench"), {"psnr_linear": 1.0}, seconds=seconds, alone=quiet)
+        synthetic.record(
+            label, synthetic.cell(label, target, "bench"), {"psnr_linear": 1.0}, seconds=seconds, alone=quiet
+        )
         for target, (seconds, quiet) in alone.items()
     ]
 
@@ -120,21 +126,20 @@ def test_records_that_do_not_say_what_was_beside_them_have_no_column_for_it_and_
 
 SHARED = {"t1": (5.0, False), "t2": (3.0, False)}
 ALL = {"t1": (5.0, True), "t2": (3.0, True)}
-BESIDE = "holograms computed 2 side by side, which disturb each other"
+INFLATED = "timed with 2 concurrent workers and are inflated"
 SENTENCES = [
-    (timed(), "The seconds are of one hologram a row, computed with nothing beside it."),
+    (timed(), "Seconds are those of one hologram per row, timed alone."),
     (
         [*timed(), *timed("b", SHARED)],
-        f"The seconds are of one hologram a row, computed with nothing beside it; those of b on bench are of {BESIDE}.",
+        f"Seconds are those of one hologram per row, timed alone; those of b on bench were {INFLATED}.",
     ),
     (
         [*timed("a", SHARED), *timed("b", ALL)],
-        "The seconds are of those holograms of a row that were computed with nothing beside them; those of a on bench "
-        f"are of {BESIDE}.",
+        f"Seconds are those of the holograms timed alone; those of a on bench were {INFLATED}.",
     ),
-    (timed("a", SHARED), f"The seconds are of {BESIDE}."),
-    (timed("a", ALL), "Each hologram was computed with nothing beside it."),
-    (rows({"t1": 1.0}), f"The seconds are of {BESIDE}."),
+    (timed("a", SHARED), f"Seconds were {INFLATED}."),
+    (timed("a", ALL), "Each hologram was timed alone."),
+    (rows({"t1": 1.0}), f"Seconds were {INFLATED}."),
 ]
 
 
@@ -148,7 +153,7 @@ def test_nothing_is_said_of_records_that_a_single_worker_left_without_a_note():
 
 
 def test_published_figures_have_columns_of_their_own(records):
-    table = table_from_records(records_frame(records, made.layout()), made.layout())
+    table = table_from_records(records_frame(records, synthetic.layout()), synthetic.layout())
     assert row_of(table, "HIL")["reported_psnr"] == 20.5
     assert np.isnan(row_of(table, "GS")["reported_psnr"])
     assert row_of(table, "HIL")["psnr_linear"] != 20.5
@@ -156,7 +161,7 @@ def test_published_figures_have_columns_of_their_own(records):
 
 @pytest.mark.parametrize("label", ["NA", "nan", "a,b", 'say "x"', "1e5", " padded ", "é"])
 def test_labels_survive_being_written_and_read(label):
-    layout = made.layout(pairs=((label, "bench"),), targets=("t1",), reported={})
+    layout = synthetic.layout(pairs=((label, "bench"),), targets=("t1",), reported={})
     text = csv_text(records_frame(rows({"t1": 1.0}, label=label), layout))
     assert list(read_records(text)["method"]) == [label]
     assert csv_text(read_records(text)) == text
@@ -181,7 +186,7 @@ def test_records_of_another_version_are_refused():
 
 
 def test_published_figures_stand_beside_the_display_they_belong_to(records):
-    layout = made.layout(reported_beside=made.layout().conditions[0])
+    layout = synthetic.layout(reported_beside=synthetic.layout().conditions[0])
     table = table_from_records(records_frame(records, layout), layout)
     beside = table[table["reported_psnr"].notna()]
     assert set(beside["condition"]) == {layout.conditions[0]}

@@ -6,16 +6,16 @@ from skimage.io import imread
 
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.charts.frontier import Costs, Frontier, Mark, draw_frontiers
-from holobench_eval.report.charts.frontiers import draw
 from holobench_eval.report.charts.labels import Names
 from holobench_eval.report.charts.style import new_figure
+from holobench_eval.report.sections.leaderboard import draw
 from tests.support import budget_study as budget
 
 NAN = float("nan")
 
 
-def mark(label, cost, quality, track="calibrated", group=""):
-    return Mark(label, group or label, track, cost, quality, quality - 0.5, quality + 0.5)
+def mark(label, cost, quality, category="calibrated", group=""):
+    return Mark(label, group or label, category, cost, quality, quality - 0.5, quality + 0.5)
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +30,9 @@ def drawn(monkeypatch):
     seen = []
     settle = Names._settle
 
-    def watch(self, shown, middle, width, height):
-        settle(self, shown, middle, width, height)
-        seen.append((shown.get_text(), self.taken[-1], self.axes))
+    def watch(self, annotation, middle, width, height):
+        settle(self, annotation, middle, width, height)
+        seen.append((annotation.get_text(), self.taken[-1], self.axes))
 
     monkeypatch.setattr(Names, "_settle", watch)
     return seen
@@ -114,7 +114,7 @@ def test_the_axis_names_zero_and_round_numbers_with_a_break_between(most, expect
 def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(
-        "holobench_eval.report.charts.frontiers.draw_frontiers", lambda path, panels, *_: seen.append(panels)
+        "holobench_eval.report.sections.leaderboard.draw_frontiers", lambda path, panels, *_: seen.append(panels)
     )
     list(draw(found, tmp_path))
     marks = {one.label: one for one in seen[0][0].marks}
@@ -126,21 +126,21 @@ def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_p
     assert one.high - one.quality == pytest.approx(gained.high - gained.mean)
     assert np.isnan(marks["wirtinger"].low)
     assert "oracle" not in marks
-    assert seen[0][0].ceiling.label.startswith("ceiling: oracle, ")
+    assert seen[0][0].oracle.label.startswith("ceiling: oracle, ")
     assert seen[0][0].floor.label.startswith("baseline: wirtinger, ")
 
 
-def test_a_method_that_lacks_a_target_is_left_out_and_said_to_be(tmp_path, monkeypatch):
+def test_a_method_that_lacks_a_target_is_omitted_and_named(tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(
-        "holobench_eval.report.charts.frontiers.draw_frontiers", lambda path, panels, *_: seen.append(panels)
+        "holobench_eval.report.sections.leaderboard.draw_frontiers", lambda path, panels, *_: seen.append(panels)
     )
     records = budget.study()
     lost = next(i for i, record in enumerate(records) if record["label"] == "hil")
     records[lost] = records[lost] | {"state": "failed", "scores": {}}
     layout = budget.layout()
     captions = [caption for _, caption in draw(Results(records_frame(records, layout), layout), tmp_path)]
-    assert all("Left out where they lack a target: hil." in caption for caption in captions)
+    assert all("Omitted where a target is missing: hil." in caption for caption in captions)
     there = [{one.label for one in panel.marks} for panel in seen[0]]
     assert [("hil" in labels, "sgd" in labels) for labels in there] == [(False, True), (True, True)]
 

@@ -1,7 +1,7 @@
 import pytest
 
 from holobench_eval.report import layout_of
-from holobench_eval.report.sections.description import describe
+from holobench_eval.report.description import describe
 from holobench_eval.study.config import load_study
 
 PLUGINS = """
@@ -57,7 +57,7 @@ def test_a_layout_holds_what_the_config_orders(study):
     assert (layout.title, layout.seed, layout.baseline, layout.headline) == ("Two methods", 7, "honest", "ssim_linear")
     assert layout.privileged == {"knowing"}
     assert layout.camera == {"seeing"}
-    assert [layout.track(label) for label in layout.methods] == ["open loop", "ceiling", "online"]
+    assert [layout.category(label) for label in layout.methods] == ["open loop", "ceiling", "online"]
     assert layout.reported_metrics == ("psnr",)
     assert layout.reported_source == "a paper, table 3"
 

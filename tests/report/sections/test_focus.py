@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from holobench_eval.report import Results, records_frame
-from holobench_eval.report.charts.figures import _sheets
+from holobench_eval.report import Description, Results, records_frame
 from holobench_eval.report.data.scores import parse
-from holobench_eval.report.data.text import wording
-from holobench_eval.report.sections.findings import blur_keys
-from holobench_eval.report.sections.focus import by_plane, sentences
-from holobench_eval.report.sections.tables import leading_scores
-from tests.support import synthetic_study as made
+from holobench_eval.report.data.text import text_of
+from holobench_eval.report.section import Report
+from holobench_eval.report.sections.comparison import pages_of_targets
+from holobench_eval.report.sections.focus import SECTIONS, by_plane, sentences
+from tests.support import synthetic_study as synthetic
 
 PLANES = {
     f"{scene}@{plane:g}mm": (scene, plane) for scene in ("shapes", "motorcycle", "room") for plane in (-2.0, 0.0, 2.0)
@@ -34,8 +34,8 @@ def results_of(quality: dict[str, float], noise: float = 0.2, **changes: Any) ->
                 "psnr_linear_infocus": value,
                 "ssim_linear_infocus": 0.5,
             }
-            described = made.cell(label, target, "bench", measure="focus")
-            records.append(made.record(label, described, scores, seconds=SECONDS[label]))
+            described = synthetic.cell(label, target, "bench", measure="focus")
+            records.append(synthetic.record(label, described, scores, seconds=SECONDS[label]))
     given = {
         "pairs": tuple((label, "bench") for label in quality),
         "targets": tuple(PLANES),
@@ -47,8 +47,12 @@ def results_of(quality: dict[str, float], noise: float = 0.2, **changes: Any) ->
         "privileged": frozenset(),
         "reported": {},
     }
-    layout = made.layout(**(given | changes))
+    layout = synthetic.layout(**(given | changes))
     return Results(records_frame(records, layout), layout)
+
+
+def report_of(results: Results, output: Path) -> Report:
+    return Report(results, [], output, {}, Description())
 
 
 def lines(text: str) -> list[list[str]]:
@@ -66,7 +70,7 @@ def test_a_table_has_a_column_a_plane_and_the_seconds_of_a_hologram_and_of_a_sce
 
 def test_the_cost_and_the_loss_of_a_hologram_of_all_planes_are_told() -> None:
     (told,) = sentences(results_of({"lens": 20.0, "joint": 19.0}), "bench")
-    assert "It takes 5 s, 2.5 times what lens takes for one plane and 0.833 times what lens takes for all" in told
+    assert "It takes 5 s: 2.5 times the time of lens for one plane, 0.833 times that for all planes." in told
     assert "it loses in focus: -2.33 [" in told
     assert "-3.00 dB at -2 mm, -1.00 dB at 0 mm and -3.00 dB at 2 mm" in told
 
@@ -82,25 +86,29 @@ def test_without_both_there_is_nothing_to_compare(changes: dict[str, Any]) -> No
 
 
 def test_other_studies_have_no_such_section() -> None:
-    assert by_plane(results_of({"lens": 20.0}, planes={}), "bench") == ""
+    (section,) = SECTIONS
+    assert section.applies(report_of(results_of({"lens": 20.0}), Path()))
+    assert not section.applies(report_of(results_of({"lens": 20.0}, planes={}), Path()))
 
 
 def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
     assert parse("psnr_linear_infocus").axis == "PSNR in focus, linear light [dB]"
-    leading = [score.key for score in leading_scores(results_of({"lens": 20.0}))]
+    leading = [score.key for score in results_of({"lens": 20.0}).leading]
     assert leading[:3] == ["psnr_linear_infocus", "ssim_linear_infocus", "psnr_linear"]
 
 
 def test_blur_is_compared_with_whole_pictures() -> None:
-    assert [score.key for score in blur_keys(results_of({"lens": 20.0}))] == ["psnr_linear", "psnr_linear_blur1"]
+    assert [score.key for score in results_of({"lens": 20.0}).blur_scores] == ["psnr_linear", "psnr_linear_blur1"]
 
 
-def test_a_sheet_shows_every_plane_of_a_scene() -> None:
-    pictures = {target: np.zeros((8, 8, 3)) for target in PLANES}
-    sheets = _sheets(results_of({"lens": 20.0}), "bench", pictures)
+def test_a_sheet_shows_every_plane_of_a_scene(tmp_path: Path) -> None:
+    report = report_of(results_of({"lens": 20.0}), tmp_path)
+    for target in PLANES:
+        synthetic.save_picture(report.thumbnails.store.target_thumbnail(target), np.zeros((8, 8, 3)))
+    sheets = pages_of_targets(report, "bench")
     assert [len(sheet) for sheet in sheets] == [3, 3, 3]
     assert sheets[1] == ["motorcycle@-2mm", "motorcycle@0mm", "motorcycle@2mm"]
 
 
 def test_the_words_say_what_the_display_does() -> None:
-    assert "adds the phase of a lens" in wording("focus", "", False).procedure
+    assert "adds the phase of a lens" in text_of("focus").procedure

@@ -2,11 +2,13 @@ import numpy as np
 import pytest
 
 from holobench_eval.report import Results, csv_text, recompute_table, records_frame
+from holobench_eval.report.data.categories import meanings
 from holobench_eval.report.sections.findings import findings
-from holobench_eval.report.sections.leaderboard import leaderboard, reading, stopped, tracks
+from holobench_eval.report.sections.leaderboard import leaderboard, reading
+from holobench_eval.report.sections.results import stopped
 from holobench_eval.study.plan import REFERENCE
 from tests.support import budget_study as budget
-from tests.support import synthetic_study as made
+from tests.support import synthetic_study as synthetic
 
 NEW = ("track", "rank", "total_captures", "memory_mib", "stopped")
 
@@ -75,17 +77,17 @@ def test_a_headline_of_which_less_is_better_is_ranked_the_other_way(records):
     assert order == [name for track, _, name in ranked(results(records)) if track == "calibrated"][::-1]
 
 
-def test_the_way_to_the_ceiling_is_zero_at_the_baseline_and_whole_at_the_ceiling(found):
-    assert found.closed("wirtinger", "ideal") == 0
-    assert found.closed("oracle", "ideal") == 1
+def test_no_gap_is_closed_at_the_baseline_and_all_of_it_at_the_oracle(found):
+    assert found.gap_closed("wirtinger", "ideal") == 0
+    assert found.gap_closed("oracle", "ideal") == 1
     mean = {name: found.values(name, "ideal").mean() for name in ("wirtinger", "hil", "oracle")}
     expected = (mean["hil"] - mean["wirtinger"]) / (mean["oracle"] - mean["wirtinger"])
-    assert found.closed("hil", "ideal") == pytest.approx(expected)
+    assert found.gap_closed("hil", "ideal") == pytest.approx(expected)
 
 
-def test_there_is_no_way_to_a_ceiling_below_the_baseline(records):
+def test_there_is_no_gap_to_an_oracle_below_the_baseline(records):
     bad = [r | {"scores": {"psnr_linear": 1.0}} if r["label"] == "oracle" else r for r in records]
-    assert np.isnan(results(bad).closed("hil", "ideal"))
+    assert np.isnan(results(bad).gap_closed("hil", "ideal"))
     assert "way to the ceiling" not in leaderboard(results(bad), "ideal")
 
 
@@ -99,25 +101,26 @@ def test_a_stopped_method_is_named_with_its_reason_and_how_often(records):
     reason = "online_camera has used its 25 captures"
     ended = [r | {"stopped": reason} if "(25" in r["label"] and r["cell"]["target"] != "coffee" else r for r in records]
     (line,) = stopped(results(ended), "ideal")
-    assert line.startswith(f"Stopped by the display, online_camera (25 captures): {reason}, on 5 of 6 targets.")
+    assert line.startswith(f"The display stopped online_camera (25 captures) on 5 of 6 targets: {reason}.")
     assert stopped(results(records), "ideal") == []
 
 
 def test_the_findings_rank_online_methods_apart(found):
     ((_, sentences), *_) = findings(found)
-    assert sentences[0].startswith("Without the camera for the scored image, best of the 8 ranked methods: parametric")
-    assert sentences[1].startswith("With the camera for the scored image (online track), best of the 3 ranked methods")
-    assert any("best method of the calibrated track, parametric_model (64 captures), goes 7" in s for s in sentences)
+    best = "parametric_model (64 captures)"
+    assert sentences[0].startswith(f"{best} ranks first of 8 methods, without the camera for the scored image: PSNR")
+    assert "ranks first of 3 methods of the online track, with the camera for the scored image: PSNR" in sentences[1]
+    assert any(f"{best}, the best method of the calibrated track, closes 7" in sentence for sentence in sentences)
     assert not any("online" in label for label in found.ranking("leto-aged"))
 
 
 def test_tracks_are_explained_where_they_occur(records, found):
-    assert [track for track, _ in tracks(found)] == ["open loop", "calibrated", "online", "ceiling"]
+    assert [category for category, _ in meanings(found.categories)] == ["open loop", "calibrated", "online", "ceiling"]
     assert "compete in a track of their own" in reading(found)
     kept = [record for record in records if not record["label"].startswith("online")]
     pairs = tuple(pair for pair in budget.layout().pairs if not pair[0].startswith("online"))
     without = results(kept, pairs=pairs, camera=frozenset())
-    assert "online" not in {track for track, _ in tracks(without)}
+    assert "online" not in without.categories
     assert "track of their own" not in reading(without)
 
 
@@ -129,7 +132,7 @@ def test_a_study_without_captures_has_no_leaderboard(records):
 
 def test_the_table_follows_from_the_written_records(records):
     ended = [record | {"stopped": "over, and out"} for record in records]
-    floor = made.record("floor_black", made.cell("floor_black", "coffee", REFERENCE), {"psnr_linear": 1.0})
+    floor = synthetic.record("floor_black", synthetic.cell("floor_black", "coffee", REFERENCE), {"psnr_linear": 1.0})
     found = results([*ended, floor])
     assert recompute_table(csv_text(found.frame), found.layout) == csv_text(found.table)
 

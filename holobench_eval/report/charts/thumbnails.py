@@ -1,0 +1,62 @@
+"""The thumbnails of a study: pictures of targets and captures, and which of them are not there."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ...study.store import Store
+from ..data.results import Results
+from ..data.tables import DONE
+from .gallery import Picture, Tile, load_picture
+
+
+class Thumbnails:
+    """Pictures of a report's targets and captures; ``absent`` holds the names of files that were asked for in vain."""
+
+    def __init__(self, results: Results, output: Path) -> None:
+        """output: the folder of the report."""
+        self.results, self.store = results, Store(output)
+        self.absent: set[str] = set()
+
+    @cached_property
+    def targets(self) -> dict[str, Picture]:
+        """The targets that have a picture, in their order."""
+        pictures = ((target, self._load(self.store.target_thumbnail(target))) for target in self.results.targets)
+        return {target: picture for target, picture in pictures if picture is not None}
+
+    def tile(self, label: str, condition: str, target: str) -> Tile:
+        """The capture of the first repeat that is done, with its own scores; without one, the reason in its place."""
+        cells = self.results.cells(label, condition)
+        cells = cells[cells["target"] == target]
+        if cells.empty:
+            return Tile(None, "not planned")
+        done = cells[cells["state"] == DONE]
+        if done.empty:
+            return Tile(None, f"{cells.iloc[0]['state']}: {cells.iloc[0]['reason']}")
+        cell, shape = done.iloc[0], self.targets[target].shape
+        picture = self._load(self.store.thumbnail(str(cell["cell"])))
+        if picture is None:
+            return Tile(None, "no thumbnail of this capture")
+        if picture.shape != shape:
+            return Tile(None, f"thumbnail is {picture.shape[1]} x {picture.shape[0]}, target {shape[1]} x {shape[0]}")
+        scores = [self.results.headline, *(score for score in self.results.leading if score.metric == "ssim")][:2]
+        return Tile(picture, "   ".join(f"{score.title} {score.with_unit(float(cell[score.key]))}" for score in scores))
+
+    def by_quality(self, condition: str) -> list[str]:
+        """The targets that have a picture, from worst to best by their mean over methods."""
+        results = self.results
+        values = np.vstack([results.values(label, condition) for label in results.methods(condition)])
+        known = np.isfinite(values)
+        means = np.where(known, values, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        sign = 1 if results.headline.higher_is_better else -1
+        quality = dict(zip(results.targets, sign * means, strict=True))
+        return sorted(self.targets, key=lambda target: quality[target])
+
+    def _load(self, path: Path) -> Picture | None:
+        picture = load_picture(path)
+        if picture is None:
+            self.absent.add(path.name)
+        return picture

@@ -1,0 +1,104 @@
+"""What a report says of a study besides its numbers: the displays, the config, the command."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING
+
+from ..display.simulated.profile import Panel, Profile, load_profile
+from ..study.displays import displays as conditions
+from .data.text import plain
+
+if TYPE_CHECKING:
+    from ..display.api import DisplaySpec
+    from ..study.definition import Study
+    from ..study.displays import Condition
+
+
+@dataclass(frozen=True)
+class Display:
+    """A display as the report describes it: name, a heading line, and a line per property."""
+
+    name: str
+    heading: str
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Description:
+    """What the report says of a study besides its numbers; every field may be empty.
+
+    config_file: the config as the user named it; config_text: what is in it; command: what writes the report again
+    (empty: a run of the config).
+    """
+
+    displays: tuple[Display, ...] = ()
+    config_file: str = ""
+    config_text: str = ""
+    command: str = ""
+
+
+def describe(study: Study) -> Description:
+    """The description of a checked study; reads its profiles."""
+    if study.display.real:
+        displays = tuple(_real(condition) for condition in conditions(study).values())
+    elif study.display.learned is None:
+        profiles = [load_profile(source, study.folder) for source in study.display.profiles]
+        displays = tuple(_simulated(profile, study.display.panel) for profile in profiles)
+    else:
+        profile = study.display.learned.profile
+        displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
+    command = "holoeval session import with the session's folder" if study.display.session else ""
+    file = study.file.name if study.file.is_absolute() else study.file.as_posix()
+    return Description(displays, file, study.text, command)
+
+
+def _learned(condition: Condition, profile: str) -> Display:
+    network = condition.learned
+    assert network is not None
+    return Display(
+        name=condition.name,
+        heading=f"The frozen network of {network.method}, trained on captures of {profile}; no noise, no camera.",
+        lines=(f"artifact: {network.name}", f"parameters: {plain(dict(network.params))}"),
+    )
+
+
+def _real(condition: Condition) -> Display:
+    rig, spec = condition.real, condition.spec
+    assert rig is not None
+    way = f"photographs exchanged as files, session {rig.session[:16]}" if rig.session else "photographed live"
+    return Display(
+        name=condition.name,
+        heading=f"Version {condition.version}, sha256 {condition.digest[:16]}. A real bench, {way}; only its nominal "
+        "optics are known, and an efficiency of 1 is the nominal one.",
+        lines=(f"panel: {spec.shape[0]} x {spec.shape[1]} pixels, {spec.distance * 1e3:.4g} mm", _optics(spec)),
+    )
+
+
+def _simulated(profile: Profile, panel: tuple[int, int] | None) -> Display:
+    return Display(
+        name=profile.name,
+        heading=f"Version {profile.version}, sha256 {profile.digest[:16]}. {profile.description}",
+        lines=(
+            f"panel: {profile.scaling_note(panel)}",
+            _optics(profile.scaled(panel).panel),
+            *_stages(profile),
+        ),
+    )
+
+
+def _optics(panel: Panel | DisplaySpec) -> str:
+    wavelengths = ", ".join(f"{value * 1e9:.4g}" for value in panel.wavelengths)
+    iris = f"an iris of {panel.pupil:g} of the band" if panel.pupil else "no iris"
+    return f"optics: pitch {panel.pitch * 1e6:.4g} um, wavelengths {wavelengths} nm, {panel.bits} bit, {iris}"
+
+
+def _stages(profile: Profile) -> list[str]:
+    """A line for every stage of the bench whose parameters are not the neutral ones."""
+    lines = []
+    for item in fields(profile):
+        stage = getattr(profile, item.name)
+        neutral = item.default_factory() if item.default_factory is not MISSING else item.default
+        if is_dataclass(stage) and not isinstance(stage, type | Panel) and stage != neutral:
+            lines.append(f"{item.name.replace('_', ' ')}: {plain(asdict(stage))}")
+    return lines

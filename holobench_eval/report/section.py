@@ -1,0 +1,112 @@
+"""What a report is made from, and what a section of it is: a file in ``sections`` and a line in its list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from .charts.thumbnails import Thumbnails
+from .data.layout import Layout
+from .data.ranks import Ranks, ranks
+from .data.results import Results
+from .data.sweeps import Sweep, sweeps
+from .data.text import number
+from .data.trainings import Training, trainings
+from .description import Description
+from .markdown import Markdown, blocks, heading, table
+
+Blocks = Iterable[object]  # what `markdown.blocks` takes
+Figures = Sequence[Markdown]
+Column = tuple[str, Callable[[pd.Series], str]]  # a heading, and the cell of a row of the table
+
+
+def column(heading: str, key: str) -> Column:
+    """A column of plain numbers."""
+    return heading, lambda row: number(row[key])
+
+
+def method_rows(results: Results, condition: str, columns: Sequence[Column]) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of a display's table, a row for every method."""
+    rows = [
+        [results.layout.marked(name), *(cell(results.row(name, condition)) for _, cell in columns)]
+        for name in results.methods(condition)
+    ]
+    return ["method", *(heading for heading, _ in columns)], rows
+
+
+def by_method(results: Results, condition: str, columns: Sequence[Column]) -> Markdown:
+    """A display's table, a row for every method."""
+    return table(*method_rows(results, condition, columns))
+
+
+@dataclass(frozen=True)
+class Report:
+    """What sections are made from.
+
+    records: one for every planned cell; output: the folder of the report, with thumbnails in ``records``; provenance:
+    see ``study.provenance``.
+    """
+
+    results: Results
+    records: Sequence[Mapping[str, Any]]
+    output: Path
+    provenance: Mapping[str, Any]
+    description: Description
+
+    @property
+    def layout(self) -> Layout:
+        """The rows of the study's tables."""
+        return self.results.layout
+
+    @property
+    def figures(self) -> Path:
+        """The folder of the figures."""
+        return self.output / "figures"
+
+    @cached_property
+    def thumbnails(self) -> Thumbnails:
+        """Pictures of targets and captures."""
+        return Thumbnails(self.results, self.output)
+
+    @cached_property
+    def trainings(self) -> list[Training]:
+        """Everything that the study had to learn."""
+        return trainings(self.layout, self.records, self.output)
+
+    @cached_property
+    def sweeps(self) -> list[Sweep]:
+        """Changes of the displays."""
+        return sweeps(self.results)
+
+    @cached_property
+    def ranks(self) -> list[Ranks]:
+        """Rankings over draws of the displays."""
+        return ranks(self.results)
+
+    def by_display(self, rows: Callable[[Results, str], object], instead: str = "") -> Markdown:
+        """A table for every display that has one, under its name; ``instead`` where none has."""
+        parts: list[object] = []
+        for condition in self.results.conditions:
+            if contents := rows(self.results, condition):
+                parts += [heading(condition, 3), contents]
+        return blocks(parts or [instead])
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the report.
+
+    order: where it stands among the others; render: its blocks, from the report and the figures of the section, each a
+    block too; applies: whether the report has it; figures: draws its figures, (file, caption) of each.
+    """
+
+    name: str
+    order: int
+    render: Callable[[Report, Figures], Blocks]
+    applies: Callable[[Report], bool] = lambda report: True
+    figures: Callable[[Report], Iterable[tuple[Path, str]]] = lambda report: ()

@@ -1,0 +1,154 @@
+"""The main results: the headline metric of every method, the floor that it must clear, and its charts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ...study.plan import REFERENCE
+from ..charts.quality import Chart, quality_bars, target_dots
+from ..data.results import Results
+from ..data.scores import Score
+from ..data.tables import DONE, STOPPED_COLUMN
+from ..data.text import FILES
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Column, Figures, Report, Section, column, method_rows
+
+WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
+
+
+def _render(report: Report, figures: Figures) -> Blocks:
+    results, layout = report.results, report.layout
+    yield heading("Results")
+    yield (
+        f"The headline metric is {results.headline.axis}{layout.text.axis}. Brackets hold 95 % bootstrap intervals "
+        "over targets; n is the number of targets with a score."
+    )
+    if layout.privileged:
+        yield (
+            'Rows marked "ceiling (privileged)" are oracles: they may differentiate through the simulated bench, which '
+            "no real method can. They bound what is possible and do not compete."
+        )
+    for condition in results.conditions:
+        yield heading(condition, 3)
+        yield table(*headline_rows(results, condition))
+        yield bullets(stopped(results, condition))
+    yield layout.note
+    if layout.reported_source:
+        yield (
+            'Columns named "reported" hold published figures from other hardware and other images; they were not '
+            f"measured here. Source: {layout.reported_source}"
+        )
+    yield _without_lpips(results)
+    yield heading("The floor", 3)
+    if results.floors:
+        yield layout.text.floor
+        yield _floors(results)
+    else:
+        yield "No reference row has a score."
+    yield from figures
+
+
+def _without_lpips(results: Results) -> str:
+    """Why LPIPS is missing where it was wanted, and how to have it."""
+    metrics, wanted = {score.metric for score in results.scores}, results.layout.metrics
+    lpips = any(name.startswith("lpips") for name in metrics)
+    if lpips or not (wanted is None or any(name.startswith("lpips") for name in wanted)):
+        return ""
+    option = "" if results.layout.measure == FILES else "or set `protocol: {lpips_weights: ...}` to its path, "
+    mofd = (
+        " The tables have MOFD (multi-scale oriented feature distance) instead, a perceptual distance without trained "
+        "weights; its values are not LPIPS values."
+    )
+    return Markdown(
+        f"LPIPS is not in these tables: no package contains the weights of its trunk. To add it, put <{WEIGHTS}> into "
+        f"the folder `checkpoints` of torch's hub cache, {option}and run again.{mofd if 'mofd' in metrics else ''}"
+    )
+
+
+def cost_columns(results: Results, each: str = "") -> dict[str, str]:
+    """Columns of the table that say what the scores took, with their headings.
+
+    Captures for training and those while solving stay apart: the former are taken once. each: added to the latter.
+    """
+    if results.layout.measure == FILES:
+        return {}
+    trained = "training_captures" in results.table
+    training = {"training_captures": "captures for training", "training_seconds": "seconds of training"}
+    solving = {"captures": f"captures{each}{' while solving' * trained}", "seconds": f"seconds{each}"}
+    if results.layout.measure == "prediction":
+        del solving["captures"]
+    return training | solving if trained else solving
+
+
+def headline_rows(results: Results, condition: str) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of a condition's main table; published figures stand in columns of their own."""
+    layout = results.layout
+    reported = layout.reported_metrics if layout.reported_beside in (None, condition) else ()
+    columns: list[Column] = [
+        ("n", lambda row: f"{row['n']:.0f} of {len(results.targets)}"),
+        *((score.heading, score.in_row) for score in results.leading),
+        *(column(title, key) for key, title in cost_columns(results).items()),
+        *(column(f"reported {Score(metric, metric).axis}", f"reported_{metric}") for metric in reported),
+    ]
+    return method_rows(results, condition, columns)
+
+
+def stopped(results: Results, condition: str) -> list[str]:
+    """A sentence for every method that the display ended on this display, with the reason it gave."""
+    if STOPPED_COLUMN not in results.frame:
+        return []
+    frame, targets = results.frame, len(results.targets)
+    ended = frame[(frame["condition"] == condition) & (frame["state"] == DONE) & (frame[STOPPED_COLUMN] != "")]
+    return [
+        f"The display stopped {name} on {cells['target'].nunique()} of {targets} targets: {reason}. Its best hologram "
+        "until then was scored."
+        for (name, reason), cells in ended.groupby(["method", STOPPED_COLUMN], sort=False)
+    ]
+
+
+def _floors(results: Results) -> Markdown:
+    """What images that no method made score."""
+    text, rows = results.layout.text, []
+    for name in results.floors:
+        row = results.row(name, REFERENCE)
+        rows.append([text.floor_name(name), f"{row['n']:.0f}", *(score.in_row(row) for score in results.leading)])
+    return table([text.instead, "n", *(score.heading for score in results.leading)], rows)
+
+
+def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+    results, conditions = report.results, report.results.conditions
+    score, text = results.headline, report.layout.text
+    rows = results.table[results.table["condition"].isin(conditions)]
+    if score.key not in rows or not np.isfinite(rows[score.key]).any():
+        return
+    floors = {
+        text.floor_name(name): float(results.row(name, REFERENCE)[score.key])
+        for name in ("floor_constant", "floor_speckle")
+        if name in results.floors and all(map(results.has_floor, conditions))
+    }
+    chart = Chart(score, report.layout, tuple(dict.fromkeys(rows["method"])), floors)
+    path = report.figures / "quality-bars.png"
+    quality_bars(path, rows, chart)
+    lines = f"{' Vertical lines: the floor.' * bool(floors)}{' Hatched: the oracle.' * bool(report.layout.privileged)}"
+    yield path, f"{chart.axis}, by method and display. Mean over targets with its 95 % interval.{lines}"
+
+    frames = {
+        condition: pd.DataFrame(
+            {name: results.values(name, condition) for name in results.methods(condition)}, index=results.targets
+        ).dropna(axis=1, how="all")
+        for condition in conditions
+    }
+    path = report.figures / "quality-by-target.png"
+    target_dots(path, {condition: frame for condition, frame in frames.items() if not frame.empty}, chart)
+    yield (
+        path,
+        f"{chart.axis}, of every target. Dots are targets, lines join a target across methods (a gap is a hole), bars "
+        "are means.",
+    )
+
+
+SECTIONS = (Section("results", 30, _render, figures=_figures),)

@@ -1,0 +1,161 @@
+"""The head of a report, and what was measured: the setup, the displays, the methods."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...study.plan import REFERENCE
+from ..data.layout import Layout, TrainingSet
+from ..data.results import Results
+from ..data.tables import DONE
+from ..data.text import FILES, plain, words
+from ..data.trainings import DISPLAY, Training
+from ..markdown import Markdown, bullets, code, heading, properties, table
+from ..section import Blocks, Figures, Report, Section
+
+TARGETS_NAMED = 40
+
+
+def _title(report: Report, _: Figures) -> Blocks:
+    return [heading(report.layout.title, 1), counts(report.results)]
+
+
+def _setup(report: Report, _: Figures) -> Blocks:
+    layout = report.layout
+    yield heading("What was measured")
+    yield layout.text.procedure
+    yield properties(_from_files(report) if layout.measure == FILES else _on_displays(report))
+    displays = report.description.displays
+    if displays:
+        yield layout.text.displays
+    elif layout.measure != FILES:
+        yield "No description of the displays was recorded."
+    for display in displays:
+        yield heading(f"Display {display.name}", 3)
+        yield display.heading
+        yield bullets(display.lines)
+    if layout.measure != FILES:
+        yield heading("Methods", 3)
+        yield _methods(report)
+    yield training_paragraph(layout, report.trainings)
+
+
+def counts(results: Results) -> str:
+    """How large the study is, in one sentence."""
+    cells = results.frame[results.frame["condition"] != REFERENCE]
+    done = int((cells["state"] == DONE).sum())
+    parts = (
+        (len(results.targets), "target"),
+        (cells["method"].nunique(), "method"),
+        (len(results.conditions), "display"),
+        (cells["repeat"].nunique(), "repeat"),
+    )
+    size = ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in parts)
+    return f"{size}: {len(cells)} cells, {done} with a score, {len(cells) - done} without."
+
+
+def _on_displays(report: Report) -> list[tuple[str, str]]:
+    """Name and value of everything that was the same for all methods."""
+    layout, cells = report.layout, [record["cell"] for record in report.records]
+    sets = dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)
+    panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
+    predicted = [("measured", f"predictions of the captures of holograms by {layout.holograms}")]
+    return [
+        *(predicted if layout.measure == "prediction" else []),
+        _targets(report.results),
+        ("dataset", "; ".join(sets)),
+        *([("training images", _training_images(layout.training))] if layout.training else []),
+        ("panel", "; ".join(panels)),
+        ("exposure", _distinct(report.results, "exposure")),
+        ("metric protocol", _distinct(report.results, "protocol")),
+        ("repeats", str(report.results.frame["repeat"].nunique())),
+        ("seed", str(layout.seed)),
+        ("headline metric", report.results.headline.axis),
+        ("baseline", layout.baseline or "none"),
+    ]
+
+
+def _from_files(report: Report) -> list[tuple[str, str]]:
+    """The same where the pictures were given."""
+    cells = [record["cell"] for record in report.records if record["cell"]["condition"] != REFERENCE]
+    sizes = dict.fromkeys(" x ".join(map(str, cell["panel"])) for cell in cells if cell["panel"])
+    return [
+        _targets(report.results),
+        ("size of the captures", f"{'; '.join(sizes)} pixels"),
+        ("compared", report.layout.text.compared),
+        ("metric protocol", _distinct(report.results, "protocol")),
+        ("headline metric", report.results.headline.axis),
+        ("baseline", report.layout.baseline or "none"),
+    ]
+
+
+def _targets(results: Results) -> tuple[str, str]:
+    more = len(results.targets) - TARGETS_NAMED
+    names = ", ".join(results.targets[:TARGETS_NAMED])
+    return "targets", f"{len(results.targets)}: {names}{f' and {more} more' if more > 0 else ''}"
+
+
+def _training_images(given: TrainingSet) -> str:
+    limit = "no limit on captures" if given.captures is None else f"at most {given.captures} captures"
+    return f"{given.images} of {given.dataset}, of which {given.held_out} only watch the training; {limit}"
+
+
+def _distinct(results: Results, column: str) -> str:
+    return ", ".join(sorted(set(results.frame[column]) - {""}))
+
+
+def _methods(report: Report) -> Markdown:
+    """Label, registered name and parameters of every method, in the order of the tables."""
+    cells = {record["label"]: record["cell"] for record in report.records}
+    planned = report.results.table["condition"] != REFERENCE
+    rows = [
+        [label, code(cells[label]["method"]), plain(cells[label]["params"]) + _limit(cells[label])]
+        for label in dict.fromkeys(report.results.table.loc[planned, "method"])
+    ]
+    return table(["method", "registered as", "parameters"], rows)
+
+
+def _limit(cell: Mapping[str, Any]) -> str:
+    """The most captures that the display allows for a target, where the study limits them."""
+    return f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
+
+
+def training_paragraph(layout: Layout, trainings: Sequence[Training]) -> str:
+    """Who is trained, on what, and that no training image is scored; empty for a study in which nothing is trained."""
+    given = layout.training
+    if given is None or not trainings:
+        return ""
+    methods = [label for label in layout.methods if label in layout.trained]
+    trained = [*methods, *([DISPLAY] if layout.learned_display is not None else [])]
+    who = words(trained)
+    limit = (
+        "" if given.captures is None else f", and none may take more than {given.captures} captures for its training"
+    )
+    return (
+        f"{who[:1].upper() + who[1:] if who.startswith('the ') else who} {'are' if len(trained) > 1 else 'is'} trained "
+        f"on captures of a display before any target is seen. The {given.images} training images come from the dataset "
+        f"{given.dataset}; {given.held_out} of them only monitor the training. All methods of the study "
+        f"receive the same images{limit}. Training images are never scored: a study in which one is a target is "
+        f"refused. {_captures_taken(trainings)}"
+    )
+
+
+def _captures_taken(trainings: Sequence[Training]) -> str:
+    counts = sorted(value for training in trainings if math.isfinite(value := training.number("captures")))
+    if not counts:
+        return "No training has been finished."
+    if counts[0] == counts[-1]:
+        each = "The training" if len(counts) == 1 else f"Each of the {len(counts)} trainings"
+        return f"{each} took {counts[0]:.0f} captures, those of held-out images included."
+    return (
+        f"The {len(counts)} trainings took {counts[0]:.0f} to {counts[-1]:.0f} captures, those of held-out images "
+        "included."
+    )
+
+
+SECTIONS = (
+    Section("title", 0, _title),
+    Section("setup", 20, _setup),
+)

@@ -1,0 +1,77 @@
+"""A section costs a file and a line: here the file lies beside the package's, and its name is added to the list."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.report import Description, sections, write_report
+from tests.support import synthetic_study as synthetic
+
+FILE = '''
+"""How bright the captures are, which no other section asks."""
+
+from holobench_eval.report.charts.style import new_figure, save
+from holobench_eval.report.markdown import bullets, heading
+from holobench_eval.report.section import Section
+
+
+def _render(report, figures):
+    yield heading("Brightness | of captures")
+    yield bullets(f"{name}: *{len(report.results.targets)}* targets" for name in report.results.methods("ideal"))
+    yield from figures
+
+
+def _figures(report):
+    path = report.figures / "brightness.png"
+    save(new_figure(40, 30), path)
+    yield path, "Nothing yet."
+
+
+SECTIONS = (
+    Section("brightness", 35, _render, applies=lambda report: "ideal" in report.results.conditions, figures=_figures),
+)
+'''
+
+
+@pytest.fixture
+def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "sections"
+    folder.mkdir()
+    (folder / "brightness.py").write_text(FILE)
+    monkeypatch.setattr(sections, "__path__", [*sections.__path__, str(folder)])
+    monkeypatch.setattr(sections, "NAMES", (*sections.NAMES, "brightness"))
+
+
+def text_of(tmp_path: Path, condition: str) -> str:
+    pairs = tuple((label, condition) for label in ("GS", "Wirtinger"))
+    records = [
+        synthetic.record(label, synthetic.cell(label, target, condition), {"psnr_linear": 20.0})
+        for label, _ in pairs
+        for target in synthetic.TARGETS
+    ]
+    layout = synthetic.layout(pairs=pairs, reported={}, privileged=frozenset())
+    return write_report(layout, records, tmp_path / "report", {}, Description())[0].read_text()
+
+
+def test_a_file_and_a_line_add_a_section_at_its_place_with_numbered_figures(added: None, tmp_path: Path) -> None:
+    text = text_of(tmp_path, "ideal")
+    headings = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
+    assert headings[2:5] == ["Results", r"Brightness \| of captures", "Captures to look at"]
+    assert "\n- GS: \\*6\\* targets\n- Wirtinger: \\*6\\* targets\n" in text
+    assert "![Figure 3](figures/brightness.png)\n\n**Figure 3.** Nothing yet.\n" in text
+    assert (tmp_path / "report" / "figures" / "brightness.png").is_file()
+
+
+def test_a_section_that_does_not_apply_leaves_nothing(added: None, tmp_path: Path) -> None:
+    assert "Brightness" not in text_of(tmp_path, "leto-aged")
+    assert not (tmp_path / "report" / "figures" / "brightness.png").exists()
+
+
+def test_every_file_of_sections_is_in_the_list_and_no_two_sections_share_a_place() -> None:
+    files = {path.stem for path in Path(sections.__file__).parent.glob("*.py")} - {"__init__"}
+    assert files == set(sections.NAMES)
+    orders = [section.order for section in sections.sections()]
+    assert orders == sorted(set(orders))
