@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING
 
-from ..display.simulated.profile import Panel, Profile, load_profile
+from ..display.simulated.profile import Profile, load_profile
+from ..display.simulated.stages import Panel
 from ..study.displays import displays as conditions
 from .data.text import plain
 

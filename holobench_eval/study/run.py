@@ -17,7 +17,8 @@ from . import cost, provenance
 from .artifacts import Artifacts
 from .definition import Study
 from .displays import Preparation
-from .executors import Address, Executor, Local, Serial
+from .executors import Executor, Serial
+from .executors.clusters import Address, Local
 from .plan import Cell, Plan, Task
 from .scoring.cell import work
 from .scoring.job import Job, Setting
