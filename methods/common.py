@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
 
+from ..display.api import DisplaySpec
 from ..optics import AngularSpectrum
 from ..optics.phase import TAU, wrap
 from ..optics.phasor import phasor
-
-if TYPE_CHECKING:
-    from ..display.api import DisplaySpec
 
 Offset = Literal["none", "centre"]
 

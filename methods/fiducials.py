@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from torch import Tensor
 
+from ..display.api import Display
 from ..display.metered import MeteredDisplay
 from ..optics.phase import TAU
 from .wirtinger import Wirtinger
-
-if TYPE_CHECKING:
-    from ..display.api import Display
 
 HOLOGRAMS, STEPS = 4, 4
 

@@ -7,17 +7,15 @@ diffraction plane pictures", Optik 35, 237 (1972).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 from annotated_types import Interval
 from torch import Tensor
 
+from ..display.api import Region
 from ..optics import AngularSpectrum
 from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
 from .initial_phase import InitialPhase, initial_phase
-
-if TYPE_CHECKING:
-    from ..display.api import Region
 
 
 @dataclass(frozen=True)

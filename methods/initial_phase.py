@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import torch
 from torch import Tensor
 
+from ..display.api import DisplaySpec
 from ..optics.phase import TAU, lens
 from .common import Bench
 from .double_phase import DoublePhase
-
-if TYPE_CHECKING:
-    from ..display.api import DisplaySpec
 
 InitialPhase = Literal["random", "narrow", "constant", "quadratic", "dpe"]
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ..display.metered import MeteredDisplay
 from .descent import adam, by_autograd
 from .losses import intensity_l2
 from .wirtinger import Wirtinger
-
-if TYPE_CHECKING:
-    from ..display.metered import MeteredDisplay
 
 
 @dataclass(frozen=True)

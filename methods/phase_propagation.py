@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import torch
 from torch import Tensor
 
+from ..display.api import Region
 from ..optics import AngularSpectrum
 from ..optics.convolution import convolve
-
-if TYPE_CHECKING:
-    from ..display.api import Region
 
 
 class PhasePropagation:

@@ -7,21 +7,19 @@ Chakravarthula, Peng, Kollin, Fuchs & Heide, "Wirtinger holography for near-eye 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ..display.api import Region
 from ..optics import AngularSpectrum
 from .common import Bench, Offset, nominal_model, per_channel, with_offset
 from .descent import Best, adam
 from .initial_phase import InitialPhase, initial_phase
 from .losses import LOSSES, Loss, LossName
 from .phase_propagation import PhasePropagation
-
-if TYPE_CHECKING:
-    from ..display.api import Region
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ def show(
 def effects(source: str) -> Iterator[tuple[str, str, bool]]:
     """Name and description of every effect of a display profile, and whether the parametric model has a term for it."""
     from ..display import load_profile
-    from ..methods.display_model import FORM
+    from ..methods.calibrated.display_model import FORM
 
     for effect in load_profile(source).effects():
         yield effect.name, effect.text, effect.name in FORM

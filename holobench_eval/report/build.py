@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core.io import write_atomically
+from ..study.definition import Study
 from .data.layout import Layout, layout_of
 from .data.results import Results
 from .data.tables import csv_text, read_records, records_frame
@@ -15,9 +16,6 @@ from .description import Description, describe
 from .markdown import Markdown, blocks
 from .section import Report
 from .sections import sections
-
-if TYPE_CHECKING:
-    from ..study.definition import Study
 
 # Figures that a report draws itself; others in its folder, such as the stages of a bench, are drawn elsewhere.
 DRAWN = ("comparison-*.jpg", "sweep-*.jpg", "quality-*.png", "training-*.png")

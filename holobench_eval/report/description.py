@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass
-from typing import TYPE_CHECKING
 
+from ..display.api import DisplaySpec
 from ..display.simulated.profile import Profile, load_profile
 from ..display.simulated.stages import Panel
+from ..study.definition import Study
+from ..study.displays import Condition
 from ..study.displays import displays as conditions
 from .data.text import plain
-
-if TYPE_CHECKING:
-    from ..display.api import DisplaySpec
-    from ..study.definition import Study
-    from ..study.displays import Condition
 
 
 @dataclass(frozen=True)

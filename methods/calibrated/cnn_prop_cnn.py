@@ -7,12 +7,13 @@ holographic virtual and augmented reality displays", ACM Trans. Graph. 40(6), 24
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
+from ...display.api import DisplaySpec
 from ...optics.phasor import squared_modulus
 from ..common import safe_amplitude, unit_field
 from ..learned.samples import Steps
@@ -20,9 +21,6 @@ from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
 from .method import Calibrated, ShortSchedule
 from .networks import ColourByColour
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
 
 
 class TwoNetworks(nn.Module):

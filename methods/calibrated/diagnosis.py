@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
 
+from ...display.api import DisplaySpec
 from ...display.estimates import Estimate, disc, estimate, focusing, reach, stroke, undiffracted, zernike_waves
 from ...optics.phase import TAU
 from ...optics.zernike import NAMES, zernike
-from ..display_model import FORM, KNOTS, MODES, DisplayModel, enlarged
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
+from .display_model import FORM, KNOTS, MODES, DisplayModel, enlarged
 
 
 class Diagnosed:

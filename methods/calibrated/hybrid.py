@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
+from ...display.api import DisplaySpec
+from ...display.estimates import Estimate
 from ...optics.phasor import phasor
-from ..display_model import FORM, DisplayModel
 from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
 from .diagnosis import Diagnosed, diagnose
+from .display_model import FORM, DisplayModel
 from .method import Calibrated
 from .networks import ColourByColour
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
-    from ...display.estimates import Estimate
 
 
 class FinePanel(DisplayModel):

@@ -6,19 +6,17 @@ Kavakli, Urey & Aksit, "Learned holographic light transport", Applied Optics 61(
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
+from ...display.api import DisplaySpec
 from ..common import unit_field
 from ..learned.samples import Steps
 from .approximator import ModelApproximator, Rates
 from .method import Calibrated, ShortSchedule
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
 
 
 class Kernels(nn.Module):

@@ -6,25 +6,23 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ...display.api import DisplaySpec
+from ...display.metered import MeteredDisplay
+from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.fidelity import matched_psnr
 from ..learned.method import frozen, hologram, predicted
 from ..learned.retrieval import SquaredErrorRetrieval, check_region, retrieve
 from ..learned.samples import Sample, Schedule, Steps, captured
 from ..wirtinger import Wirtinger
+from .approximator import ModelApproximator
 from .patterns import pattern_samples
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
-    from ...display.metered import MeteredDisplay
-    from ...display.training import TrainingBench, TrainingImage
-    from .approximator import ModelApproximator
 
 
 @dataclass(frozen=True)

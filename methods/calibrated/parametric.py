@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from ..display_model import DisplayModel
+from ...display.api import DisplaySpec
 from .approximator import ModelApproximator, Rates
 from .diagnosis import Diagnosed
+from .display_model import DisplayModel
 from .method import Calibrated
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
 
 
 @dataclass(frozen=True)

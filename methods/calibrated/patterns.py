@@ -7,17 +7,12 @@ tell look-up table, phase gain, crosstalk, unmodulated light and aberrations apa
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ...display.training import TrainingImage
+from ...display.training import TrainingBench, TrainingImage
 from ..learned.samples import Sample, captured
-
-if TYPE_CHECKING:
-    from ...display.training import TrainingBench
 
 # Correlation lengths [px] that the patterns go through in turn: wraps from everywhere to a few long edges.
 LENGTHS = (2.0, 4.0, 8.0, 16.0)

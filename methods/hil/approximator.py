@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import torch
 from torch import Tensor
 
+from ...display.api import DisplaySpec
 from ..common import matched, unit_field
 from ..learned.retrieval import Image, Verdict
 from ..learned.samples import Sample
@@ -16,9 +17,6 @@ from .approximator_loss import ApproximatorLoss
 from .critic import Critic
 from .networks import Network
 from .trainer import trainer
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
 
 
 class NetworkApproximator:

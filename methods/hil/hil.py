@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ...display.api import DisplaySpec
+from ...display.metered import MeteredDisplay
+from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.method import frozen, hologram, predicted
 from ..learned.retrieval import Image, PhaseRetrieval, check_region, retrieve
@@ -24,11 +27,6 @@ from .approximator_loss import ApproximatorLoss
 from .networks import Network
 from .offset import best_offset
 from .start import SmoothStart
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
-    from ...display.metered import MeteredDisplay
-    from ...display.training import TrainingBench, TrainingImage
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
 
+from ...display.api import DisplaySpec
+from ...display.metered import MeteredDisplay
+from ...display.training import TrainingBench
 from ..learned.algorithm import train
 from ..learned.method import frozen, hologram, predicted
 from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
@@ -22,11 +25,6 @@ from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
 from .networks import Network
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
-    from ...display.metered import MeteredDisplay
-    from ...display.training import TrainingBench
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,12 @@ light that the panel does not modulate (Chakravarthula et al. 2020, Eq. 5 and 13
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from torch.nn import functional
 
+from ...display.training import TrainingBench
 from ..common import matched
 from ..wirtinger import Wirtinger
-
-if TYPE_CHECKING:
-    from ...display.training import TrainingBench
 
 TRIED_IMAGES = 4
 

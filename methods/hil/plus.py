@@ -8,20 +8,18 @@ what a look-up table does to a wrap. Captures, rounds and retrieval are those of
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from torch import nn
 
 from ...core.errors import UserError
+from ...display.api import DisplaySpec
 from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.diagnosis import Diagnosed
+from ..calibrated.display_model import DisplayModel
 from ..calibrated.method import ThroughModel
-from ..display_model import DisplayModel
 from ..learned.weights import seeded, start_at_zero
 from .networks import Network
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
 
 RATES = Rates(model=1e-2, network=3e-4)
 

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from torch import Tensor
 
+from ...display.training import TrainingBench, TrainingImage
 from .checkpoint import Checkpoint
 from .fidelity import fidelity
 from .retrieval import Image
 from .samples import Approximator, Sample, Schedule
-
-if TYPE_CHECKING:
-    from ...display.training import TrainingBench, TrainingImage
 
 # Display as it is approximated, target (C, h, w), start (C, H, W): the phase retrieved through it.
 Minimise = Callable[[Image, Tensor, Tensor], Tensor]

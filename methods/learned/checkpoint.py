@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 
+from ...display.training import TrainingBench, TrainingImage
 from .samples import Approximator, Sample, captured
-
-if TYPE_CHECKING:
-    from ...display.training import TrainingBench, TrainingImage
 
 STEPS_BETWEEN_SAVES = 100
 

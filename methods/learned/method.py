@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import torch
 from torch import Tensor
 
+from ...display.metered import MeteredDisplay
+from ...display.training import TrainingBench, TrainingImage
 from ..wirtinger import Wirtinger
 from .retrieval import Image
 from .samples import Approximator
-
-if TYPE_CHECKING:
-    from ...display.metered import MeteredDisplay
-    from ...display.training import TrainingBench, TrainingImage
 
 D = TypeVar("D", bound=Approximator)
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ...display.training import TrainingBench, TrainingImage
 from .retrieval import Image
-
-if TYPE_CHECKING:
-    from ...display.training import TrainingBench, TrainingImage
 
 Steps = Annotated[int, Interval(ge=1, le=1_000_000)]
 

@@ -7,20 +7,18 @@ torchoptics (M. J. Filipovich & A. I. Lvovsky, arXiv:2411.18591, MIT licence): a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ...display.api import DisplaySpec
 from ..common import Bench, per_channel
 from ..descent import Best
 from ..initial_phase import InitialPhase, initial_phase
 from ..losses import LOSSES, LossName
 from .loading import load, unavailable
-
-if TYPE_CHECKING:
-    from ...display.api import DisplaySpec
 
 
 @dataclass(frozen=True)

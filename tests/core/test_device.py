@@ -7,7 +7,7 @@ from holobench_eval.core.device import CPU, find, gpu_name, gpus, moved
 from holobench_eval.core.errors import UserError
 from holobench_eval.display.simulated.stages.relay import gathered
 from holobench_eval.imaging.shifts import mirrored
-from holobench_eval.methods.display_model import enlarged, weighted
+from holobench_eval.methods.calibrated.display_model import enlarged, weighted
 from holobench_eval.methods.hil.generator import Dropout
 
 without_gpu = pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -17,12 +16,10 @@ from ...core.io import decode_levels, write_png
 from ...imaging.grid import fiducial
 from ...imaging.grid_picture import grid_picture
 from ...optics.phase import blaze
+from ..real import RealBench
+from . import FolderPhotographer
 from .checks import check_order, thumbnail
 from .manifest import DARK, REPEAT, Pattern, inside
-
-if TYPE_CHECKING:
-    from ..real import RealBench
-    from . import FolderPhotographer
 
 FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol v1, point 3)
 FINENESS = 20  # steps a pixel of the correlation that measures drift

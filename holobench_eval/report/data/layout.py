@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from ...core import plugins
 from ...display.simulated.changes import draws
 from ...display.simulated.profile import load_profile
-from ...study.displays import changed, displays
+from ...study.definition import Study
+from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .text import FILES, Text, plain, text_of
-
-if TYPE_CHECKING:
-    from ...study.definition import Study
-    from ...study.displays import Condition
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from holobench_eval.commands.show import effects as listed
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.profile import names
 from holobench_eval.display.simulated.stages import Flicker, LookUpTable
-from holobench_eval.methods.display_model import FORM
+from holobench_eval.methods.calibrated.display_model import FORM
 
 
 def found(name: str) -> set[str]:

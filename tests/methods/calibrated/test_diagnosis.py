@@ -17,8 +17,8 @@ from holobench_eval.display.simulated.ground_truth import truth
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import Crosstalk, LookUpTable, Propagation, ZeroOrder
 from holobench_eval.methods.calibrated.diagnosis import diagnose
+from holobench_eval.methods.calibrated.display_model import KNOTS, MODES, SOURCE_GRID, DisplayModel
 from holobench_eval.methods.calibrated.patterns import random_phase
-from holobench_eval.methods.display_model import KNOTS, MODES, SOURCE_GRID, DisplayModel
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.optics.phase import TAU

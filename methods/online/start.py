@@ -9,18 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from .common import matched
-from .descent import Best
-from .wirtinger import Wirtinger
-
-if TYPE_CHECKING:
-    from ..display.metered import MeteredDisplay
+from ...display.metered import MeteredDisplay
+from ..common import matched
+from ..descent import Best
+from ..wirtinger import Wirtinger
 
 # Neither the search for a start nor the decision at the end takes more than one capture in so many.
 LEAST_SHARE = 4

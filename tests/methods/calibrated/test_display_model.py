@@ -14,7 +14,7 @@ from holobench_eval.display import load_profile
 from holobench_eval.display.api import DisplaySpec, Region, white_irradiance
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import LookUpTable, ZeroOrder
-from holobench_eval.methods.display_model import KNOTS, MODES, DisplayModel
+from holobench_eval.methods.calibrated.display_model import KNOTS, MODES, DisplayModel
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.wirtinger import Wirtinger

@@ -7,19 +7,16 @@ parameters of its own, so that Eq. 13, |P(H) + R|^2, is kept as it stands: a com
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ..optics import AngularSpectrum
-from ..optics.phase import TAU, wrap
-from ..optics.phasor import phasor
-from ..optics.zernike import NAMES, zernike
-
-if TYPE_CHECKING:
-    from ..display.api import DisplaySpec
+from ...display.api import DisplaySpec
+from ...optics import AngularSpectrum
+from ...optics.phase import TAU, wrap
+from ...optics.phasor import phasor
+from ...optics.zernike import NAMES, zernike
 
 # Of the look-up table: levels where its deviation is learned; linear between them.
 KNOTS = 17

@@ -3,9 +3,9 @@ from itertools import pairwise
 import pytest
 import torch
 
-from holobench_eval.methods.camera_start import Camera, CameraStart, captured_error
 from holobench_eval.methods.losses import intensity_l2
-from holobench_eval.methods.online_camera import OnlineCamera
+from holobench_eval.methods.online.camera import OnlineCamera
+from holobench_eval.methods.online.start import Camera, CameraStart, captured_error
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
 from holobench_eval.testing.contract import check_method
 from tests.support.toy_camera import SPEC, Plug, ToyDisplay, picture

@@ -8,23 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ..metrics.base import gaussian_blur
-from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
-from .hil.approximator import NetworkApproximator
-from .hil.approximator_loss import ApproximatorLoss
-from .hil.networks import Network
-from .learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
-from .learned.samples import Sample
-from .learned.weights import start_at_zero
-
-if TYPE_CHECKING:
-    from ..display.metered import MeteredDisplay
+from ...display.metered import MeteredDisplay
+from ...metrics.base import gaussian_blur
+from ..hil.approximator import NetworkApproximator
+from ..hil.approximator_loss import ApproximatorLoss
+from ..hil.networks import Network
+from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from ..learned.samples import Sample
+from ..learned.weights import start_at_zero
+from .start import LEAST_SHARE, Camera, CameraStart, allowed
 
 # Width [px] of the Gaussian that what the network misses of the captures is filtered with.
 SMOOTHING = 0.7

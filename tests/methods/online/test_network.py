@@ -1,10 +1,10 @@
 import pytest
 import torch
 
-from holobench_eval.methods.camera_start import CameraStart
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.learned.samples import Sample
-from holobench_eval.methods.online_camera_network import FromIdentity, OnlineCameraNetwork, ShortRetrieval, corrected
+from holobench_eval.methods.online.network import FromIdentity, OnlineCameraNetwork, ShortRetrieval, corrected
+from holobench_eval.methods.online.start import CameraStart
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.testing.contract import check_method
 from tests.support.toy_camera import Plug, ToyDisplay, picture

@@ -8,20 +8,18 @@ near-eye displays", ACM Trans. Graph. 39(6), 186 (2020), Section 4.5; the camera
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ..metrics.base import gaussian_blur
-from .camera_start import LEAST_SHARE, Camera, CameraStart, allowed
-from .common import matched, unit_field
-from .descent import cosine_decay
-
-if TYPE_CHECKING:
-    from ..display.api import DisplaySpec
-    from ..display.metered import MeteredDisplay
+from ...display.api import DisplaySpec
+from ...display.metered import MeteredDisplay
+from ...metrics.base import gaussian_blur
+from ..common import matched, unit_field
+from ..descent import cosine_decay
+from .start import LEAST_SHARE, Camera, CameraStart, allowed
 
 # Adam's decay rates. Little momentum: the gradient is that of another display.
 MOMENTS = (0.6, 0.99)

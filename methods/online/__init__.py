@@ -1,0 +1,1 @@
+"""Optimisation with the camera in the loop, one image at a time."""
