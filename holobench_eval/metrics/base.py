@@ -57,6 +57,12 @@ class Metric:
         Whether autograd passes through.
     available
         Why it cannot be computed here and what to do about it, or None.
+    title
+        In tables and figures; the name without underscores if it is empty.
+    unit
+        Empty for a pure number.
+    digits
+        Behind the decimal point, in tables.
     """
 
     name: str
@@ -69,6 +75,9 @@ class Metric:
     symmetric: bool = True
     differentiable: bool = True
     available: Callable[[], str | None] = always
+    title: str = ""
+    unit: str = ""
+    digits: int = 3
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
 from .base import Metric
-from .feature_distance import MOFD
-from .flip import FLIP
-from .fsim import FSIM
-from .gmsd import GMSD
-from .haarpsi import HAARPSI
 from .lpips import lpips_metric
-from .mdsi import MDSI
-from .ms_ssim import MS_SSIM
-from .psnr import PSNR
-from .ssim import SSIM
-from .vsi import VSI
 
-_FIXED = (PSNR, SSIM, MS_SSIM, MOFD, FLIP, HAARPSI, GMSD, MDSI, FSIM, VSI)
+# The files of this folder that hold a METRIC.
+NAMES = ("psnr", "ssim", "ms_ssim", "feature_distance", "flip", "haarpsi", "gmsd", "mdsi", "fsim", "vsi")
 
 
 def catalogue(lpips_weights: Path | None = None) -> tuple[Metric, ...]:
@@ -26,7 +18,8 @@ def catalogue(lpips_weights: Path | None = None) -> tuple[Metric, ...]:
 
     lpips_weights: file or folder of the LPIPS trunk, default torch's hub cache.
     """
-    return (*_FIXED, lpips_metric("alex", lpips_weights), lpips_metric("vgg", lpips_weights))
+    fixed: list[Metric] = [import_module(f".{name}", __package__).METRIC for name in NAMES]
+    return (*fixed, lpips_metric("alex", lpips_weights), lpips_metric("vgg", lpips_weights))
 
 
 def direction(column: str) -> Literal["higher", "lower"] | None:

@@ -173,4 +173,4 @@ def mofd(image: Tensor, target: Tensor) -> Tensor:
     return _fixed(target)(image)
 
 
-MOFD = Metric("mofd", "1", "lower", 0.0, ("srgb",), mofd, smallest=SMALLEST_MOFD)
+METRIC = Metric("mofd", "1", "lower", 0.0, ("srgb",), mofd, smallest=SMALLEST_MOFD, title="MOFD")

@@ -40,4 +40,4 @@ def flip(image: Tensor, target: Tensor) -> Tensor:
     return torch.tensor(means, dtype=image.dtype, device=image.device).reshape(image.shape[:-3])
 
 
-FLIP = Metric("flip", "1", "lower", 0.0, ("srgb",), flip, differentiable=False)
+METRIC = Metric("flip", "1", "lower", 0.0, ("srgb",), flip, differentiable=False, title="FLIP")

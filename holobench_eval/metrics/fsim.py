@@ -61,4 +61,4 @@ def fsim(image: Tensor, target: Tensor) -> Tensor:
     return torch.where(empty, 1.0, value).reshape(image.shape[:-3])
 
 
-FSIM = Metric("fsim", "1", "higher", 1.0, ("srgb",), fsim, smallest=16)
+METRIC = Metric("fsim", "1", "higher", 1.0, ("srgb",), fsim, smallest=16, title="FSIM")

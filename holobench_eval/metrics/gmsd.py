@@ -45,4 +45,4 @@ def gmsd(image: Tensor, target: Tensor) -> Tensor:
     return safe_sqrt(variance).reshape(image.shape[:-3])
 
 
-GMSD = Metric("gmsd", "1", "lower", 0.0, ("srgb",), gmsd, smallest=2)
+METRIC = Metric("gmsd", "1", "lower", 0.0, ("srgb",), gmsd, smallest=2, title="GMSD")

@@ -68,4 +68,4 @@ def haarpsi(image: Tensor, target: Tensor) -> Tensor:
     return torch.where(empty, 1.0, (mean.logit() / ALPHA).square()).reshape(image.shape[:-3])
 
 
-HAARPSI = Metric("haarpsi", "1", "higher", 1.0, ("srgb",), haarpsi, smallest=2)
+METRIC = Metric("haarpsi", "1", "higher", 1.0, ("srgb",), haarpsi, smallest=2, title="HaarPSI")

@@ -200,4 +200,5 @@ def lpips_metric(network: Network, weights: Path | None = None) -> Metric:
         function=partial(lpips, network=network, weights=weights),
         smallest=SMALLEST_LPIPS,
         available=partial(available, network, weights),
+        title={"alex": "LPIPS (AlexNet)", "vgg": "LPIPS (VGG)"}[network],
     )

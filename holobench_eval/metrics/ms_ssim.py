@@ -73,4 +73,6 @@ def ms_ssim(image: Tensor, target: Tensor) -> Tensor:
     return FixedMsSsim(target)(image)
 
 
-MS_SSIM = Metric("ms_ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ms_ssim, smallest=SMALLEST_MS_SSIM)
+METRIC = Metric(
+    "ms_ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ms_ssim, smallest=SMALLEST_MS_SSIM, title="MS-SSIM"
+)

@@ -40,4 +40,4 @@ def psnr(image: Tensor, target: Tensor) -> Tensor:
     return (-10 * (error + FLOOR).log10()).reshape(image.shape[:-3])
 
 
-PSNR = Metric("psnr", "1", "higher", 80.0, ("linear", "amplitude", "srgb"), psnr)
+METRIC = Metric("psnr", "1", "higher", 80.0, ("linear", "amplitude", "srgb"), psnr, title="PSNR", unit="dB", digits=2)

@@ -138,4 +138,4 @@ def _strip_filtered(plane: Plane) -> Plane:
     return np.asarray(cv2.sepFilter2D(plane, -1, taps, taps)[RADIUS:-RADIUS, RADIUS:-RADIUS], dtype=plane.dtype)
 
 
-SSIM = Metric("ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ssim, smallest=2 * RADIUS + 1)
+METRIC = Metric("ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ssim, 2 * RADIUS + 1, title="SSIM")

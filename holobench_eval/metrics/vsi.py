@@ -130,4 +130,4 @@ def vsi(image: Tensor, target: Tensor) -> Tensor:
     return value.reshape(image.shape[:-3])
 
 
-VSI = Metric("vsi", "1", "higher", 1.0, ("srgb",), vsi, smallest=3)
+METRIC = Metric("vsi", "1", "higher", 1.0, ("srgb",), vsi, smallest=3, title="VSI")

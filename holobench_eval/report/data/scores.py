@@ -15,25 +15,8 @@ from .statistics import Estimate
 DOMAINS = ("linear", "amplitude", "srgb", "stored")
 DOMAIN_NAMES = {"linear": "linear light", "amplitude": "amplitude", "srgb": "sRGB", "stored": "values as stored"}
 
-_TITLES = {
-    "psnr": "PSNR",
-    "ssim": "SSIM",
-    "ms_ssim": "MS-SSIM",
-    "lpips_alex": "LPIPS (AlexNet)",
-    "lpips_vgg": "LPIPS (VGG)",
-    "mofd": "MOFD",
-    "flip": "FLIP",
-    "gmsd": "GMSD",
-    "haarpsi": "HaarPSI",
-    "mdsi": "MDSI",
-    "fsim": "FSIM",
-    "vsi": "VSI",
-    "scale_0": "match factor (red)",
-    "scale_1": "match factor (green)",
-    "scale_2": "match factor (blue)",
-}
-_UNITS = {"psnr": "dB"}
-_DIGITS = {"psnr": 2}
+METRICS = {metric.name: metric for metric in catalogue()}
+_FACTORS = {"scale_0": "match factor (red)", "scale_1": "match factor (green)", "scale_2": "match factor (blue)"}
 
 _PATTERN = re.compile(rf"(?P<metric>\w+?)_(?P<domain>{'|'.join(DOMAINS)})(?:_(?P<variant>\w[\w.]*))?")
 _BLUR = re.compile(r"blur_?(?P<width>\d+(?:[.p]\d+)?)")
@@ -51,7 +34,8 @@ class Score:
     @property
     def title(self) -> str:
         """The metric's usual name."""
-        name = _TITLES.get(self.metric, self.metric.replace("_", " "))
+        metric = METRICS.get(self.metric)
+        name = (metric.title if metric else _FACTORS.get(self.metric)) or self.metric.replace("_", " ")
         return f"{name} in focus" if self.in_focus else name
 
     @property
@@ -62,7 +46,7 @@ class Score:
     @property
     def unit(self) -> str:
         """Unit, empty for pure numbers."""
-        return _UNITS.get(self.metric, "")
+        return METRICS[self.metric].unit if self.metric in METRICS else ""
 
     @property
     def axis(self) -> str:
@@ -94,7 +78,8 @@ class Score:
         """The value with the metric's digits; a dash for NaN."""
         if np.isnan(value):
             return "–"
-        return f"{value:{'+' if signed else ''}z.{_DIGITS.get(self.metric, 3)}f}"
+        digits = METRICS[self.metric].digits if self.metric in METRICS else 3
+        return f"{value:{'+' if signed else ''}z.{digits}f}"
 
     def interval(self, mean: float, low: float, high: float, signed: bool = False) -> str:
         """``17.62 [16.90, 18.31]``; the mean alone where there is no interval."""
