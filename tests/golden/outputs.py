@@ -24,7 +24,7 @@ from holobench_eval.core import plugins, seeds
 from holobench_eval.display import DisplaySpec, load_profile
 from holobench_eval.display.simulated import profile as profiles
 from holobench_eval.imaging.align import align
-from holobench_eval.metrics import score
+from holobench_eval.metrics import catalogue, score
 from holobench_eval.study.opening import open_bench
 from holobench_eval.study.versions import ALIGNMENT, HARNESS, method_version
 from tests.support import photographed
@@ -103,7 +103,13 @@ def complaint(name: str, case: Case, numbers: Numbers, recorded: Mapping[str, An
     changed = differences(case, numbers, recorded["numbers"])
     if not changed:
         return None
-    declared = {HARNESS: "HARNESS", ALIGNMENT: "ALIGNMENT"}.get(case.version, "`version` of the method's class")
+    declared = {
+        "method": "`version` of the method's class",
+        "metric": "`version` of the `Metric`",
+        "profile": "`version` in the profile's YAML, or HARNESS where the bench is another",
+        "alignment": "ALIGNMENT",
+        "protocol": "HARNESS",
+    }[name.split()[0]]
     return (
         f"numbers of '{name}' changed ({', '.join(changed)}): raise its declared version ({declared}; see "
         f"holobench_eval/study/versions.py), then {REWRITE} rewrites {FILE.name}; or undo the change"
@@ -120,13 +126,23 @@ def cases() -> dict[str, Case]:
     folder = Path(profiles.__file__).with_name("profiles")
     shipped = sorted(path.stem for path in folder.glob("*.yaml"))
     methods = {name: plugins.find("methods", name) for name in plugins.names("methods")}
-    known: dict[str, Case] = {f"profile {name}": Case(HARNESS, partial(_profile, name)) for name in shipped}
-    known["metrics"] = Case(HARNESS, _metrics, EXACT)
+    known = {
+        f"profile {name}": Case(_with_harness(load_profile(name).version), partial(_profile, name)) for name in shipped
+    }
+    known["protocol"] = Case(HARNESS, partial(_scores, None), EXACT)
+    for metric in catalogue():
+        if not metric.name.startswith("lpips"):  # its weights are in no package
+            known[f"metric {metric.name}"] = Case(_with_harness(metric.version), partial(_scores, metric.name), EXACT)
     known["alignment"] = Case(ALIGNMENT, _alignment)
     for name, cls in methods.items():
         if _installed(cls):
             known[f"method {name}"] = Case(method_version(cls), partial(_method, name), ROUNDED.get(name, ITERATED))
     return known
+
+
+def _with_harness(version: object) -> str:
+    """The version of what has one of its own beside that of the harness."""
+    return f"{version} of {HARNESS}"
 
 
 def _installed(cls: type[Any]) -> bool:
@@ -152,14 +168,21 @@ def _profile(name: str) -> dict[str, Tensor]:
     }
 
 
-def _metrics() -> dict[str, Tensor]:
-    """A picture of 192 px, speckled, shifted by a part of a pixel and noisy, against itself."""
+def _scores(metric: str | None) -> dict[str, Tensor]:
+    """A picture of 192 px, speckled, shifted by a part of a pixel and noisy, against itself.
+
+    metric: None for the numbers of the protocol that are no metric's.
+    """
     target = _smooth(3, (192, 192), 0.0, 1.0).double()
     target[:, 40:90, 50:120] = 0.7
     grain = torch.rand(target.shape, generator=seeds.generator("golden", "speckle"), dtype=torch.float64)
     capture = 0.6 * target.roll(1, -1) + 1.2 * target * (0.8 + 0.4 * grain) + 0.02 * grain
-    scores = score(capture, target) | {f"stored {key}": v for key, v in score(capture, target, stored=True).items()}
-    return {name: torch.tensor(value, dtype=torch.float64) for name, value in scores.items()}
+    wanted = (metric,) if metric else ("psnr", "speckle_contrast")
+    scores = score(capture, target, metrics=wanted)
+    scores |= {f"stored {key}": value for key, value in score(capture, target, metrics=wanted, stored=True).items()}
+    own = {key: value for key, value in scores.items() if key.removeprefix("stored ").startswith(f"{wanted[0]}_")}
+    kept = own if metric else {key: value for key, value in scores.items() if key not in own}
+    return {name: torch.tensor(value, dtype=torch.float64) for name, value in kept.items()}
 
 
 def _alignment() -> dict[str, Tensor]:

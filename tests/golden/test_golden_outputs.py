@@ -83,7 +83,7 @@ def _other_step(patch: pytest.MonkeyPatch) -> None:
     ("name", "change"),
     [
         ("profile leto-aged", _brighter_sensor),
-        ("metrics", _other_encoding),
+        ("metric psnr", _other_encoding),
         ("alignment", _another_place),
         ("method double_phase", _longer_wave),
         ("method gerchberg_saxton", _longer_wave),

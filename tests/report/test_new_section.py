@@ -31,7 +31,7 @@ def _figures(report):
 
 
 SECTIONS = (
-    Section("brightness", 35, _render, applies=lambda report: "ideal" in report.results.conditions, figures=_figures),
+    Section("brightness", 31, _render, applies=lambda report: "ideal" in report.results.conditions, figures=_figures),
 )
 '''
 

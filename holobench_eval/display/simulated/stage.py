@@ -54,7 +54,10 @@ class Stage:
         return None
 
     def image(self, light: Tensor, profile: Profile, geometry: Geometry) -> Tensor:
-        """Intensity ``(n H, n W)`` at the image plane after the stage, n samples a pixel and axis; differentiable."""
+        """Intensity ``(n H, n W)`` at the image plane after the stage, n samples a pixel and axis; differentiable.
+
+        Coordinates are those of the panel, before the relay's pose; the first sample is the first pixel's centre.
+        """
         return light
 
 
