@@ -50,86 +50,86 @@ class Artifacts:
 
     folder: Path
 
-    def place(self, needed: Preparation) -> Path:
+    def folder_of(self, preparation: Preparation) -> Path:
         """The artifact's folder."""
-        return self.folder / file_name(needed.name)
+        return self.folder / file_name(preparation.name)
 
-    def has(self, needed: Preparation) -> bool:
+    def has(self, preparation: Preparation) -> bool:
         """Whether the artifact is there; it is checked when it is loaded."""
-        return (self.place(needed) / PROVENANCE).is_file()
+        return (self.folder_of(preparation) / PROVENANCE).is_file()
 
-    def load(self, needed: Preparation) -> Artifact:
+    def load(self, preparation: Preparation) -> Artifact:
         """The artifact, once for a process. UserError: damaged, foreign, or made for something else."""
-        place = self.place(needed)
+        folder = self.folder_of(preparation)
         try:
-            stamp = (place / STATE).stat().st_mtime_ns
-            described = (place / PROVENANCE).read_bytes()
+            stamp = (folder / STATE).stat().st_mtime_ns
+            described = (folder / PROVENANCE).read_bytes()
         except OSError:
-            raise UserError(f"{place}: {STATE} or {PROVENANCE} is missing; delete the folder and run again") from None
-        artifact = _loaded(place, stamp, described)
-        check_matches(place, artifact.provenance, needed)
+            raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; delete the folder and run again") from None
+        artifact = _loaded(folder, stamp, described)
+        check_matches(folder, artifact.provenance, preparation)
         return artifact
 
-    def write(self, needed: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
+    def write(self, preparation: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
         """Keep a learned state; facts: what else its provenance should say. What the training left behind goes."""
-        place, buffer = self.place(needed), io.BytesIO()
+        folder, buffer = self.folder_of(preparation), io.BytesIO()
         torch.save({"format": FORMAT, "state": dict(state)}, buffer)
         content = buffer.getvalue()
-        write_atomically(place / STATE, content)
+        write_atomically(folder / STATE, content)
         sha256 = hashlib.sha256(content).hexdigest()
-        described = {"format": FORMAT, "sha256": sha256, "description": needed.description(), **facts}
-        write_atomically(place / PROVENANCE, f"{json.dumps(described, indent=1)}\n".encode())
-        (place / FAILURE).unlink(missing_ok=True)
-        shutil.rmtree(place / UNFINISHED, ignore_errors=True)
+        described = {"format": FORMAT, "sha256": sha256, "description": preparation.description(), **facts}
+        write_atomically(folder / PROVENANCE, f"{json.dumps(described, indent=1)}\n".encode())
+        (folder / FAILURE).unlink(missing_ok=True)
+        shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
 
-    def remove(self, needed: Preparation) -> None:
+    def remove(self, preparation: Preparation) -> None:
         """Forget an artifact, finished or not, so that it is made again."""
-        shutil.rmtree(self.place(needed), ignore_errors=True)
+        shutil.rmtree(self.folder_of(preparation), ignore_errors=True)
 
-    def fail(self, needed: Preparation, error: BaseException) -> str:
+    def fail(self, preparation: Preparation, error: BaseException) -> str:
         """Note why an artifact could not be made, with the traceback; the reason in one line."""
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         trace = "".join(traceback.format_exception(error))
-        write_atomically(self.place(needed) / FAILURE, f"{reason}\n\n{trace}".encode())
+        write_atomically(self.folder_of(preparation) / FAILURE, f"{reason}\n\n{trace}".encode())
         return reason
 
-    def has_failed(self, needed: Preparation) -> bool:
+    def has_failed(self, preparation: Preparation) -> bool:
         """Whether the last attempt to make the artifact failed."""
-        return (self.place(needed) / FAILURE).is_file()
+        return (self.folder_of(preparation) / FAILURE).is_file()
 
-    def forget_failure(self, needed: Preparation) -> None:
+    def forget_failure(self, preparation: Preparation) -> None:
         """Training goes on after all."""
-        (self.place(needed) / FAILURE).unlink(missing_ok=True)
+        (self.folder_of(preparation) / FAILURE).unlink(missing_ok=True)
 
-    def failure(self, needed: Preparation) -> str:
+    def failure(self, preparation: Preparation) -> str:
         """Why an artifact is not there, in one line."""
         try:
-            lines = (self.place(needed) / FAILURE).read_text(encoding="utf-8").splitlines()
+            lines = (self.folder_of(preparation) / FAILURE).read_text(encoding="utf-8").splitlines()
         except OSError:
             return "it was not tried"
         return lines[0] if lines else "no reason was kept"
 
     @contextmanager
-    def locked(self, needed: Preparation) -> Iterator[None]:
+    def locked(self, preparation: Preparation) -> Iterator[None]:
         """Keep others from making the same artifact; they wait. The lock dies with its process."""
-        place = self.place(needed)
-        place.mkdir(parents=True, exist_ok=True)
-        with (place / ".lock").open("w") as lock:
+        folder = self.folder_of(preparation)
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / ".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            for left in place.rglob(f"{TEMPORARY}*"):
+            for left in folder.rglob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
 
-    def memory(self, needed: Preparation) -> FolderMemory:
+    def memory(self, preparation: Preparation) -> FolderMemory:
         """Where an unfinished training is kept."""
-        return FolderMemory(self.place(needed))
+        return FolderMemory(self.folder_of(preparation))
 
 
 @dataclass(frozen=True)
 class FolderMemory:
     """Values of an unfinished training, a file each, and its log."""
 
-    place: Path
+    folder: Path
 
     def load(self, name: str) -> dict[str, Any] | None:
         """The value of a name; None if there is none. UserError for a damaged file."""
@@ -145,37 +145,37 @@ class FolderMemory:
     def log(self, row: Mapping[str, float | int | str]) -> None:
         """Add to ``training.csv``, in the order of round and step; what is said of one of these twice is merged."""
         new = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in row.items()}
-        place, rows = _place(row), self.rows()
-        known = next((old for old in rows if place and _place(old) == place), None)
-        if known is None:
+        position, rows = _round_and_step(row), self.rows()
+        earlier = next((old for old in rows if position and _round_and_step(old) == position), None)
+        if earlier is None:
             rows.append(new)
         else:
-            known |= new
-        if all(one.get(name, "").isdigit() for one in rows for name in ("round", "step")):
-            rows.sort(key=lambda one: (int(one["round"]), int(one["step"])))
+            earlier |= new
+        if all(entry.get(name, "").isdigit() for entry in rows for name in ("round", "step")):
+            rows.sort(key=lambda entry: (int(entry["round"]), int(entry["step"])))
         text = io.StringIO()
-        writer = csv.DictWriter(text, list(dict.fromkeys(key for one in rows for key in one)), lineterminator="\n")
+        writer = csv.DictWriter(text, list(dict.fromkeys(key for entry in rows for key in entry)), lineterminator="\n")
         writer.writeheader()
-        writer.writerows([{key: value or "" for key, value in one.items()} for one in rows])
-        write_atomically(self.place / LOG, text.getvalue().encode())
+        writer.writerows([{key: value or "" for key, value in entry.items()} for entry in rows])
+        write_atomically(self.folder / LOG, text.getvalue().encode())
 
     def rows(self) -> list[dict[str, str]]:
         """The log so far."""
-        return read_log(self.place)
+        return read_log(self.folder)
 
     def _path(self, name: str) -> Path:
-        return self.place / UNFINISHED / f"{file_name(name)}.pt"
+        return self.folder / UNFINISHED / f"{file_name(name)}.pt"
 
 
-def _place(row: Mapping[str, Any]) -> dict[str, str]:
+def _round_and_step(row: Mapping[str, Any]) -> dict[str, str]:
     """Round and step of a row, as far as it has them."""
     return {name: str(row[name]) for name in ("round", "step") if row.get(name) not in (None, "")}
 
 
-def read_log(place: Path) -> list[dict[str, str]]:
+def read_log(folder: Path) -> list[dict[str, str]]:
     """The rows of an artifact's ``training.csv``, empty if there is none."""
     try:
-        with (place / LOG).open(encoding="utf-8", newline="") as file:
+        with (folder / LOG).open(encoding="utf-8", newline="") as file:
             return list(csv.DictReader(file))
     except FileNotFoundError:
         return []
@@ -196,16 +196,16 @@ def read_tensors(path: Path) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def _loaded(place: Path, _stamp: int, described: bytes) -> Artifact:
-    provenance = _provenance(place / PROVENANCE, described)
-    content = read_tensors(place / STATE)
-    found = hashlib.sha256((place / STATE).read_bytes()).hexdigest()
-    if found != provenance["sha256"]:
+def _loaded(folder: Path, _stamp: int, described: bytes) -> Artifact:
+    provenance = _provenance(folder / PROVENANCE, described)
+    content = read_tensors(folder / STATE)
+    sha256 = hashlib.sha256((folder / STATE).read_bytes()).hexdigest()
+    if sha256 != provenance["sha256"]:
         raise UserError(
-            f"{place / STATE}: is not the file that {PROVENANCE} describes; delete the folder and run again"
+            f"{folder / STATE}: is not the file that {PROVENANCE} describes; delete the folder and run again"
         )
     if content.get("format") != FORMAT or not isinstance(content.get("state"), dict):
-        raise UserError(f"{place / STATE}: of another version; delete the folder and run again")
+        raise UserError(f"{folder / STATE}: of another version; delete the folder and run again")
     return Artifact(content["state"], provenance)
 
 
@@ -225,13 +225,13 @@ def _provenance(path: Path, text: bytes) -> dict[str, Any]:
     return content
 
 
-def check_matches(place: Path, provenance: Mapping[str, Any], needed: Preparation) -> None:
+def check_matches(folder: Path, provenance: Mapping[str, Any], preparation: Preparation) -> None:
     """Refuse a network of another panel, wavelength, profile version, method or setting; UserError names the first."""
-    made, wanted = provenance["description"], needed.description()
+    trained, wanted = provenance["description"], preparation.description()
     for key in wanted:
-        if made.get(key) != wanted[key]:
+        if trained.get(key) != wanted[key]:
             raise UserError(
-                f"{place}: trained for {key.replace('_', ' ')} {_short(made.get(key))}, this study needs "
+                f"{folder}: trained for {key.replace('_', ' ')} {_short(trained.get(key))}, this study needs "
                 f"{_short(wanted[key])}; delete it, or give --retrain"
             )
 
@@ -270,10 +270,10 @@ class TrainingRecord:
         return digest(self.provenance["description"])
 
 
-def known(place: Path) -> dict[str, Any] | None:
+def provenance_of(folder: Path) -> dict[str, Any] | None:
     """An artifact's provenance without its tensors; None where there is none that can be read."""
     try:
-        content = json.loads((place / PROVENANCE).read_text(encoding="utf-8"))
+        content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return content if isinstance(content, dict) and isinstance(content.get("description"), dict) else None
@@ -281,15 +281,15 @@ def known(place: Path) -> dict[str, Any] | None:
 
 def training_records(output: Path) -> dict[str, TrainingRecord]:
     """The trainings beside a report by the id of what was to be learned; a file that is none is passed over."""
-    found = []
+    records = []
     for path in sorted((output / RECORDS).glob("*.json")):
         try:
             provenance = json.loads(path.read_text(encoding="utf-8"))
         except ValueError:
             continue
         if isinstance(provenance, dict) and isinstance(provenance.get("description"), dict):
-            found.append(TrainingRecord(provenance, rounds_of(path.with_suffix(".csv"))))
-    return {one.id: one for one in found}
+            records.append(TrainingRecord(provenance, rounds_of(path.with_suffix(".csv"))))
+    return {record.id: record for record in records}
 
 
 def rounds_of(log: Path) -> tuple[Round, ...]:
@@ -313,10 +313,10 @@ def rounds_in(rows: Iterable[Mapping[str | Any, Any]]) -> tuple[Round, ...]:
     return tuple(
         Round(
             number,
-            *(found.get(name, math.nan) for name in ("captures", "seconds")),
-            *(found.get(f"{name}_psnr", math.nan) for name in ("predicted", "captured", "fidelity")),
+            *(logged.get(name, math.nan) for name in ("captures", "seconds")),
+            *(logged.get(f"{name}_psnr", math.nan) for name in ("predicted", "captured", "fidelity")),
         )
-        for number, found in sorted(rounds.items())
+        for number, logged in sorted(rounds.items())
     )
 
 
@@ -327,7 +327,7 @@ def _number(value: Any) -> float:
         return math.nan
 
 
-def progress(place: Path) -> tuple[float, float]:
+def progress(folder: Path) -> tuple[float, float]:
     """Captures and seconds of an unfinished training by the last row of its log; NaN where it has none."""
-    rows = rounds_in(read_log(place))
+    rows = rounds_in(read_log(folder))
     return (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)

@@ -164,12 +164,17 @@ def timed(study: Study, plan: Plan) -> frozenset[str]:
 
 def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
     """Name of a task's timing: the hash of everything its wall time should depend on. gpu: its name, empty for none."""
-    cell, place = task.cells[0], task.conditions[0]
+    cell, display = task.cells[0], task.conditions[0]
     return digest(
         {
             "method": [cell.method, cell.method_sha256, dict(cell.params), *([cell.captures] if cell.captures else [])],
             "target": [cell.target_sha256, dict(cell.dataset_params)],
-            "display": [repr(place.spec), place.digest, cell.exposure, *([dict(cell.change)] if cell.change else [])],
+            "display": [
+                repr(display.spec),
+                display.digest,
+                cell.exposure,
+                *([dict(cell.change)] if cell.change else []),
+            ],
             "noise": [cell.seed, cell.repeat],
             "learned": [cell.measure, *cell.prepared],
             "measure": cell.measure,
@@ -184,7 +189,7 @@ def names() -> frozenset[str]:
     return frozenset(path.stem for path in folder().glob("*.json"))
 
 
-def known(name: str) -> Cost | None:
+def recorded(name: str) -> Cost | None:
     """The first measurement under a name, None if there is none; of an earlier version, without memory."""
     try:
         content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
@@ -196,9 +201,9 @@ def known(name: str) -> Cost | None:
     return effort if all(math.isfinite(size) and size >= 0 for size in sizes) else None
 
 
-def keep(name: str, effort: Cost, again: bool = False) -> Cost:
+def keep(name: str, effort: Cost, retime: bool = False) -> Cost:
     """Note a measurement and return the one to report: the first, or this one when it is measured again."""
-    first = None if again else known(name)
+    first = None if retime else recorded(name)
     if first is not None and (first.memory_mib is not None or effort.memory_mib is None):
         return first
     kept = effort if first is None else Cost(first.seconds, effort.memory_mib)

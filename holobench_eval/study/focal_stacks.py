@@ -45,22 +45,22 @@ def showings(
     """
     if not getattr(method, "planes", False):
         for target in targets:
-            yield [(target, _at(place, LENS, planes[target[0]][1])) for place in group]
+            yield [(target, _at(display, LENS, planes[target[0]][1])) for display in group]
         return
     alike: dict[float, list[Condition]] = {}
-    for place in group:
-        alike.setdefault(offset(place, {STAYS: 1.0}), []).append(place)
+    for display in group:
+        alike.setdefault(offset(display, {STAYS: 1.0}), []).append(display)
     for scene in dict.fromkeys(planes[name][0] for name, _ in targets):
         stack = [target for target in targets if planes[target[0]][0] == scene]
-        for places in alike.values():
-            yield [(target, _at(place, STAYS, planes[target[0]][1])) for target in stack for place in places]
+        for subgroup in alike.values():
+            yield [(target, _at(display, STAYS, planes[target[0]][1])) for target in stack for display in subgroup]
 
 
-def _at(place: Condition, kind: str, millimetres: float) -> Condition:
-    return place if millimetres == 0 else replace(place, change=(kind, millimetres))
+def _at(display: Condition, kind: str, millimetres: float) -> Condition:
+    return display if millimetres == 0 else replace(display, change=(kind, millimetres))
 
 
-def offset(place: Condition, change: Mapping[str, Any]) -> float:
+def offset(display: Condition, change: Mapping[str, Any]) -> float:
     """How far a cell's plane lies from that of its display [m], on the display's own panel."""
-    full = load_profile(place.source, folder=place.folder).panel.distance
-    return float(sum(change.values())) * 1e-3 * place.spec.distance / full
+    full = load_profile(display.source, folder=display.folder).panel.distance
+    return float(sum(change.values())) * 1e-3 * display.spec.distance / full

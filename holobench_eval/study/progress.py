@@ -43,31 +43,31 @@ class Follower:
     """
 
     seconds: float
-    places: dict[str, Path] = field(default_factory=dict)
-    told: dict[str, str] = field(default_factory=dict)
+    folders: dict[str, Path] = field(default_factory=dict)
+    last_lines: dict[str, str] = field(default_factory=dict)
     done: threading.Event = field(default_factory=threading.Event)
 
     def start(self, names: list[tuple[str, Path]], tell: Callable[[str], object]) -> None:
         """Follow the logs in these folders until each has ``ended``."""
-        self.places = dict(names)
+        self.folders = dict(names)
         self.done.clear()
         threading.Thread(target=self._follow, args=(tell,), daemon=True).start()
 
     def ended(self, name: str) -> None:
         """Follow this one no more."""
-        self.places.pop(name, None)
-        if not self.places:
+        self.folders.pop(name, None)
+        if not self.folders:
             self.done.set()
 
     def _follow(self, tell: Callable[[str], object]) -> None:
         while not self.done.wait(self.seconds):
-            for name, place in list(self.places.items()):
-                rows = read_log(place)
+            for name, folder in list(self.folders.items()):
+                rows = read_log(folder)
                 line = (
                     f"{name}: {', '.join(f'{key} {value}' for key, value in rows[-1].items() if value)}" if rows else ""
                 )
-                if line and self.told.get(name) != line:
-                    self.told[name] = line
+                if line and self.last_lines.get(name) != line:
+                    self.last_lines[name] = line
                     tell(line)
 
 
@@ -162,7 +162,7 @@ class Lines:
     def _left(self, now: float) -> str:
         if not self.done or self.begun is None:
             return ""
-        training = len(self.follower.places)
+        training = len(self.follower.folders)
         beside = f" besides the {training} in training" * bool(training)
         return f", about {(now - self.begun) / self.done * (self.total - self.done):.0f} s left{beside}"
 

@@ -36,14 +36,16 @@ def describe(
 
     device: as it was asked for; gpu: its name, if it is one and known.
     """
-    shown = {place.name: place for task in plan.tasks for place in task.conditions}
+    displays = {display.name: display for task in plan.tasks for display in task.conditions}
     return {
         "package": __version__,
         **revision(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
-        "profiles": {name: {"version": place.version, "sha256": place.digest} for name, place in shown.items()},
+        "profiles": {
+            name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
+        },
         "python": platform.python_version(),
         "packages": {name: installed(name) for name in PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",

@@ -28,7 +28,7 @@ from .training import TrainingJob, train
 LATE = 10.0
 """Seconds after which a record on a shared disk should be seen by all."""
 Step = TrainingJob | Job
-Made = str | list[Record]
+Result = str | list[Record]
 """Of a training why it failed, empty if it did not; of a task its records."""
 
 
@@ -168,30 +168,32 @@ def _compute(
     artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
     untrained = _untrained(plan, missing, setting)
     if untrained:
-        watch.training([(needed.name, artifacts.place(needed)) for needed in untrained])
-    unlearned = {needed.id for needed in untrained}
-    trainings = [TrainingJob(needed, setting.artifacts, setting.threads, setting.device) for needed in untrained]
+        watch.training([(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained])
+    unlearned = {preparation.id for preparation in untrained}
+    trainings = [
+        TrainingJob(preparation, setting.artifacts, setting.threads, setting.device) for preparation in untrained
+    ]
     at_work: list[Step] = []
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
     jobs = _jobs(plan, missing, missing if single else timed, setting)
     steps = queue(trainings, jobs, unlearned, at_work)
-    results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, at_work, watch))
-    for one, made in results:
-        at_work.remove(one)
-        if isinstance(one, TrainingJob):
-            reason = made if isinstance(made, str) else artifacts.fail(one.needed, _error(made))
-            unlearned.discard(one.needed.id)
-            watch.trained(one.needed.name, reason)
+    results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, _watched(steps, at_work, watch))
+    for job, result in results:
+        at_work.remove(job)
+        if isinstance(job, TrainingJob):
+            reason = result if isinstance(result, str) else artifacts.fail(job.preparation, _error(result))
+            unlearned.discard(job.preparation.id)
+            watch.trained(job.preparation.name, reason)
         else:
-            records = made if isinstance(made, list) else _lost(one, _error(made), store)
+            records = result if isinstance(result, list) else _lost(job, _error(result), store)
             _refuse_unseen(records, store)
             watch.finished(records)
 
 
 def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
     """Remove what was learned for a plan, and the records that depend on it."""
-    for needed in plan.preparations().values():
-        artifacts.remove(needed)
+    for preparation in plan.preparations().values():
+        artifacts.remove(preparation)
     for cell in plan.cells:
         if cell.prepared:
             store.path(cell.id).unlink(missing_ok=True)
@@ -201,12 +203,12 @@ def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Pr
     """What missing cells need and is not there; what is there is checked before anything is computed with it."""
     wanted = {identity for cell in plan.cells if cell.id in missing for identity in cell.prepared}
     artifacts, waiting = Artifacts(setting.artifacts), []
-    for needed in plan.preparations().values():
-        if needed.id in wanted:
-            if artifacts.has(needed):
-                artifacts.load(needed)
+    for preparation in plan.preparations().values():
+        if preparation.id in wanted:
+            if artifacts.has(preparation):
+                artifacts.load(preparation)
             else:
-                waiting.append(needed)
+                waiting.append(preparation)
     return waiting
 
 
@@ -218,14 +220,14 @@ def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: S
             yield Job(task, wanted, setting, alone=not wanted.isdisjoint(alone))
 
 
-def _told(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> Iterator[Step | None]:
+def _watched(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> Iterator[Step | None]:
     """The same steps; each is at work when an executor takes it, and the watch is told of tasks."""
-    for one in steps:
-        if one is not None:
-            at_work.append(one)
-        if isinstance(one, Job):
-            watch.started(one.task)
-        yield one
+    for job in steps:
+        if job is not None:
+            at_work.append(job)
+        if isinstance(job, Job):
+            watch.started(job.task)
+        yield job
 
 
 def _refuse_unseen(records: list[Record], store: Store) -> None:
@@ -241,9 +243,9 @@ def _refuse_unseen(records: list[Record], store: Store) -> None:
             time.sleep(0.1)
 
 
-def _error(made: Made | Exception) -> Exception:
+def _error(result: Result | Exception) -> Exception:
     """What is neither of the two results is an error."""
-    return made if isinstance(made, Exception) else TypeError(f"a worker returned {type(made).__name__}")
+    return result if isinstance(result, Exception) else TypeError(f"a worker returned {type(result).__name__}")
 
 
 def _lost(job: Job, error: Exception, store: Store) -> list[Record]:
@@ -254,9 +256,9 @@ def _lost(job: Job, error: Exception, store: Store) -> list[Record]:
     return records
 
 
-def step(one: Step) -> Made:
+def step(job: Step) -> Result:
     """Carry out a training (see ``train``) or the cells of a task (see ``work``). This is what a worker runs."""
-    return train(one) if isinstance(one, TrainingJob) else work(one)
+    return train(job) if isinstance(job, TrainingJob) else work(job)
 
 
 def queue(
@@ -269,15 +271,15 @@ def queue(
     results removes both as they come. None: all that is left waits for a step that is still at work.
     """
     yield from trainings
-    every = list(jobs)
-    waiting = [job for job in every if not job.alone]
+    all_jobs = list(jobs)
+    waiting = [job for job in all_jobs if not job.alone]
     while waiting:
         ready = [job for job in waiting if unlearned.isdisjoint(_needs(job))]
         waiting = [job for job in waiting if not unlearned.isdisjoint(_needs(job))]
         yield from ready
         if not ready:
             yield None
-    for job in every:
+    for job in all_jobs:
         if job.alone:
             while at_work:
                 yield None
@@ -295,12 +297,12 @@ def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> Non
     """
     seen: set[str] = set()
     for task in plan.tasks:
-        if task.is_floor or not missing.intersection(one.id for one in task.cells):
+        if task.is_floor or not missing.intersection(cell.id for cell in task.cells):
             continue
         for name, params in _used(task.cells[0]):
-            made = canonical([name, params])
-            if made not in seen:
-                seen.add(made)
+            identity = canonical([name, params])
+            if identity not in seen:
+                seen.add(identity)
                 reason = _reason(name, params, folder)
                 if reason is not None:
                     raise UserError(f"method '{name}' cannot run here: {reason}")

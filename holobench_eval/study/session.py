@@ -73,18 +73,18 @@ def export(
         shutil.copyfile(bench, folder / BENCH)
     if named and Path(named).name == named:
         shutil.copyfile(study.folder / named, folder / named)
-    place = next(iter(displays(chosen).values()))
-    spec, described = place.spec, place.digest
+    real_display = next(iter(displays(chosen).values()))
+    spec, described = real_display.spec, real_display.digest
     if spec.bits != 8:
-        raise UserError(f"'{place.name}' has {spec.bits} bits; patterns are written with 8")
-    described_bench = place.real.bench if place.real else None
+        raise UserError(f"'{real_display.name}' has {spec.bits} bits; patterns are written with 8")
+    described_bench = real_display.real.bench if real_display.real else None
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
         session=digest([text, described, str(config), digest(folder.resolve().as_posix())]),
         study_sha256=text,
         bench_sha256=described,
-        display=place.name,
+        display=real_display.name,
         panel=spec.shape,
         wavelengths=spec.wavelengths,
         phase=load_bench_file(described_bench).phase if described_bench else Convention(),
@@ -120,11 +120,11 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     for note in photographer.notes:
         say(note)
     try:
-        found = look(_bench(study), photographer, folder / REPORT, say)
+        findings = look(_bench(study), photographer, folder / REPORT, say)
     except Pending:
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
-    notes = [study.note, *photographer.notes, *found]
+    notes = [study.note, *photographer.notes, *findings]
     advance = _advance(study, folder, watch, threads)
     return replace(advance, study=replace(advance.study, note=" ".join(_sentence(note) for note in notes if note)))
 
@@ -149,11 +149,11 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
         raise UserError(f"{path}: {reason}; give --study with your own copy of the config")
     bench = folder / BENCH
     study = _on_one_display(load_study(path), bench if bench.is_file() else None, manifest.display)
-    place = next(iter(displays(study).values()))
-    if place.digest != manifest.bench_sha256:
-        raise UserError(f"'{place.name}' has changed since the session was exported; export a new one")
-    if (place.spec.shape, place.spec.wavelengths) != (tuple(manifest.panel), tuple(manifest.wavelengths)):
-        raise UserError(f"{folder}: the manifest's panel or wavelengths are not those of '{place.name}'")
+    display = next(iter(displays(study).values()))
+    if display.digest != manifest.bench_sha256:
+        raise UserError(f"'{display.name}' has changed since the session was exported; export a new one")
+    if (display.spec.shape, display.spec.wavelengths) != (tuple(manifest.panel), tuple(manifest.wavelengths)):
+        raise UserError(f"{folder}: the manifest's panel or wavelengths are not those of '{display.name}'")
     return replace(study, display=replace(study.display, session=folder))
 
 
@@ -174,17 +174,17 @@ def _reaches_out(path: Path) -> str:
 
     def walk(value: object, key: str) -> str:
         if isinstance(value, dict):
-            return next((found for name, item in value.items() if (found := walk(item, str(name)))), "")
+            return next((reason for name, item in value.items() if (reason := walk(item, str(name)))), "")
         if isinstance(value, list):
-            return next((found for item in value if (found := walk(item, key))), "")
+            return next((reason for item in value if (reason := walk(item, key))), "")
         file = isinstance(value, str) and (".py:" in value or value.endswith((".yaml", ".yml")) or "/" in value)
-        told = key in ("title", "note", "label", "source")
-        reaches = (file and not told) or key in ("path", "manifest", "lpips_weights", "weights")
+        is_prose = key in ("title", "note", "label", "source")
+        reaches = (file and not is_prose) or key in ("path", "manifest", "lpips_weights", "weights")
         return f"names a file ({key}: {str(value)[:60]})" if reaches else ""
 
     for section in ("targets", "training"):
-        given = study.get(section)
-        dataset = given.get("dataset", "dead_leaves") if isinstance(given, dict) else "dead_leaves"
+        entry = study.get(section)
+        dataset = entry.get("dataset", "dead_leaves") if isinstance(entry, dict) else "dead_leaves"
         if dataset not in OWN:
             return f"names the dataset '{str(dataset)[:60]}', which may read any folder"
     return walk(study, "")
@@ -222,7 +222,7 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
 
 def _profile(study: Study, display: str | None) -> str:
     """The profile that a display is named by. UserError: several, or none of the name."""
-    names = {condition(one, study.display.panel, study.folder).name: one for one in study.display.profiles}
+    names = {condition(profile, study.display.panel, study.folder).name: profile for profile in study.display.profiles}
     if display is None and len(names) > 1:
         raise UserError(f"{study.file}: several displays; choose one with --display, or describe yours with --bench")
     if display is None:

@@ -86,7 +86,7 @@ class Store:
 
     def write(self, record: Record) -> None:
         """Write a record, whole or not at all. A failure never replaces a score, which was only to be timed again."""
-        if record.state == "failed" and (known := self.read(record.id)) is not None and known.state == "done":
+        if record.state == "failed" and (earlier := self.read(record.id)) is not None and earlier.state == "done":
             return
         text = json.dumps(vars(record), indent=1, sort_keys=True, allow_nan=False)
         write_atomically(self.path(record.id), f"{text}\n".encode())
@@ -107,13 +107,13 @@ class Store:
 
         A cell without a record has the state ``missing``, so that no hole in a table is silent.
         """
-        found = []
+        records = []
         for label, cell in plan.labelled():
             record = self.read(cell.id)
             if record is None:
                 record = Record(cell.description(), "missing", label, "no record: not run")
-            found.append({**vars(record), "label": label})
-        return found
+            records.append({**vars(record), "label": label})
+        return records
 
     def missing(
         self, cells: tuple[Cell, ...], retry_failed: bool = False, timed: frozenset[str] = frozenset()
@@ -131,8 +131,8 @@ class Store:
 
         def state(cell: Cell) -> State:
             record = self.read(cell.id) if cell.id in there else None
-            again = cell.id in timed and record is not None and record.state == "done" and not record.alone
-            return "missing" if record is None or again else record.state
+            untimed = cell.id in timed and record is not None and record.state == "done" and not record.alone
+            return "missing" if record is None or untimed else record.state
 
         return {cell.id: state(cell) for cell in cells}
 
@@ -163,7 +163,9 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
     if record.state not in get_args(State) or not isinstance(record.scores, dict):
         raise UserError(f"{path}: unknown state '{record.state}'; delete the file and run the study again")
     numbers = [record.seconds, record.memory_mib, record.registration_residual_px, record.saturated]
-    if not all(_is_number(value) for value in (*record.scores.values(), *filter(_is_told, numbers), record.captures)):
+    if not all(
+        _is_number(value) for value in (*record.scores.values(), *filter(_is_present, numbers), record.captures)
+    ):
         raise UserError(f"{path}: a score or a measurement is not a number; delete the file and run the study again")
     if not all(isinstance(text, str) for text in (record.label, record.reason, record.stopped)):
         raise UserError(f"{path}: label, reason and stopped are texts; delete the file and run the study again")
@@ -174,7 +176,7 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
     return record
 
 
-def _is_told(value: object) -> bool:
+def _is_present(value: object) -> bool:
     return value is not None
 
 

@@ -97,7 +97,7 @@ def _code(file: Path, text: str) -> tuple[str, frozenset[Path]]:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
             node.body = node.body[1:] or [ast.Pass()]
         if isinstance(node, ast.ImportFrom) and 0 < node.level <= len(file.parents):
-            place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
-            for module in (place, *(place / alias.name for alias in node.names)):
+            package = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            for module in (package, *(package / alias.name for alias in node.names)):
                 imported |= {module.parent / f"{module.name}.py", module / "__init__.py"}
     return ast.unparse(tree), frozenset(imported)

@@ -71,10 +71,10 @@ def executor(name: str, workers: int | None, small: bool = True, address: str | 
         if workers is None:
             raise UserError("--executor slurm needs --workers, how many SLURM jobs to start")
         return Slurm(workers, on_gpu=gpus > 0)
-    many = workers or gpus or _cores()
-    if name == "serial" or (name == "auto" and (many == 1 or not (small or workers or gpus))):
+    count = workers or gpus or _cores()
+    if name == "serial" or (name == "auto" and (count == 1 or not (small or workers or gpus))):
         return Serial()
-    return Local(many, gpus)
+    return Local(count, gpus)
 
 
 def _cores() -> int:

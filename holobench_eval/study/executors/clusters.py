@@ -155,7 +155,11 @@ class Address:
 def _usable(client: Any, on_gpu: bool) -> dict[str, Any]:
     """What the scheduler knows of its workers at this moment, by their names; on_gpu: of those that declare a GPU."""
     workers = client.scheduler_info(n_workers=-1)["workers"]
-    return {name: one for name, one in workers.items() if not on_gpu or one["resources"].get("GPU", 0) >= GPU["GPU"]}
+    return {
+        name: worker
+        for name, worker in workers.items()
+        if not on_gpu or worker["resources"].get("GPU", 0) >= GPU["GPU"]
+    }
 
 
 def _there(client: Any, on_gpu: bool) -> int:

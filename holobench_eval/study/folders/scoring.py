@@ -150,7 +150,7 @@ class Scoring:
             groups.setdefault((*picture.shape, *targets[key[1]].shape), []).append(key)
         placements: Alignments = {}
         for keys in groups.values():
-            common = shared({key: found for key in keys if isinstance(found := own[key], Alignment)})
+            common = shared({key: alignment for key in keys if isinstance(alignment := own[key], Alignment)})
             if common is None:
                 continue
             warp, agreeing = common
@@ -194,8 +194,10 @@ class Scoring:
         if other is None:
             return {}
         image = torch.from_numpy(sampled(frame, other))
-        again = score(image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored")
-        scores = {f"{name}_{self.domain}_second": again[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
+        other_scores = score(
+            image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored"
+        )
+        scores = {f"{name}_{self.domain}_second": other_scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return scores | {"second_aligner_px": disagreement(first, other)}
 
     def floor(self, name: str) -> list[Record]:

@@ -23,9 +23,9 @@ from .solution import solution
 def focus(job: Job) -> Measured:
     """Solve for one plane, or for all planes of a scene at once, on the display before any change; the result shows the
     phase at any of the task's planes and displays."""
-    cells, place = job.task.cells, job.task.conditions[0].nominal
-    targets = {cell.target: job.target(cell, place) for cell in cells}
-    offsets = {cell.target: offset(place, cell.change) for cell in cells}
+    cells, display = job.task.cells, job.task.conditions[0].nominal
+    targets = {cell.target: job.target(cell, display) for cell in cells}
+    offsets = {cell.target: offset(display, cell.change) for cell in cells}
 
     def solve(method: Any, handle: MeteredDisplay) -> Any:
         pictures = torch.stack(list(targets.values())).to(job.device)
@@ -33,7 +33,7 @@ def focus(job: Job) -> Measured:
             return method.solve_planes(pictures, list(offsets.values()), handle)[None]
         return method.solve(pictures, handle)
 
-    solved = solution(job, place, targets[cells[0].target], solve)
+    solved = solution(job, display, targets[cells[0].target], solve)
     return lambda cell, shown_on: captured(job, solved, cell, shown_on, targets[cell.target], scored)
 
 

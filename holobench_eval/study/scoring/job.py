@@ -92,7 +92,7 @@ class Job:
     def cells(self) -> list[tuple[Cell, Condition]]:
         """The wanted cells and their displays."""
         pairs = zip(self.task.cells, self.task.conditions, strict=True)
-        return [(cell, place) for cell, place in pairs if cell.id in self.wanted]
+        return [(cell, display) for cell, display in pairs if cell.id in self.wanted]
 
     def failed(self, cell: Cell, error: BaseException) -> Record:
         """The record of a cell that has no score, with the reason in one line."""
@@ -104,41 +104,41 @@ class Job:
         """An instance of a method, built anew: no cell may depend on those computed before."""
         return plugins.build("methods", name, dict(params), self.setting.folder)
 
-    def learned(self, needed: Preparation | None) -> Artifact | None:
+    def learned(self, preparation: Preparation | None) -> Artifact | None:
         """What a method learned; None if it had nothing to learn. CellError when its training failed."""
-        if needed is None:
+        if preparation is None:
             return None
         artifacts = Artifacts(self.setting.artifacts)
-        if not artifacts.has(needed):
-            if needed.place.real and not artifacts.has_failed(needed):
+        if not artifacts.has(preparation):
+            if preparation.display.real and not artifacts.has_failed(preparation):
                 raise Pending("its training waits for photographs")
-            raise CellError(f"not trained: {artifacts.failure(needed)}")
-        return artifacts.load(needed)
+            raise CellError(f"not trained: {artifacts.failure(preparation)}")
+        return artifacts.load(preparation)
 
-    def display(self, cell: Cell, place: Condition) -> CalibratedBench | RealBench | LearnedBench:
+    def display(self, cell: Cell, display: Condition) -> CalibratedBench | RealBench | LearnedBench:
         """The display of a cell: a simulated bench, a real one, or a trained network."""
-        needed, learned = place.learned, self.learned(place.learned)
-        if needed is None or learned is None:
-            return opening.open_display(place, cell.seed, self.device)
-        method = self.method(needed.method, needed.params)
-        return LearnedBench(place.spec, method, moved(learned.state, self.device), cell.seed, self.device)
+        preparation, learned = display.learned, self.learned(display.learned)
+        if preparation is None or learned is None:
+            return opening.open_display(display, cell.seed, self.device)
+        method = self.method(preparation.method, preparation.params)
+        return LearnedBench(display.spec, method, moved(learned.state, self.device), cell.seed, self.device)
 
     def source(self, cell: Cell) -> TargetSource:
         """Where the target of a cell comes from."""
         params = canonical(dict(cell.dataset_params))
         return cell.dataset, params, self.setting.folder, cell.target, cell.target_sha256
 
-    def target(self, cell: Cell, place: Condition) -> Tensor:
+    def target(self, cell: Cell, display: Condition) -> Tensor:
         """The target of a cell at the size of the scored region; see ``load_target``."""
-        return load_target(self.source(cell), place)
+        return load_target(self.source(cell), display)
 
 
-def load_target(source: TargetSource, place: Condition) -> Tensor:
+def load_target(source: TargetSource, display: Condition) -> Tensor:
     """A target at the size of the scored region, ``(C, h, w)`` linear light in [0, 1].
 
     CellError for a source that has changed since the study was planned.
     """
-    return _target(source, place.spec.region.shape, len(place.spec.wavelengths)).clone()
+    return _target(source, display.spec.region.shape, len(display.spec.wavelengths)).clone()
 
 
 @lru_cache(maxsize=TARGETS_KEPT)

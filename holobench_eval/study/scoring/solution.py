@@ -38,7 +38,7 @@ class Solution:
     learned: Artifact | None
 
 
-def solution(job: Job, place: Condition, target: Tensor, solve: Solve) -> Solution:
+def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solution:
     """Let the task's method ``solve`` on a display, in the name of the task's first cell.
 
     target: ``(C, h, w)``, which the display is exposed for. What a method does to its own must not reach the score.
@@ -47,7 +47,7 @@ def solution(job: Job, place: Condition, target: Tensor, solve: Solve) -> Soluti
     task, first = job.task, job.task.cells[0]
     learned = job.learned(task.preparation)
     method = job.method(first.method, first.params)
-    handle = job.display(first, place).for_method(
+    handle = job.display(first, display).for_method(
         method,
         task.label,
         target.to(job.device),
@@ -67,8 +67,8 @@ def solution(job: Job, place: Condition, target: Tensor, solve: Solve) -> Soluti
 
 def wrong_output(job: Job, function: str, output: Any, wanted: str) -> CellError:
     """The error for what a method returned in the place of ``wanted``."""
-    found = tuple(output.shape) if isinstance(output, Tensor) else type(output).__name__
-    return CellError(f"{job.task.label}: {function} returned {found}, not {wanted}")
+    actual = tuple(output.shape) if isinstance(output, Tensor) else type(output).__name__
+    return CellError(f"{job.task.label}: {function} returned {actual}, not {wanted}")
 
 
 def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[Any, str]:
@@ -89,9 +89,9 @@ def kept(job: Job, make: Callable[[], Solution]) -> Solution:
     """The solution of a task, made once; kept in the output folder by the name of the task's first cell."""
     path = job.setting.output / FOLDER / f"{job.task.cells[0].id}.pt"
     if path.is_file():
-        known = read_tensors(path)
+        content = read_tensors(path)
         learned = job.learned(job.task.preparation)
-        return Solution(known["phase"], known["captures"], Cost(**known["taken"]), known["stopped"], learned)
+        return Solution(content["phase"], content["captures"], Cost(**content["taken"]), content["stopped"], learned)
     fresh, buffer = make(), io.BytesIO()
     account = {"captures": fresh.captures, "taken": asdict(fresh.cost), "stopped": fresh.stopped}
     torch.save({"phase": fresh.phase, **account}, buffer)
