@@ -1,4 +1,4 @@
-"""What trained methods learned, kept in a folder each and shared by studies; made once, checked before it is used."""
+"""Learned states of trained methods: a folder each, shared by studies, made once and checked before use."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from .displays import Preparation
 
 STATE, PROVENANCE, LOG, FAILURE = "learned.pt", "provenance.json", "training.csv", "failure.log"
 UNFINISHED = "unfinished"
+# Folder beside a report with the log (``<name>.csv``) and the provenance (``<name>.json``) of everything that its study
+# had to learn. Both are small enough to be committed; a report does not need the tensors.
 RECORDS = "training"
-"""Folder beside a report with the log and the provenance of everything that its study had to learn: ``<name>.csv`` and
-``<name>.json``, small enough to be committed. A report does not need the tensors."""
 FORMAT = 1
 
 
@@ -71,7 +71,7 @@ class Artifacts:
         return artifact
 
     def write(self, preparation: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
-        """Keep a learned state; facts: what else its provenance should say. What the training left behind goes."""
+        """Keep a learned state; facts: further entries of its provenance. The unfinished training is removed."""
         folder, buffer = self.folder_of(preparation), io.BytesIO()
         torch.save({"format": FORMAT, "state": dict(state)}, buffer)
         content = buffer.getvalue()
@@ -87,7 +87,7 @@ class Artifacts:
         shutil.rmtree(self.folder_of(preparation), ignore_errors=True)
 
     def fail(self, preparation: Preparation, error: BaseException) -> str:
-        """Note why an artifact could not be made, with the traceback; the reason in one line."""
+        """Write down the traceback of a failed training and return the reason in one line."""
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         trace = "".join(traceback.format_exception(error))
         write_atomically(self.folder_of(preparation) / FAILURE, f"{reason}\n\n{trace}".encode())
@@ -98,11 +98,11 @@ class Artifacts:
         return (self.folder_of(preparation) / FAILURE).is_file()
 
     def forget_failure(self, preparation: Preparation) -> None:
-        """Training goes on after all."""
+        """Remove the note of a failure: the training goes on."""
         (self.folder_of(preparation) / FAILURE).unlink(missing_ok=True)
 
     def failure(self, preparation: Preparation) -> str:
-        """Why an artifact is not there, in one line."""
+        """The reason why an artifact is missing, in one line."""
         try:
             lines = (self.folder_of(preparation) / FAILURE).read_text(encoding="utf-8").splitlines()
         except OSError:
@@ -111,7 +111,7 @@ class Artifacts:
 
     @contextmanager
     def locked(self, preparation: Preparation) -> Iterator[None]:
-        """Keep others from making the same artifact; they wait. The lock dies with its process."""
+        """Let other processes that want to make the same artifact wait. The lock dies with its process."""
         folder = self.folder_of(preparation)
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / ".lock").open("w") as lock:
@@ -127,7 +127,7 @@ class Artifacts:
 
 @dataclass(frozen=True)
 class FolderMemory:
-    """Values of an unfinished training, a file each, and its log."""
+    """Values of an unfinished training, a file each, and its log. folder: the artifact's."""
 
     folder: Path
 
@@ -137,13 +137,13 @@ class FolderMemory:
         return None if not path.exists() else read_tensors(path)
 
     def save(self, name: str, value: dict[str, Any]) -> None:
-        """Keep a value, whole or not at all."""
+        """Write a value; an interrupted write leaves the earlier file."""
         buffer = io.BytesIO()
         torch.save(value, buffer)
         write_atomically(self._path(name), buffer.getvalue())
 
     def log(self, row: Mapping[str, float | int | str]) -> None:
-        """Add to ``training.csv``, in the order of round and step; what is said of one of these twice is merged."""
+        """Add a row to ``training.csv``, ordered by round and step; rows of the same round and step are merged."""
         new = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in row.items()}
         position, rows = _round_and_step(row), self.rows()
         earlier = next((old for old in rows if position and _round_and_step(old) == position), None)
@@ -210,7 +210,7 @@ def _loaded(folder: Path, _stamp: int, described: bytes) -> Artifact:
 
 
 def _provenance(path: Path, text: bytes) -> dict[str, Any]:
-    """A provenance that has all that is asked of one. UserError says what is wrong."""
+    """A provenance with every required entry. UserError names what is missing or invalid."""
     try:
         content = json.loads(text)
     except (ValueError, RecursionError):
@@ -226,7 +226,7 @@ def _provenance(path: Path, text: bytes) -> dict[str, Any]:
 
 
 def check_matches(folder: Path, provenance: Mapping[str, Any], preparation: Preparation) -> None:
-    """Refuse a network of another panel, wavelength, profile version, method or setting; UserError names the first."""
+    """UserError for a state trained for another description; it names the first entry that differs."""
     trained, wanted = provenance["description"], preparation.description()
     for key in wanted:
         if trained.get(key) != wanted[key]:
@@ -271,7 +271,7 @@ class TrainingRecord:
 
 
 def provenance_of(folder: Path) -> dict[str, Any] | None:
-    """An artifact's provenance without its tensors; None where there is none that can be read."""
+    """An artifact's provenance, read without its tensors; None where it is missing or unreadable."""
     try:
         content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -280,7 +280,7 @@ def provenance_of(folder: Path) -> dict[str, Any] | None:
 
 
 def training_records(output: Path) -> dict[str, TrainingRecord]:
-    """The trainings beside a report by the id of what was to be learned; a file that is none is passed over."""
+    """The trainings beside a report, by ``Preparation.id``; files that are no provenance are skipped."""
     records = []
     for path in sorted((output / RECORDS).glob("*.json")):
         try:
@@ -293,7 +293,7 @@ def training_records(output: Path) -> dict[str, TrainingRecord]:
 
 
 def rounds_of(log: Path) -> tuple[Round, ...]:
-    """The rounds in a log, which may have other columns or none of these: then there are no rounds."""
+    """The rounds in a log; none where the log lacks these columns."""
     try:
         with log.open(encoding="utf-8", newline="") as file:
             return rounds_in(csv.DictReader(file))
@@ -302,7 +302,7 @@ def rounds_of(log: Path) -> tuple[Round, ...]:
 
 
 def rounds_in(rows: Iterable[Mapping[str | Any, Any]]) -> tuple[Round, ...]:
-    """The rounds in the rows of a log: of each round the last figure of every kind."""
+    """The rounds in the rows of a log, each with the last finite figure of every column."""
     rounds: dict[int, dict[str, float]] = {}
     for row in rows:
         number = _number(row.get("round"))
@@ -328,6 +328,6 @@ def _number(value: Any) -> float:
 
 
 def progress(folder: Path) -> tuple[float, float]:
-    """Captures and seconds of an unfinished training by the last row of its log; NaN where it has none."""
+    """Captures and seconds of an unfinished training, by the last round in its log; NaN where there is none."""
     rows = rounds_in(read_log(folder))
     return (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)

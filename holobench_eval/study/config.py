@@ -1,6 +1,6 @@
 """Read a study from ``configs/*.yaml`` and check all of it before anything runs.
 
-Every mistake in a config is one line that starts with its place, ``configs/table3.yaml:12:5: ...``.
+Every mistake in a config is reported in one line that starts with its position, ``configs/table3.yaml:12:5: ...``.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ def _check_labels(study: Study, document: Document) -> None:
 
 
 def _check_twins(study: Study, document: Document) -> None:
-    """Two labels for one and the same cell would be one measurement printed as two."""
+    """Refuse two labels for the same cell: a measurement would be printed twice."""
     for index, entry in enumerate(study.methods):
         for other in study.methods[:index]:
             same = (entry.name, entry.params, entry.captures) == (other.name, other.params, other.captures)
@@ -216,7 +216,7 @@ def _check_twins(study: Study, document: Document) -> None:
 
 
 def sweep_of(study: Study, document: Document, index: int) -> Sweep:
-    """A sweep of a config, its values and displays checked. UserError with the place of what is wrong."""
+    """A sweep of a config, its values and displays checked. UserError with ``file:line:column`` of a fault."""
     sweep, where = study.sweeps[index], ("sweeps", index)
     if study.display.learned or study.display.real or study.measure != "picture":
         raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
@@ -246,7 +246,7 @@ def sweep_of(study: Study, document: Document, index: int) -> Sweep:
 
 
 def subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:
-    """The named displays of the study, in its order; all for none."""
+    """The named displays in the study's order; all displays if none is named."""
     for number, profile in enumerate(named):
         if profile not in study.display.sources:
             message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
@@ -255,9 +255,9 @@ def subset(study: Study, document: Document, named: tuple[str, ...], where: Keys
 
 
 def check_metrics(study: Study, document: Document) -> None:
-    """Refuse unknown metrics, a headline that is of none of them, and one that needs a larger window.
+    """Refuse unknown metrics, a headline that no metric computes, and a headline that needs a larger window.
 
-    Weights that are missing here are no fault of the study: see ``study.available``.
+    Missing weights are no fault of the config; ``run.refuse_unscored`` reports them.
     """
     wanted, metrics = study.protocol.metrics, {metric.name: metric for metric in catalogue()}
     for index, name in enumerate(wanted or ()):

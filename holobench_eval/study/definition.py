@@ -13,8 +13,7 @@ from annotated_types import Interval, MinLen
 from ..core import plugins
 from ..core.errors import UserError
 
-LEARNED = "learned"
-"""How a config names the display that is a trained network."""
+LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
 Text = Annotated[str, MinLen(1)]
 
@@ -88,10 +87,10 @@ class Probe:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A change of the displays at test time, by one value after another; methods were prepared without it.
+    """A change of the displays at test time, with a list of values; methods were prepared without it.
 
-    condition: its kind, see ``display.simulated.changes``; values: numbers, or names; count: so many siblings or draws
-    in their place; profiles: the displays that are changed, a subset of the study's.
+    condition: its kind, see ``display.simulated.changes``; values: numbers or names; count: how many siblings or draws
+    to take instead of values; profiles: the displays that are changed, a subset of the study's.
     """
 
     condition: Text

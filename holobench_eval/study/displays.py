@@ -73,7 +73,7 @@ class Preparation:
     """What a method has to learn before it can solve: the name of its artifact follows from it.
 
     method, params: as in a cell; version: the method's own ``version``, raised when its training changes; folder: the
-    config's folder; place: the display it is trained on; dataset, dataset_params: source of the images; images: name
+    config's folder; display: the one it is trained on; dataset, dataset_params: source of the images; images: name
     and digest of each; held_out: how many of the last only watch the training; captures: the most it may take; seed:
     the study's.
     """
@@ -91,8 +91,11 @@ class Preparation:
     seed: int
 
     def description(self) -> dict[str, Any]:
-        """Everything that the learned state depends on, as plain JSON values. The version of the harness is not part of
-        it: a faster bench need not cost a day of training; ``provenance.json`` says with which one it was made."""
+        """Everything that the learned state depends on, as plain JSON values.
+
+        The harness version is not part of it, so that a faster bench does not cost a day of training;
+        ``provenance.json`` records it.
+        """
         spec = self.display.spec
         return {
             "method": self.method,
@@ -128,9 +131,9 @@ class Preparation:
 
 
 def preparation(study: Study, method: str, params: Mapping[str, Any], display: Condition) -> Preparation | None:
-    """What ``method`` has to learn to be shown on ``place``; None for a method that learns nothing.
+    """What ``method`` has to learn before it is shown on ``display``; None for a method that learns nothing.
 
-    On a learned display a method is trained on the display that this one was learned from.
+    For a learned display, a method is trained on the display that the network was trained on.
     """
     cls = plugins.find("methods", method, study.folder)
     if not getattr(cls, "trains", False):
@@ -171,7 +174,7 @@ def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
 
 
 def real_condition(source: str, folder: Path) -> Condition:
-    """Read the file of a real bench without opening its devices. UserError for a file that is none."""
+    """Read the file of a real bench without opening its devices. UserError for an invalid file."""
     path = folder / source
     bench = load_bench_file(path)
     spec = bench.panel.spec(bench.name)
@@ -179,7 +182,7 @@ def real_condition(source: str, folder: Path) -> Condition:
 
 
 def _real(study: Study, display: Condition) -> Condition:
-    """The display with a session folder in its place, if the study has one."""
+    """The display, with its photographs from the study's session folder if there is one."""
     folder = study.display.session
     if folder is None:
         return display

@@ -18,20 +18,20 @@ from ..lab.session import session_photographer
 from ..methods.fiducials import fiducial_phases
 from .displays import Condition, RealSource
 
+# Limits on the benches that a process keeps open, their pixels in all and their number; two are always kept.
 OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
-"""Pixels of all benches that a process keeps open, and their number, at most; but two are."""
 
 
 def open_display(display: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench | RealBench:
-    """The bench of a condition, built and calibrated once in a process; a simulated one is computed on ``device``.
+    """The bench of a display, built and calibrated once in a process; a simulated bench is computed on ``device``.
 
-    CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
+    CellError when its calibration cannot be trusted; a failed calibration is kept and not repeated for every cell.
     """
     return _cached(display, seed, device)
 
 
 def simulated(display: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
-    """``open_display`` of a display that does not exist."""
+    """``open_display`` of a simulated display."""
     bench = _cached(display, seed, device)
     assert isinstance(bench, CalibratedBench)
     return bench
@@ -61,12 +61,11 @@ def _cached(display: Condition, seed: int, device: torch.device) -> CalibratedBe
     return opened
 
 
-_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()
-"""Those used least recently come first."""
+_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()  # least recently used first
 
 
 def forget_sessions() -> None:
-    """Open the benches behind session folders anew when they are next asked for: their files may have changed."""
+    """Drop the real benches, so that the next use opens them anew: files of a session folder may have changed."""
     for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
         del _open[key]
 
@@ -106,7 +105,7 @@ def _opened(display: Condition, seed: int, device: torch.device) -> CalibratedBe
 
 
 def _open_real(display: Condition, source: RealSource, seed: int) -> RealBench:
-    """The bench behind a session folder, or that of devices. UserError for a description that has changed."""
+    """The bench of a session folder or of devices. UserError for a description that has changed since the plan."""
     bench = None if source.bench is None else load_bench_file(source.bench)
     described = bench or load_profile(display.source, folder=display.folder).scaled(display.spec.shape)
     if described.digest != display.digest:

@@ -1,4 +1,4 @@
-"""The grid of cells of a study: which number is measured how. Nothing is computed or written here."""
+"""The grid of cells of a study: every number and how it is measured. Nothing is computed or written here."""
 
 from __future__ import annotations
 
@@ -18,11 +18,9 @@ from .focal_stacks import VERSION as IN_FOCUS
 from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
 from .versions import HARNESS, method_version
 
-REFERENCE = "reference"
-"""The condition of the floor cells."""
-Maker = tuple[str, str, Mapping[str, Any]]
-"""Method, its version, parameters."""
-FLOORS = (
+REFERENCE = "reference"  # the condition of the floor cells
+Maker = tuple[str, str, Mapping[str, Any]]  # method, its version, parameters
+FLOORS = (  # what a study without any display would score: see ``holobench_eval.metrics.references``
     "floor_constant",
     "floor_black",
     "floor_speckle",
@@ -30,12 +28,11 @@ FLOORS = (
     "floor_mirrored",
     "floor_shift_1px",
 )
-"""What a study without any display would score: see ``holobench_eval.metrics.references``."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One number of every table: the plain description that is hashed to name its record.
+    """The plain description of a measurement; its hash names the record.
 
     method: registered name or ``file.py:Class``; method_sha256: its version (``versions.method_version``); params:
     all of them; target_sha256: digest of the source image; profile_version, profile_sha256: of the display;
@@ -75,8 +72,8 @@ class Cell:
     session: str = ""
 
     def description(self) -> dict[str, Any]:
-        """The cell as plain JSON values; without ``captures`` where there is no limit, and what is empty of the last
-        two."""
+        """The cell as plain JSON values, without ``captures`` if there is no limit, and without an empty ``change`` or
+        ``session``."""
         plain: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
         plain |= {name: list(plain[name]) for name in ("panel", "metrics", "prepared")}
         plain |= {name: dict(plain[name]) for name in ("params", "dataset_params", "holograms", "change")}
@@ -95,10 +92,9 @@ class Cell:
 
 @dataclass(frozen=True)
 class Task:
-    """Cells that share one solution: a method solves a target once, and the phase is shown on each of the
-    displays.
+    """Cells that share a solution: a method solves a target once, and the phase is shown on each of the displays.
 
-    conditions: the display of each cell; the method meets the first one while it solves. A floor task has no
+    conditions: the display of each cell; the method solves on the first. A floor task has no
     solution and one display, which gives the size of the scored region. preparation: what the method learns first.
     """
 
@@ -131,7 +127,7 @@ class Plan:
         return tuple(cell for task in self.tasks for cell in task.cells)
 
     def preparations(self) -> dict[str, Preparation]:
-        """What has to be learned before the cells can be computed, by its id, each once."""
+        """Everything that has to be learned before the cells can be computed, by its id."""
         trainings = [task.preparation for task in self.tasks]
         trainings += [display.learned for task in self.tasks for display in task.conditions]
         return {training.id: training for training in trainings if training is not None}
@@ -206,7 +202,7 @@ class _Ground:
         prepared: tuple[str, ...] = (),
         captures: int | None = None,
     ) -> Cell:
-        """A cell; ``target`` is a name and its digest, ``made`` says by what the picture is made."""
+        """A cell; ``target``: name and digest; ``maker``: the method that makes the picture."""
         study = self.study
         method, version, params = maker
         holograms = study.holograms
@@ -261,7 +257,7 @@ class _Ground:
                 yield Task(entry.label, tuple(cells), conditions, own)
 
     def _showings(self, cls: type[Any], entry_displays: list[Condition], targets: list[Target]) -> Iterator[Showing]:
-        """Targets and displays that share a solution, for every solution."""
+        """The targets and displays of each solution."""
         measure = self.study.measure
         for group in (
             [(display,) for display in entry_displays] if measure == "prediction" else _sharing(cls, entry_displays)
@@ -272,11 +268,11 @@ class _Ground:
                 yield from ([(target, display) for display in group] for target in targets)
 
     def _condition(self, display: Condition) -> str:
-        """The name of a display in tables, where planes of a focal stack stand together."""
+        """The name of a display in tables; the planes of a focal stack share a row."""
         return display.name if self.study.measure == "focus" else display.title
 
     def floor(self, display: Condition, target: Target, wrong: Target) -> Task:
-        """The references of a target; ``wrong`` is the target that is shown in its place."""
+        """The references of a target; ``wrong``: the target whose picture is scored as the wrong one."""
         wrong_target = {"target": wrong[0], "target_sha256": wrong[1]}
         params = {name: wrong_target if name == "floor_wrong_target" else {} for name in FLOORS}
         if wrong == target:
@@ -293,8 +289,10 @@ def _ids(*trainings: Preparation | None) -> tuple[str, ...]:
 
 
 def _metrics(study: Study) -> tuple[str, ...]:
-    """Name and version of the metrics that the study names, wherever it is planned; else of all that can be computed
-    here, and the headline's: LPIPS needs weights that may come later."""
+    """Name and version of the study's metrics.
+
+    A study that names none gets all that can be computed here, and the headline's: weights of LPIPS may come later.
+    """
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics
     metrics = catalogue(None if weights is None else Path(weights))
     if wanted is None:
@@ -308,11 +306,11 @@ def _metrics(study: Study) -> tuple[str, ...]:
 
 
 def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[tuple[Condition, ...]]:
-    """Displays grouped so that one solution serves a group.
+    """Displays grouped so that the displays of a group share a solution.
 
-    A method that neither captures nor trains nor looks into the bench knows only the nominal optics, so displays with
-    equal nominal optics get the same phase from it. One that was trained knows the display before any change. One that
-    captures or looks into the bench meets it as it is.
+    A method that neither captures nor trains nor is privileged knows only the nominal optics, so displays with equal
+    nominal optics get the same phase. A trained method knows the display before any change. A method that captures or
+    is privileged solves on each display as it is.
     """
     if any(getattr(cls, property, False) for property in ("camera", "privileged")):
         return [(display,) for display in entry_displays]

@@ -1,4 +1,4 @@
-"""How a run shows where it is: a live bar on a terminal, a line every few seconds elsewhere."""
+"""The progress of a run: a live bar on a terminal, a line every few seconds elsewhere."""
 
 from __future__ import annotations
 
@@ -37,9 +37,10 @@ def _untrained(name: str, reason: str) -> str:
 
 @dataclass
 class Follower:
-    """Tells what the newest line of each growing ``training.csv`` says, every so many seconds, from a thread.
+    """Reports the newest row of each growing ``training.csv`` from a thread.
 
-    Workers of any kind write that file, so that it is followed in the same way wherever they run.
+    Workers of any kind write that file, so it is followed in the same way wherever they run. seconds: between two
+    looks; folders: of the artifacts in training, by name; last_lines: the lines reported last, by name.
     """
 
     seconds: float
@@ -54,7 +55,7 @@ class Follower:
         threading.Thread(target=self._follow, args=(tell,), daemon=True).start()
 
     def ended(self, name: str) -> None:
-        """Follow this one no more."""
+        """Stop following this log."""
         self.folders.pop(name, None)
         if not self.folders:
             self.done.set()
@@ -82,7 +83,7 @@ class Bar:
     follower: Follower = field(default_factory=lambda: Follower(0.5))
 
     def planned(self, cells: int, missing: int) -> None:
-        """Start at the cells that have a record already."""
+        """Set the bar to the number of missing cells."""
         self.missing = missing
         self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
 

@@ -34,7 +34,7 @@ def describe(
 ) -> dict[str, Any]:
     """Everything about the present run that is not in its config: versions, revision, machine, displays, command.
 
-    device: as it was asked for; gpu: its name, if it is one and known.
+    device: as requested; gpu: its name, empty for a CPU or an unknown GPU.
     """
     displays = {display.name: display for task in plan.tasks for display in task.conditions}
     return {
@@ -76,10 +76,9 @@ def _git(folder: Path, *arguments: str) -> str:
 
 
 def begin(output: Path, provenance: dict[str, Any], resumed: bool) -> dict[str, Any]:
-    """Write ``provenance.json`` at the start of a run; runs that this one completes are kept under
-    ``earlier``.
+    """Write ``provenance.json`` at the start of a run, with the runs that it resumes under ``earlier``.
 
-    Written first, so that a run that is killed leaves its trace beside the records it made.
+    Written first, so that a killed run leaves its provenance beside its records.
     """
     earlier = []
     if resumed and (before := read(output)):

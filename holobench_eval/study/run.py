@@ -25,11 +25,9 @@ from .scoring.job import Job, Setting
 from .store import Record, Store
 from .training import TrainingJob, train
 
-LATE = 10.0
-"""Seconds after which a record on a shared disk should be seen by all."""
+LATE = 10.0  # s after which all machines should see a record on a shared disk
 Step = TrainingJob | Job
-Result = str | list[Record]
-"""Of a training why it failed, empty if it did not; of a task its records."""
+Result = str | list[Record]  # of a training the reason of its failure, empty for success; of a task its records
 
 
 class Watch(Protocol):
@@ -164,7 +162,7 @@ def _compute(
     executor: Executor,
     watch: Watch,
 ) -> None:
-    """Train what missing cells need and is not there, then compute them, those of ``timed`` alone."""
+    """Train what the missing cells still need, then compute them; the cells of ``timed`` run alone."""
     artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
     untrained = _untrained(plan, missing, setting)
     if untrained:
@@ -200,7 +198,7 @@ def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
 
 
 def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Preparation]:
-    """What missing cells need and is not there; what is there is checked before anything is computed with it."""
+    """The missing artifacts that missing cells need; existing artifacts are checked before any computation."""
     wanted = {identity for cell in plan.cells if cell.id in missing for identity in cell.prepared}
     artifacts, waiting = Artifacts(setting.artifacts), []
     for preparation in plan.preparations().values():
@@ -213,7 +211,7 @@ def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Pr
 
 
 def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: Setting) -> Iterator[Job]:
-    """The tasks with missing cells. alone: cells whose task has nothing beside it."""
+    """The tasks with missing cells. alone: cells whose task runs without concurrent workers."""
     for task in plan.tasks:
         wanted = missing.intersection(cell.id for cell in task.cells)
         if wanted:
@@ -221,7 +219,7 @@ def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: S
 
 
 def _watched(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> Iterator[Step | None]:
-    """The same steps; each is at work when an executor takes it, and the watch is told of tasks."""
+    """The same steps; each is added to ``at_work`` when an executor takes it, and tasks are reported to the watch."""
     for job in steps:
         if job is not None:
             at_work.append(job)
@@ -231,7 +229,7 @@ def _watched(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) ->
 
 
 def _refuse_unseen(records: list[Record], store: Store) -> None:
-    """UserError for records that were written, but not where this process reads them: all results would be holes."""
+    """UserError for records that a worker wrote to a folder that this process does not see."""
     until = time.monotonic() + LATE
     for record in records:
         while not store.path(record.id).exists():
@@ -244,7 +242,7 @@ def _refuse_unseen(records: list[Record], store: Store) -> None:
 
 
 def _error(result: Result | Exception) -> Exception:
-    """What is neither of the two results is an error."""
+    """The error of a job without a valid result."""
     return result if isinstance(result, Exception) else TypeError(f"a worker returned {type(result).__name__}")
 
 
@@ -264,11 +262,11 @@ def step(job: Step) -> Result:
 def queue(
     trainings: Iterable[TrainingJob], jobs: Iterable[Job], unlearned: set[str], at_work: Collection[Step]
 ) -> Iterator[Step | None]:
-    """Trainings first, since they take longest; then jobs, those that need nothing of ``unlearned`` before the others;
-    at the end, one by one, the jobs that are to be alone.
+    """Trainings first, since they take longest; then the jobs that need nothing of ``unlearned``, then the others; at
+    the end, each by itself, the jobs that run alone.
 
-    unlearned: ids of the preparations that are not there yet; at_work: the steps that were taken; whoever takes the
-    results removes both as they come. None: all that is left waits for a step that is still at work.
+    unlearned: ids of the preparations still to be trained; at_work: the steps that an executor took. The caller removes
+    entries from both as results come. None: all remaining jobs wait for a step that is at work.
     """
     yield from trainings
     all_jobs = list(jobs)
@@ -293,7 +291,7 @@ def _needs(job: Job) -> set[str]:
 def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> None:
     """UserError, in one line, if a method of a missing cell says by ``available()`` that it cannot run here.
 
-    Only what is to be computed is asked for: a report of what was computed elsewhere needs no method of its study.
+    Only methods of missing cells are asked: a report of records from elsewhere needs no method of its study.
     """
     seen: set[str] = set()
     for task in plan.tasks:
@@ -309,7 +307,7 @@ def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> Non
 
 
 def refuse_unscored(study: Study) -> None:
-    """UserError, in one line, if a metric that the study names, or that its headline is of, cannot be computed here."""
+    """UserError, in one line, if a metric of the study or of its headline cannot be computed here."""
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics or ()
     for metric in catalogue(None if weights is None else Path(weights)):
         if (metric.name in wanted or study.headline in metric.columns) and (reason := metric.available()):

@@ -28,16 +28,15 @@ from .run import Outcome, Watch, run
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
-OWN = ("photographs", "dead_leaves", "charts")
-"""Datasets that come with the package and read no folder."""
+OWN = ("photographs", "dead_leaves", "charts")  # datasets that come with the package and read no folder
 
 
 @dataclass(frozen=True)
 class Advance:
-    """What an import or export came to.
+    """The result of an import or export.
 
-    study: on the session's display; patterns: of the new round that has to be photographed, none when the study is
-    complete; outcome: of the cells. The study's note says what is to be known of the photographs.
+    study: on the session's display, with notes on the photographs in its ``note``; patterns: of the new round that has
+    to be photographed, none when the study is complete; outcome: of the cells.
     """
 
     study: Study
@@ -99,8 +98,8 @@ def export(
 def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], config: Path | None = None) -> Advance:
     """Read the photographs of all rounds so far, score what can be scored, and write the next round if one is needed.
 
-    config: the study's config, where the copy in the folder cannot stand for it (see ``study_of``); say: is told
-    what was found, line by line. UserError with every fault of the photographs; nothing is scored then.
+    config: use this config instead of the copy in the session folder (see ``study_of``); say: gets the findings, line
+    by line. UserError with every fault of the photographs; nothing is scored then.
     """
     refuse_links_out(folder)
     manifest = read_manifest(folder)
@@ -135,10 +134,10 @@ def _sentence(note: str) -> str:
 
 
 def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
-    """The study of a session. UserError: another one, or one whose copy may not be trusted with this machine.
+    """The study of a session. UserError for another study, or for a copy that may not be trusted.
 
-    A session folder comes from somewhere else, so its copy of the config is used only where it names nothing but what
-    is installed: code in files, datasets in folders and weights need the user's own config.
+    A session folder comes from elsewhere, so its copy of the config is used only if everything that it names is
+    installed: code in files, datasets in folders and weights need the user's own config.
     """
     path = folder / STUDY if config is None else config
     if not path.is_file() or (config is None and path.is_symlink()):
@@ -158,14 +157,14 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
 
 
 def _is_beside(bench: object, folder: Path) -> bool:
-    """Whether a bench file is one of the session folder's own: data that is read, and devices that are not opened."""
+    """Whether a bench file lies in the session folder; it is only read, and its devices are not opened."""
     return isinstance(bench, str) and Path(bench).name == bench and (folder / bench).is_file()
 
 
 def _reaches_out(path: Path) -> str:
-    """What a config names that is not installed here, empty for nothing.
+    """The first file or dataset of a config that is not part of the package; empty if there is none.
 
-    Datasets that read folders are known by not being in ``OWN``; code in files and profiles in files by their names.
+    A dataset outside ``OWN`` may read folders; code and profiles in files are recognized by their names.
     """
     study = load(path).data
     display = study.get("display")
@@ -191,7 +190,7 @@ def _reaches_out(path: Path) -> str:
 
 
 def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:
-    """The study with one display, that photographs can be exchanged for. UserError says what stands against it."""
+    """The study with a single display, for an exchange of photographs. UserError where that is impossible."""
     if study.measure == "focus" or study.sweeps or study.display.learned:
         what = "focal stacks" if study.measure == "focus" else "changes of a display" if study.sweeps else "a network"
         raise UserError(f"{study.file}: a session measures pictures on one real display, not {what}")
@@ -221,7 +220,7 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
 
 
 def _profile(study: Study, display: str | None) -> str:
-    """The profile that a display is named by. UserError: several, or none of the name."""
+    """The profile of a display's name. UserError if the name is unknown, or missing with several displays."""
     names = {condition(profile, study.display.panel, study.folder).name: profile for profile in study.display.profiles}
     if display is None and len(names) > 1:
         raise UserError(f"{study.file}: several displays; choose one with --display, or describe yours with --bench")

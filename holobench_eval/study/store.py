@@ -1,4 +1,4 @@
-"""One small file a cell: written whole or not at all, so that a run can be killed at any moment and resumed."""
+"""A small file for each cell, written atomically, so that a run can be killed at any moment and resumed."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ from ..core.hashing import digest
 from ..core.io import TEMPORARY, file_name, write_atomically
 from .plan import Cell, Plan
 
+# ``missing``: a planned cell without a record; ``Store.load`` gives this state, and no file holds it.
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
-"""``missing`` is the state of a planned cell that has no record; ``Store.load`` gives it and no file holds it."""
 
-ADDED = frozenset({"alone", "memory_mib", "stopped"})
-"""What records of earlier versions lack."""
+ADDED = frozenset({"alone", "memory_mib", "stopped"})  # entries that records of earlier versions lack
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class Store:
         return self.folder / f"target-{file_name(target)}.png"
 
     def write(self, record: Record) -> None:
-        """Write a record, whole or not at all. A failure never replaces a score, which was only to be timed again."""
+        """Write a record atomically. A failure never replaces a score: that cell was only to be timed again."""
         if record.state == "failed" and (earlier := self.read(record.id)) is not None and earlier.state == "done":
             return
         text = json.dumps(vars(record), indent=1, sort_keys=True, allow_nan=False)
@@ -105,7 +104,7 @@ class Store:
     def load(self, plan: Plan) -> list[dict[str, Any]]:
         """A record for every cell of the plan, in its order, under the plan's labels.
 
-        A cell without a record has the state ``missing``, so that no hole in a table is silent.
+        A cell without a record has the state ``missing``, so that every gap in a table is visible.
         """
         records = []
         for label, cell in plan.labelled():
@@ -127,7 +126,7 @@ class Store:
 
     def states(self, cells: tuple[Cell, ...], timed: frozenset[str] = frozenset()) -> dict[str, State]:
         """State of every cell's record, by the cell's id; those of ``timed`` that were not timed alone are missing."""
-        there = {path.stem for path in self.folder.glob("*.json")}  # to open each that is not there takes longer
+        there = {path.stem for path in self.folder.glob("*.json")}  # faster than trying to open each missing file
 
         def state(cell: Cell) -> State:
             record = self.read(cell.id) if cell.id in there else None
@@ -153,7 +152,7 @@ class Store:
 
 
 def _checked(path: Path, identity: str, content: Any) -> Record:
-    """The record in a file, after checking that it is one, and the one that the file's name says."""
+    """The record in a file. UserError for invalid content, or a cell that does not match the file's name."""
     names = {item.name for item in fields(Record)}
     if not isinstance(content, dict) or set(content) | ADDED != names:
         raise UserError(f"{path}: not a record of this version; delete the file and run the study again")

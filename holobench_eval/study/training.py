@@ -27,13 +27,12 @@ from .displays import Preparation
 from .plan import Plan
 from .versions import HARNESS, method_version
 
-WAITS = "waits for photographs"
-"""In the place of a reason why a training failed."""
+WAITS = "waits for photographs"  # in place of the reason of a failure
 
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """A preparation and what a worker needs to carry it out. device: name of where it computes, see ``device.find``."""
+    """A preparation and what a worker needs to train it. device: name of where it computes, see ``device.find``."""
 
     preparation: Preparation
     folder: Path
@@ -42,7 +41,7 @@ class TrainingJob:
 
 
 def train(job: TrainingJob) -> str:
-    """Make an artifact, going on where an earlier attempt stopped. Returns why it failed, empty if it did not."""
+    """Make an artifact, resuming an earlier attempt. Returns the reason of a failure, empty for success."""
     artifacts, device = Artifacts(job.folder), find(job.device)
     with artifacts.locked(job.preparation), repeatable(job.threads, device):
         if artifacts.has(job.preparation):
@@ -92,11 +91,10 @@ def _train(preparation: Preparation, artifacts: Artifacts, threads: int, device:
 
 
 def diagnosis(method: object, state: Mapping[str, Any], display_bench: CalibratedBench | RealBench) -> dict[str, Any]:
-    """What a method says of the display it learned, beside the truth, for methods that say something.
+    """A method's estimates of the display, beside the ground truth; empty without ``estimates`` or ``form``.
 
-    estimates: see ``display.estimates.joined``; missing: effects of the bench that the form of the method's model has
-    no term for, each in words, if the method says what its ``form`` is; diagnosis_failed: why there is neither.
-    Of a real bench the truth is not known.
+    estimates: see ``display.estimates.joined``; missing: texts of the bench's effects that the model's ``form`` has no
+    term for; diagnosis_failed: the error, if there was one. A real bench has no ground truth.
     """
     estimates, form = getattr(method, "estimates", None), getattr(method, "form", None)
     findings: dict[str, Any] = {}
@@ -128,7 +126,7 @@ def _images(preparation: Preparation, device: torch.device) -> list[TrainingImag
 def keep_training_records(plan: Plan, artifacts: Artifacts, output: Path) -> None:
     """Copy logs and provenance of what a plan had to learn into ``output/training``.
 
-    What is there stays when its artifact is not at hand any more; what the plan does not need goes.
+    Copies stay when their artifact is gone; copies that the plan does not need are removed.
     """
     preparations, names = plan.preparations(), _names(plan)
     folder = output / RECORDS
@@ -155,6 +153,6 @@ def _names(plan: Plan) -> dict[str, str]:
     for identity, preparation in plan.preparations().items():
         title = titles.get(identity, f"display {preparation.method} {preparation.display.name}")
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-.")
-        taken = {name.lower() for name in names.values()}  # some file systems do not tell A from a
+        taken = {name.lower() for name in names.values()}  # some file systems ignore case
         names[identity] = f"{stem}-{identity[:8]}" if stem.lower() in taken or not stem else stem
     return names

@@ -108,7 +108,7 @@ class Scoring:
         return records
 
     def alignments(self, step: Step) -> Alignments:
-        """Every capture's own alignment, from what is kept of an earlier run or computed."""
+        """Every capture's own alignment, kept from an earlier run or computed."""
         own: Alignments = {}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
@@ -143,7 +143,7 @@ class Scoring:
         return srgb_encode(torch.from_numpy(values) / bright).numpy()
 
     def common(self, own: Alignments) -> Alignments:
-        """The shared alignments: by frame size and shape of the target, for those that agree or that they fit."""
+        """The shared alignments, by frame size and target shape, of captures that agree with one or that it fits."""
         captures, targets = self.folders.captures, self.folders.targets
         groups: dict[tuple[int, ...], list[Key]] = {}
         for key, picture in captures.items():
@@ -187,7 +187,7 @@ class Scoring:
         return record
 
     def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
-        """PSNR and SSIM by the geometry that another algorithm finds, and how far apart the two are."""
+        """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""
         frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
         light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(compared)
         other = second_warp(gray(light.numpy()), gray(reference.numpy()), first)
@@ -201,7 +201,7 @@ class Scoring:
         return scores | {"second_aligner_px": disagreement(first, other)}
 
     def floor(self, name: str) -> list[Record]:
-        """The records of what no method made."""
+        """The records of floor images."""
         names = list(self.folders.targets)
         after = names[names.index(name) + 1 :] + names[: names.index(name)]
         shape = self.folders.targets[name].shape
@@ -272,7 +272,7 @@ class Scoring:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """A kept alignment; None where there is none, or none that can be read."""
+    """A kept alignment; None where it is missing or unreadable."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

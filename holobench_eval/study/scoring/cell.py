@@ -15,18 +15,16 @@ from ..store import Record
 from . import focus, picture, prediction
 from .job import Job, Measure, Measured
 
-MEASURES: Mapping[str, Measure] = {
+MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
     "picture": picture.picture,
     "prediction": prediction.prediction,
     "focus": focus.focus,
 }
-"""By the name that a study's config gives as ``measure``."""
-FLOORS: Mapping[str, Measure] = {
+FLOORS: Mapping[str, Measure] = {  # the same for images that no method made
     "picture": picture.floor,
     "prediction": prediction.floor,
     "focus": focus.floor,
 }
-"""The same for images that no method made."""
 
 
 def work(job: Job) -> list[Record]:

@@ -1,4 +1,4 @@
-"""A task with all that a worker needs to compute it."""
+"""A task with everything that a worker needs to compute it."""
 
 from __future__ import annotations
 
@@ -26,16 +26,13 @@ from ..displays import Condition, Preparation
 from ..plan import Cell, Task
 from ..store import Record, Store
 
-TARGETS_KEPT = 16
-"""Targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels."""
+TARGETS_KEPT = 16  # targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels
 
+# Dataset, its parameters as JSON, folder of the config, name of the image and its digest.
 TargetSource = tuple[str, str, Path, str, str]
-"""Dataset, its parameters as JSON, folder of the config, name of the image and its digest."""
 
-Measured = Callable[[Cell, Condition], Record]
-"""Makes the record of a cell on its display."""
-Measure = Callable[["Job"], Measured]
-"""Does for a job what all of its cells share."""
+Measured = Callable[[Cell, Condition], Record]  # makes the record of a cell on its display
+Measure = Callable[["Job"], Measured]  # does the work that all cells of a job share
 
 
 @dataclass(frozen=True)
@@ -64,7 +61,7 @@ class Setting:
 class Job:
     """A task, the cells of it that are wanted, and the setting of the run.
 
-    alone: whether nothing else of the run is at work meanwhile, so that its time can be compared.
+    alone: whether it runs without concurrent workers, so that its time can be compared.
     """
 
     task: Task
@@ -84,7 +81,7 @@ class Job:
 
     @property
     def timing(self) -> str:
-        """The name of its timing; what was measured alone serves a run with one worker, too."""
+        """The name of its timing; a job that ran alone is named as in a run with one worker."""
         workers = 1 if self.alone else max(2, self.setting.workers)  # one on a cluster may be joined by others
         return cost.key(self.task, self.setting.threads, workers, gpu_name(self.device))
 

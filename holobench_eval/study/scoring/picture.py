@@ -1,4 +1,4 @@
-"""A picture against its target: solve, show, photograph, score; and what images that no method made would score."""
+"""A picture against its target: solve, show, photograph, score; and the scores of floor images."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ from .job import Job, Measured
 from .pictures import write_capture, write_phase, write_thumbnail
 from .solution import Solution, kept, solution
 
-Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]
-"""The scores of an image ``(C, h, w)`` against the wanted one."""
+Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]  # scores of an image ``(C, h, w)`` and its target
 
 
 def picture(job: Job) -> Measured:
@@ -80,7 +79,7 @@ def captured(
 
 
 def references(job: Job, wanted: Callable[[Cell, Condition], Tensor], scored: Scored = protocol_scores) -> Measured:
-    """What images that no method made score against what a cell's image is compared with."""
+    """The scores of the floor images. wanted: gives the picture that a cell's image is compared with."""
     cells, display = job.task.cells, job.task.conditions[0]
     others = [replace(cell, **cell.params) for cell in cells if cell.params]
     target, *wrong = (wanted(cell, display) for cell in (cells[0], *others))
@@ -97,7 +96,7 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor], scored: Sc
 def _second_scores(
     bench: CalibratedBench | RealBench | LearnedBench, capture: RectifiedCapture, target: Tensor
 ) -> dict[str, float]:
-    """PSNR and SSIM of a real photograph by the geometry that another algorithm found."""
+    """PSNR and SSIM of a real photograph, aligned by a second algorithm."""
     image = bench.second_image(capture, target) if isinstance(bench, RealBench) else None
     if image is None:
         return {}
@@ -106,18 +105,18 @@ def _second_scores(
 
 
 def refuse_saturated(capture: RectifiedCapture) -> None:
-    """CellError for a capture of which too much is saturated."""
+    """CellError for a capture with too many saturated samples."""
     if capture.saturated > MOST_SATURATED:
         raise CellError(f"{capture.saturated:.2%} of the capture is saturated, more than {MOST_SATURATED:.1%}")
 
 
 def account(learned: Artifact | None) -> dict[str, Any] | None:
-    """What a record says of the training behind it."""
+    """The entries of a record about the training of its method."""
     return None if learned is None else {key: learned.provenance[key] for key in ("sha256", "captures", "seconds")}
 
 
 def keep_pictures(job: Job, cell: Cell, image: Tensor, wanted: Tensor, phase: Tensor) -> None:
-    """Write the thumbnail of an image ``(C, h, w)``, and what else the study wants to keep."""
+    """Write the thumbnail of an image ``(C, h, w)``, and its capture and phase if the study saves them."""
     setting = job.setting
     name = file_name(cell.target) + (f"-{cell.repeat}" if cell.repeat else "") + ".png"
     path = Path(file_name(job.task.label), file_name(cell.condition), name)

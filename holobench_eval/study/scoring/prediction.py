@@ -1,4 +1,4 @@
-"""What a method predicts of the capture of another method's hologram, against that capture (paper 6.1)."""
+"""The predicted capture of another method's hologram, scored against the real capture (paper 6.1)."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _shown(job: Job, cell: Cell, display: Condition) -> tuple[Tensor, RectifiedC
 def _photographed(
     hologram: _Hologram, display: Condition, folder: Path, device: torch.device
 ) -> tuple[Tensor, RectifiedCapture]:
-    """Solved and photographed once in a process."""
+    """The phase of a hologram and its capture, computed once in a process."""
     bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
     item, own = hologram.source[3], target.to(device, copy=True)
     method = plugins.build("methods", hologram.method, json.loads(hologram.params), folder)
