@@ -37,7 +37,7 @@ class Artifact:
     """A learned state and where it comes from.
 
     state: what the method's ``prepare`` returned; provenance: its description, the captures and seconds it took, the
-    sha256 of its file, and the versions it was made with.
+    sha256 of its file, and the versions of the code.
     """
 
     state: Mapping[str, Any]
@@ -55,7 +55,7 @@ class Artifacts:
         return self.folder / file_name(preparation.name)
 
     def has(self, preparation: Preparation) -> bool:
-        """Whether the artifact is there; it is checked when it is loaded."""
+        """Whether the artifact exists; ``load`` checks it."""
         return (self.folder_of(preparation) / PROVENANCE).is_file()
 
     def load(self, preparation: Preparation) -> Artifact:
@@ -83,7 +83,7 @@ class Artifacts:
         shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
 
     def remove(self, preparation: Preparation) -> None:
-        """Forget an artifact, finished or not, so that it is made again."""
+        """Delete an artifact, finished or not, so that it is trained again."""
         shutil.rmtree(self.folder_of(preparation), ignore_errors=True)
 
     def fail(self, preparation: Preparation, error: BaseException) -> str:

@@ -72,7 +72,7 @@ def load_study(path: Path | str) -> Study:
 
 
 def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A config with every method as a mapping; one without parameters may be given by its name alone."""
+    """A config with every method as a mapping; a method without parameters may be just a name."""
     methods = data.get("methods")
     if not isinstance(methods, list):
         return dict(data)

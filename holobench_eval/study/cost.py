@@ -3,7 +3,7 @@
 These are the only numbers of a table that differ from run to run. So that the same command on the same machine gives
 the same table, and a run that was killed and resumed gives the table of one that was not, the first measurement of
 every solution is kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``) ``/holobench_eval/timings/`` and later runs report it.
-``holoeval run --retime`` measures again. Where the folder cannot be written, every run reports what it measures itself.
+``holoeval run --retime`` measures again. Where the folder cannot be written, every run reports its own measurements.
 
 Linux keeps the largest resident set that a process ever had (``VmHWM`` in ``/proc/self/status``) and sets it back to
 the present one when 5 is written to ``/proc/self/clear_refs`` (proc(5)). Elsewhere memory is not measured.

@@ -31,8 +31,8 @@ class Learned:
 class DisplayGrid:
     """The displays of a study.
 
-    profiles: names of profiles or paths of profile files; in their place learned: a trained network, or bench: the file
-    of a real bench (``lab.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
+    profiles: names of profiles or paths of profile files; or learned: a trained network; or bench: the file of a
+    real bench (``lab.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
     exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures). session:
     the folder that stands for the display, when photographs are exchanged as files.
     """

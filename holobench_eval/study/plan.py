@@ -105,7 +105,7 @@ class Task:
 
     @property
     def is_floor(self) -> bool:
-        """Whether the cells are references that no method made."""
+        """Whether the cells are floor cells, which have no method."""
         return self.cells[0].condition == REFERENCE
 
 

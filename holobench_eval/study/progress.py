@@ -88,7 +88,7 @@ class Bar:
         self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
 
     def training(self, names: list[tuple[str, Path]]) -> None:
-        """Show what is trained, and follow its log."""
+        """Show the number of trainings, and follow their logs."""
         self.progress.update(self.bar, total=self.missing + len(names), description="training")
         self.follower.start(names, lambda line: self.progress.update(self.bar, description=escape(line)))
 
@@ -130,12 +130,12 @@ class Lines:
         self.last = self.clock()
 
     def planned(self, cells: int, missing: int) -> None:
-        """Say what there is to do."""
+        """Write the number of cells to compute."""
         self.total = missing
         self.write(f"{missing} of {cells} cells to compute")
 
     def training(self, names: list[tuple[str, Path]]) -> None:
-        """Say what is trained, and follow its log."""
+        """Name the trainings, and follow their logs."""
         self.write(f"{len(names)} to train: {', '.join(name for name, _ in names)}")
         self.follower.start(names, self.write)
 

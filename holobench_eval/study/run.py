@@ -56,7 +56,7 @@ class Watch(Protocol):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run leaves: a record for every planned cell (``Store.load``), its provenance, and what it computed."""
+    """A record for every planned cell (``Store.load``), the run's provenance, and the number of computed cells."""
 
     records: list[dict[str, Any]]
     provenance: dict[str, Any]
@@ -83,7 +83,7 @@ def run(
 ) -> Outcome:
     """Train what is not trained, compute the missing cells of a plan and write their records.
 
-    An interrupt passes through; every record written before it stays, and the next run goes on from there.
+    An interrupt passes through; earlier records stay, and the next run resumes.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def run(
     retime
         Measure wall times again, see ``cost``.
     retrain
-        Train again, and compute again what depends on it.
+        Train again, and compute the dependent cells again.
     device
         Name of where every worker computes, see ``device.find``.
 

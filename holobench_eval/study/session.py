@@ -55,8 +55,8 @@ def export(
 ) -> Advance:
     """Make a session folder for a study and write its first round of patterns.
 
-    bench: file of the real bench; without it ``display``, one of the study's profiles, says the nominal optics (not
-    needed where the study has one) and the panel's levels have the default convention.
+    bench: file of the real bench; without it ``display``, one of the study's profiles, gives the nominal optics
+    (optional if the study has a single profile), and the panel's levels have the default convention.
     UserError: the folder is not empty, or the study cannot be shown on one real display.
     """
     if folder.exists() and any(folder.iterdir()):

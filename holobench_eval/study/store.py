@@ -24,12 +24,12 @@ ADDED = frozenset({"alone", "memory_mib", "stopped"})  # entries that records of
 
 @dataclass(frozen=True)
 class Record:
-    """What was measured in a cell.
+    """The measurement of a cell.
 
     cell: its description; state: ``done``, or why there is no score in ``reason``; scores: flat metric names
-    to numbers; captures: camera captures the method used; seconds: wall time of the solution; alone: whether
-    nothing else of the run was at work meanwhile (None: not known); memory_mib: the most resident memory that the
-    solution took beyond what was there before it [MiB]; label: the method's name in tables;
+    to numbers; captures: camera captures the method used; seconds: wall time of the solution; alone: whether it
+    was timed without concurrent workers (None: unknown); memory_mib: peak of resident memory above the level before the
+    solution [MiB]; label: the method's name in tables;
     registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
     saturated samples; learned: sha256, captures and seconds of the training that the method needed first; stopped: why
     the display ended the solution, whose best hologram so far was scored (empty: it did not). None: does not apply, as
@@ -126,10 +126,10 @@ class Store:
 
     def states(self, cells: tuple[Cell, ...], timed: frozenset[str] = frozenset()) -> dict[str, State]:
         """State of every cell's record, by the cell's id; those of ``timed`` that were not timed alone are missing."""
-        there = {path.stem for path in self.folder.glob("*.json")}  # faster than trying to open each missing file
+        recorded = {path.stem for path in self.folder.glob("*.json")}  # faster than trying to open each missing file
 
         def state(cell: Cell) -> State:
-            record = self.read(cell.id) if cell.id in there else None
+            record = self.read(cell.id) if cell.id in recorded else None
             untimed = cell.id in timed and record is not None and record.state == "done" and not record.alone
             return "missing" if record is None or untimed else record.state
 

@@ -52,9 +52,10 @@ ELSEWHERE = ("slurm", "address")  # their workers are on other machines and know
 def executor(name: str, workers: int | None, small: bool = True, address: str | None = None, gpus: int = 0) -> Executor:
     """The executor of a name; ``workers`` defaults to the number of GPUs to compute on, or of cores without a GPU.
 
-    "auto" is local where the study's panel is small and there is more than one worker to have, else serial: a small
-    panel does not keep several threads busy, a large one fills the memory. With GPUs it is local where there are
-    several. address: of a running Dask scheduler; gpus: to compute on; for workers elsewhere, 1 if each has one.
+    "auto" is local if the study's panel is small and several workers are available, else serial: a small panel does
+    not keep several threads busy, a large panel fills the memory. With GPUs, "auto" is local
+    if there are several. address: of a running Dask scheduler; gpus: to compute on; for workers elsewhere, 1 if each
+    has one.
     """
     if name not in NAMES:
         raise UserError(f"unknown executor '{name}'; {suggest(name, NAMES)}")

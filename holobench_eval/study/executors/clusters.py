@@ -44,7 +44,7 @@ SETTINGS = {
 class Local:
     """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try.
 
-    gpus: to compute on, shared out among the workers: where there are several, each worker sees one of them.
+    gpus: to compute on; of several, each worker sees only its own.
     """
 
     workers: int

@@ -54,7 +54,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Folders:
-    """What there is to score.
+    """The pictures to score.
 
     targets: by name; captures: by method and name of the target; notes: sentences that a reader of the scores needs.
     """

@@ -1,4 +1,4 @@
-"""Alignments, scores and pictures of given captures: what ``holoeval score`` computes and keeps."""
+"""The alignments, scores and pictures that ``holoeval score`` computes from captures and keeps."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from .files import Folders, Picture, Values
 CONDITION = "photographed display"
 
 Key = tuple[str, str]  # method and name of the target
-Alignments = dict[Key, Alignment | str]  # or the reasons why there are none
+Alignments = dict[Key, Alignment | str]  # or the reason of a refusal
 Step = Callable[[str], None]  # called with the name of each step
 Draw = Callable[[Path, Values, Warp, Values, Values], None]  # file, capture, warp, matched capture, target
 
@@ -61,7 +61,7 @@ def described(folders: Folders, values: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Scoring:
-    """Given captures, and how they are scored.
+    """Captures from folders, and how they are scored.
 
     store: of records, alignments and pictures; values: how files are read, ``stored`` (as they are), ``srgb``, or
     ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values.
@@ -75,7 +75,7 @@ class Scoring:
 
     @property
     def domain(self) -> str:
-        """In which PSNR and SSIM are given."""
+        """The domain of PSNR and SSIM in the scores' names."""
         return "stored" if self.values == "stored" else "linear"
 
     @cached_property

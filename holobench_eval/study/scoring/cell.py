@@ -20,7 +20,7 @@ MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
     "prediction": prediction.prediction,
     "focus": focus.focus,
 }
-FLOORS: Mapping[str, Measure] = {  # the same for images that no method made
+FLOORS: Mapping[str, Measure] = {  # the same for floor images
     "picture": picture.floor,
     "prediction": prediction.floor,
     "focus": focus.floor,

@@ -38,12 +38,12 @@ def focus(job: Job) -> Measured:
 
 
 def floor(job: Job) -> Measured:
-    """What images that no display made score on the task's target."""
+    """The scores of floor images on the task's target."""
     return references(job, job.target, scored)
 
 
 def scored(job: Job, cell: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
-    """The scores of the whole picture, and those of what is in focus."""
+    """The scores of the full picture, and of its part in focus."""
     dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
     mask = dataset.mask(cell.target, tuple(wanted.shape[-2:]))
     return protocol_scores(job, cell, image, wanted) | in_focus(image, wanted, mask)

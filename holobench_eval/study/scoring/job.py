@@ -37,7 +37,7 @@ Measure = Callable[["Job"], Measured]  # does the work that all cells of a job s
 
 @dataclass(frozen=True)
 class Setting:
-    """What a worker needs to know of a run besides its task.
+    """The settings of a run that a worker needs besides its task.
 
     output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
     what trained methods learned; metrics: names of those to compute (None: all); threads: torch threads of a worker;
@@ -102,7 +102,7 @@ class Job:
         return plugins.build("methods", name, dict(params), self.setting.folder)
 
     def learned(self, preparation: Preparation | None) -> Artifact | None:
-        """What a method learned; None if it had nothing to learn. CellError when its training failed."""
+        """A method's learned state; None if it has nothing to learn. CellError when its training failed."""
         if preparation is None:
             return None
         artifacts = Artifacts(self.setting.artifacts)

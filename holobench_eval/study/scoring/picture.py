@@ -42,7 +42,7 @@ def picture(job: Job) -> Measured:
 
 
 def floor(job: Job) -> Measured:
-    """What images that no display made score on the task's target."""
+    """The scores of floor images on the task's target."""
     return references(job, job.target)
 
 

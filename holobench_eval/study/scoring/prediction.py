@@ -74,7 +74,7 @@ def prediction(job: Job) -> Measured:
 
 
 def floor(job: Job) -> Measured:
-    """What images that no display made score on the capture that is to be predicted."""
+    """The scores of floor images on the capture that methods predict."""
 
     def wanted(cell: Cell, display: Condition) -> Tensor:
         return match(_shown(job, cell, display)[1].image, job.target(cell, display))[0]

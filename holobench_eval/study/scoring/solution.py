@@ -85,7 +85,7 @@ def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[A
 
 
 def kept(job: Job, make: Callable[[], Solution]) -> Solution:
-    """The solution of a task, made once; kept in the output folder by the name of the task's first cell."""
+    """The solution of a task, computed once and kept in the output folder under the id of the task's first cell."""
     path = job.setting.output / FOLDER / f"{job.task.cells[0].id}.pt"
     if path.is_file():
         content = read_tensors(path)
