@@ -96,7 +96,7 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
         count = Counter(states[cell.id] for cell in cells)
         unsolved = [task for task in tasks if any(states[cell.id] == "missing" for cell in task.cells)]
         keys = [cost.key(task, threads, workers, gpu) for task in tasks if not task.is_floor]
-        seconds = [earlier.seconds for key in keys if key in timed and (earlier := cost.known(key)) is not None]
+        seconds = [earlier.seconds for key in keys if key in timed and (earlier := cost.recorded(key)) is not None]
         limit = limits.get(label)
         rows.append(
             Row(
@@ -136,7 +136,7 @@ def table(study: Study, rows: list[Row]) -> Table:
 
 def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
     """A row for every artifact that a plan needs; no artifact is loaded."""
-    from ..study.artifacts import FAILURE, UNFINISHED, known, progress
+    from ..study.artifacts import FAILURE, UNFINISHED, progress, provenance_of
 
     rows = []
     for identity, preparation in plan.preparations().items():
@@ -147,9 +147,9 @@ def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
             for display in task.conditions
             if display.learned and display.learned.id == identity
         }
-        folder, reason = artifacts.place(preparation), ""
+        folder, reason = artifacts.folder_of(preparation), ""
         if artifacts.has(preparation):
-            state, facts = "done", known(folder) or {}
+            state, facts = "done", provenance_of(folder) or {}
             captures, seconds = (float(facts.get(key, math.nan)) for key in ("captures", "seconds"))
         else:
             state = "unfinished" if (folder / UNFINISHED).is_dir() else "missing"

@@ -1,4 +1,4 @@
-"""What trained methods learned, kept in a folder each and shared by studies; made once, checked before it is used."""
+"""Learned states of trained methods: a folder each, shared by studies, made once and checked before use."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from .displays import Preparation
 
 STATE, PROVENANCE, LOG, FAILURE = "learned.pt", "provenance.json", "training.csv", "failure.log"
 UNFINISHED = "unfinished"
+# Folder beside a report with the log (``<name>.csv``) and the provenance (``<name>.json``) of everything that its study
+# had to learn. Both are small enough to be committed; a report does not need the tensors.
 RECORDS = "training"
-"""Folder beside a report with the log and the provenance of everything that its study had to learn: ``<name>.csv`` and
-``<name>.json``, small enough to be committed. A report does not need the tensors."""
 FORMAT = 1
 
 
@@ -37,7 +37,7 @@ class Artifact:
     """A learned state and where it comes from.
 
     state: what the method's ``prepare`` returned; provenance: its description, the captures and seconds it took, the
-    sha256 of its file, and the versions it was made with.
+    sha256 of its file, and the versions of the code.
     """
 
     state: Mapping[str, Any]
@@ -50,86 +50,86 @@ class Artifacts:
 
     folder: Path
 
-    def place(self, needed: Preparation) -> Path:
+    def folder_of(self, preparation: Preparation) -> Path:
         """The artifact's folder."""
-        return self.folder / file_name(needed.name)
+        return self.folder / file_name(preparation.name)
 
-    def has(self, needed: Preparation) -> bool:
-        """Whether the artifact is there; it is checked when it is loaded."""
-        return (self.place(needed) / PROVENANCE).is_file()
+    def has(self, preparation: Preparation) -> bool:
+        """Whether the artifact exists; ``load`` checks it."""
+        return (self.folder_of(preparation) / PROVENANCE).is_file()
 
-    def load(self, needed: Preparation) -> Artifact:
+    def load(self, preparation: Preparation) -> Artifact:
         """The artifact, once for a process. UserError: damaged, foreign, or made for something else."""
-        place = self.place(needed)
+        folder = self.folder_of(preparation)
         try:
-            stamp = (place / STATE).stat().st_mtime_ns
-            described = (place / PROVENANCE).read_bytes()
+            stamp = (folder / STATE).stat().st_mtime_ns
+            described = (folder / PROVENANCE).read_bytes()
         except OSError:
-            raise UserError(f"{place}: {STATE} or {PROVENANCE} is missing; delete the folder and run again") from None
-        artifact = _loaded(place, stamp, described)
-        check_matches(place, artifact.provenance, needed)
+            raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; delete the folder and run again") from None
+        artifact = _loaded(folder, stamp, described)
+        check_matches(folder, artifact.provenance, preparation)
         return artifact
 
-    def write(self, needed: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
-        """Keep a learned state; facts: what else its provenance should say. What the training left behind goes."""
-        place, buffer = self.place(needed), io.BytesIO()
+    def write(self, preparation: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
+        """Keep a learned state; facts: further entries of its provenance. The unfinished training is removed."""
+        folder, buffer = self.folder_of(preparation), io.BytesIO()
         torch.save({"format": FORMAT, "state": dict(state)}, buffer)
         content = buffer.getvalue()
-        write_atomically(place / STATE, content)
+        write_atomically(folder / STATE, content)
         sha256 = hashlib.sha256(content).hexdigest()
-        described = {"format": FORMAT, "sha256": sha256, "description": needed.description(), **facts}
-        write_atomically(place / PROVENANCE, f"{json.dumps(described, indent=1)}\n".encode())
-        (place / FAILURE).unlink(missing_ok=True)
-        shutil.rmtree(place / UNFINISHED, ignore_errors=True)
+        described = {"format": FORMAT, "sha256": sha256, "description": preparation.description(), **facts}
+        write_atomically(folder / PROVENANCE, f"{json.dumps(described, indent=1)}\n".encode())
+        (folder / FAILURE).unlink(missing_ok=True)
+        shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
 
-    def remove(self, needed: Preparation) -> None:
-        """Forget an artifact, finished or not, so that it is made again."""
-        shutil.rmtree(self.place(needed), ignore_errors=True)
+    def remove(self, preparation: Preparation) -> None:
+        """Delete an artifact, finished or not, so that it is trained again."""
+        shutil.rmtree(self.folder_of(preparation), ignore_errors=True)
 
-    def fail(self, needed: Preparation, error: BaseException) -> str:
-        """Note why an artifact could not be made, with the traceback; the reason in one line."""
+    def fail(self, preparation: Preparation, error: BaseException) -> str:
+        """Write down the traceback of a failed training and return the reason in one line."""
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         trace = "".join(traceback.format_exception(error))
-        write_atomically(self.place(needed) / FAILURE, f"{reason}\n\n{trace}".encode())
+        write_atomically(self.folder_of(preparation) / FAILURE, f"{reason}\n\n{trace}".encode())
         return reason
 
-    def has_failed(self, needed: Preparation) -> bool:
+    def has_failed(self, preparation: Preparation) -> bool:
         """Whether the last attempt to make the artifact failed."""
-        return (self.place(needed) / FAILURE).is_file()
+        return (self.folder_of(preparation) / FAILURE).is_file()
 
-    def forget_failure(self, needed: Preparation) -> None:
-        """Training goes on after all."""
-        (self.place(needed) / FAILURE).unlink(missing_ok=True)
+    def forget_failure(self, preparation: Preparation) -> None:
+        """Remove the note of a failure: the training goes on."""
+        (self.folder_of(preparation) / FAILURE).unlink(missing_ok=True)
 
-    def failure(self, needed: Preparation) -> str:
-        """Why an artifact is not there, in one line."""
+    def failure(self, preparation: Preparation) -> str:
+        """The reason why an artifact is missing, in one line."""
         try:
-            lines = (self.place(needed) / FAILURE).read_text(encoding="utf-8").splitlines()
+            lines = (self.folder_of(preparation) / FAILURE).read_text(encoding="utf-8").splitlines()
         except OSError:
             return "it was not tried"
         return lines[0] if lines else "no reason was kept"
 
     @contextmanager
-    def locked(self, needed: Preparation) -> Iterator[None]:
-        """Keep others from making the same artifact; they wait. The lock dies with its process."""
-        place = self.place(needed)
-        place.mkdir(parents=True, exist_ok=True)
-        with (place / ".lock").open("w") as lock:
+    def locked(self, preparation: Preparation) -> Iterator[None]:
+        """Let other processes that want to make the same artifact wait. The lock dies with its process."""
+        folder = self.folder_of(preparation)
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / ".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            for left in place.rglob(f"{TEMPORARY}*"):
+            for left in folder.rglob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
 
-    def memory(self, needed: Preparation) -> FolderMemory:
+    def memory(self, preparation: Preparation) -> FolderMemory:
         """Where an unfinished training is kept."""
-        return FolderMemory(self.place(needed))
+        return FolderMemory(self.folder_of(preparation))
 
 
 @dataclass(frozen=True)
 class FolderMemory:
-    """Values of an unfinished training, a file each, and its log."""
+    """Values of an unfinished training, a file each, and its log. folder: the artifact's."""
 
-    place: Path
+    folder: Path
 
     def load(self, name: str) -> dict[str, Any] | None:
         """The value of a name; None if there is none. UserError for a damaged file."""
@@ -137,45 +137,45 @@ class FolderMemory:
         return None if not path.exists() else read_tensors(path)
 
     def save(self, name: str, value: dict[str, Any]) -> None:
-        """Keep a value, whole or not at all."""
+        """Write a value; an interrupted write leaves the earlier file."""
         buffer = io.BytesIO()
         torch.save(value, buffer)
         write_atomically(self._path(name), buffer.getvalue())
 
     def log(self, row: Mapping[str, float | int | str]) -> None:
-        """Add to ``training.csv``, in the order of round and step; what is said of one of these twice is merged."""
+        """Add a row to ``training.csv``, ordered by round and step; rows of the same round and step are merged."""
         new = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in row.items()}
-        place, rows = _place(row), self.rows()
-        known = next((old for old in rows if place and _place(old) == place), None)
-        if known is None:
+        position, rows = _round_and_step(row), self.rows()
+        earlier = next((old for old in rows if position and _round_and_step(old) == position), None)
+        if earlier is None:
             rows.append(new)
         else:
-            known |= new
-        if all(one.get(name, "").isdigit() for one in rows for name in ("round", "step")):
-            rows.sort(key=lambda one: (int(one["round"]), int(one["step"])))
+            earlier |= new
+        if all(entry.get(name, "").isdigit() for entry in rows for name in ("round", "step")):
+            rows.sort(key=lambda entry: (int(entry["round"]), int(entry["step"])))
         text = io.StringIO()
-        writer = csv.DictWriter(text, list(dict.fromkeys(key for one in rows for key in one)), lineterminator="\n")
+        writer = csv.DictWriter(text, list(dict.fromkeys(key for entry in rows for key in entry)), lineterminator="\n")
         writer.writeheader()
-        writer.writerows([{key: value or "" for key, value in one.items()} for one in rows])
-        write_atomically(self.place / LOG, text.getvalue().encode())
+        writer.writerows([{key: value or "" for key, value in entry.items()} for entry in rows])
+        write_atomically(self.folder / LOG, text.getvalue().encode())
 
     def rows(self) -> list[dict[str, str]]:
         """The log so far."""
-        return read_log(self.place)
+        return read_log(self.folder)
 
     def _path(self, name: str) -> Path:
-        return self.place / UNFINISHED / f"{file_name(name)}.pt"
+        return self.folder / UNFINISHED / f"{file_name(name)}.pt"
 
 
-def _place(row: Mapping[str, Any]) -> dict[str, str]:
+def _round_and_step(row: Mapping[str, Any]) -> dict[str, str]:
     """Round and step of a row, as far as it has them."""
     return {name: str(row[name]) for name in ("round", "step") if row.get(name) not in (None, "")}
 
 
-def read_log(place: Path) -> list[dict[str, str]]:
+def read_log(folder: Path) -> list[dict[str, str]]:
     """The rows of an artifact's ``training.csv``, empty if there is none."""
     try:
-        with (place / LOG).open(encoding="utf-8", newline="") as file:
+        with (folder / LOG).open(encoding="utf-8", newline="") as file:
             return list(csv.DictReader(file))
     except FileNotFoundError:
         return []
@@ -196,21 +196,21 @@ def read_tensors(path: Path) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def _loaded(place: Path, _stamp: int, described: bytes) -> Artifact:
-    provenance = _provenance(place / PROVENANCE, described)
-    content = read_tensors(place / STATE)
-    found = hashlib.sha256((place / STATE).read_bytes()).hexdigest()
-    if found != provenance["sha256"]:
+def _loaded(folder: Path, _stamp: int, described: bytes) -> Artifact:
+    provenance = _provenance(folder / PROVENANCE, described)
+    content = read_tensors(folder / STATE)
+    sha256 = hashlib.sha256((folder / STATE).read_bytes()).hexdigest()
+    if sha256 != provenance["sha256"]:
         raise UserError(
-            f"{place / STATE}: is not the file that {PROVENANCE} describes; delete the folder and run again"
+            f"{folder / STATE}: is not the file that {PROVENANCE} describes; delete the folder and run again"
         )
     if content.get("format") != FORMAT or not isinstance(content.get("state"), dict):
-        raise UserError(f"{place / STATE}: of another version; delete the folder and run again")
+        raise UserError(f"{folder / STATE}: of another version; delete the folder and run again")
     return Artifact(content["state"], provenance)
 
 
 def _provenance(path: Path, text: bytes) -> dict[str, Any]:
-    """A provenance that has all that is asked of one. UserError says what is wrong."""
+    """A provenance with every required entry. UserError names what is missing or invalid."""
     try:
         content = json.loads(text)
     except (ValueError, RecursionError):
@@ -225,13 +225,13 @@ def _provenance(path: Path, text: bytes) -> dict[str, Any]:
     return content
 
 
-def check_matches(place: Path, provenance: Mapping[str, Any], needed: Preparation) -> None:
-    """Refuse a network of another panel, wavelength, profile version, method or setting; UserError names the first."""
-    made, wanted = provenance["description"], needed.description()
+def check_matches(folder: Path, provenance: Mapping[str, Any], preparation: Preparation) -> None:
+    """UserError for a state trained for another description; it names the first entry that differs."""
+    trained, wanted = provenance["description"], preparation.description()
     for key in wanted:
-        if made.get(key) != wanted[key]:
+        if trained.get(key) != wanted[key]:
             raise UserError(
-                f"{place}: trained for {key.replace('_', ' ')} {_short(made.get(key))}, this study needs "
+                f"{folder}: trained for {key.replace('_', ' ')} {_short(trained.get(key))}, this study needs "
                 f"{_short(wanted[key])}; delete it, or give --retrain"
             )
 
@@ -270,30 +270,30 @@ class TrainingRecord:
         return digest(self.provenance["description"])
 
 
-def known(place: Path) -> dict[str, Any] | None:
-    """An artifact's provenance without its tensors; None where there is none that can be read."""
+def provenance_of(folder: Path) -> dict[str, Any] | None:
+    """An artifact's provenance, read without its tensors; None where it is missing or unreadable."""
     try:
-        content = json.loads((place / PROVENANCE).read_text(encoding="utf-8"))
+        content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return content if isinstance(content, dict) and isinstance(content.get("description"), dict) else None
 
 
 def training_records(output: Path) -> dict[str, TrainingRecord]:
-    """The trainings beside a report by the id of what was to be learned; a file that is none is passed over."""
-    found = []
+    """The trainings beside a report, by ``Preparation.id``; files that are no provenance are skipped."""
+    records = []
     for path in sorted((output / RECORDS).glob("*.json")):
         try:
             provenance = json.loads(path.read_text(encoding="utf-8"))
         except ValueError:
             continue
         if isinstance(provenance, dict) and isinstance(provenance.get("description"), dict):
-            found.append(TrainingRecord(provenance, rounds_of(path.with_suffix(".csv"))))
-    return {one.id: one for one in found}
+            records.append(TrainingRecord(provenance, rounds_of(path.with_suffix(".csv"))))
+    return {record.id: record for record in records}
 
 
 def rounds_of(log: Path) -> tuple[Round, ...]:
-    """The rounds in a log, which may have other columns or none of these: then there are no rounds."""
+    """The rounds in a log; none where the log lacks these columns."""
     try:
         with log.open(encoding="utf-8", newline="") as file:
             return rounds_in(csv.DictReader(file))
@@ -302,7 +302,7 @@ def rounds_of(log: Path) -> tuple[Round, ...]:
 
 
 def rounds_in(rows: Iterable[Mapping[str | Any, Any]]) -> tuple[Round, ...]:
-    """The rounds in the rows of a log: of each round the last figure of every kind."""
+    """The rounds in the rows of a log, each with the last finite figure of every column."""
     rounds: dict[int, dict[str, float]] = {}
     for row in rows:
         number = _number(row.get("round"))
@@ -313,10 +313,10 @@ def rounds_in(rows: Iterable[Mapping[str | Any, Any]]) -> tuple[Round, ...]:
     return tuple(
         Round(
             number,
-            *(found.get(name, math.nan) for name in ("captures", "seconds")),
-            *(found.get(f"{name}_psnr", math.nan) for name in ("predicted", "captured", "fidelity")),
+            *(logged.get(name, math.nan) for name in ("captures", "seconds")),
+            *(logged.get(f"{name}_psnr", math.nan) for name in ("predicted", "captured", "fidelity")),
         )
-        for number, found in sorted(rounds.items())
+        for number, logged in sorted(rounds.items())
     )
 
 
@@ -327,7 +327,7 @@ def _number(value: Any) -> float:
         return math.nan
 
 
-def progress(place: Path) -> tuple[float, float]:
-    """Captures and seconds of an unfinished training by the last row of its log; NaN where it has none."""
-    rows = rounds_in(read_log(place))
+def progress(folder: Path) -> tuple[float, float]:
+    """Captures and seconds of an unfinished training, by the last round in its log; NaN where there is none."""
+    rows = rounds_in(read_log(folder))
     return (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)

@@ -1,6 +1,6 @@
 """Read a study from ``configs/*.yaml`` and check all of it before anything runs.
 
-Every mistake in a config is one line that starts with its place, ``configs/table3.yaml:12:5: ...``.
+Every mistake in a config is reported in one line that starts with its position, ``configs/table3.yaml:12:5: ...``.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def load_study(path: Path | str) -> Study:
 
 
 def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A config with every method as a mapping; one without parameters may be given by its name alone."""
+    """A config with every method as a mapping; a method without parameters may be just a name."""
     methods = data.get("methods")
     if not isinstance(methods, list):
         return dict(data)
@@ -138,10 +138,10 @@ def _bench(study: Study, document: Document) -> DisplayGrid:
 
 
 def _protocol(study: Study, document: Document) -> Protocol:
-    given = study.protocol.lpips_weights
-    if given is None:
+    path = study.protocol.lpips_weights
+    if path is None:
         return study.protocol
-    weights = (study.folder / Path(given).expanduser()).resolve()
+    weights = (study.folder / Path(path).expanduser()).resolve()
     where: Keys = ("protocol", "lpips_weights")
     with placed(document, where, where):
         if not (find_weights("alex", weights) or find_weights("vgg", weights)):
@@ -158,8 +158,8 @@ def _check_profiles(study: Study, document: Document) -> None:
         where = ("display", "bench") if bench else where
         with placed(document, where, where):
             read = real_condition(bench, study.folder) if bench else None
-            place = read or condition(profile, study.display.panel, study.folder)
-        name, region = place.name, place.spec.region.shape
+            display = read or condition(profile, study.display.panel, study.folder)
+        name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
             raise document.error(("display", "panel"), f"{message}; registration needs at least {SMALLEST_REGION}")
@@ -206,7 +206,7 @@ def _check_labels(study: Study, document: Document) -> None:
 
 
 def _check_twins(study: Study, document: Document) -> None:
-    """Two labels for one and the same cell would be one measurement printed as two."""
+    """Refuse two labels for the same cell: a measurement would be printed twice."""
     for index, entry in enumerate(study.methods):
         for other in study.methods[:index]:
             same = (entry.name, entry.params, entry.captures) == (other.name, other.params, other.captures)
@@ -216,7 +216,7 @@ def _check_twins(study: Study, document: Document) -> None:
 
 
 def sweep_of(study: Study, document: Document, index: int) -> Sweep:
-    """A sweep of a config, its values and displays checked. UserError with the place of what is wrong."""
+    """A sweep of a config, its values and displays checked. UserError with ``file:line:column`` of a fault."""
     sweep, where = study.sweeps[index], ("sweeps", index)
     if study.display.learned or study.display.real or study.measure != "picture":
         raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
@@ -228,25 +228,25 @@ def sweep_of(study: Study, document: Document, index: int) -> Sweep:
     countable = KINDS[sweep.condition].counted
     if bool(sweep.values) == (sweep.count is not None) or (sweep.count is not None and not countable):
         raise document.error(where, "a sweep has values; one of siblings or draws may have a count in their place")
-    given = sweep.values or tuple(str(number) for number in range(1, (sweep.count or 0) + 1))
+    raw_values = sweep.values or tuple(str(number) for number in range(1, (sweep.count or 0) + 1))
     profiles = subset(study, document, sweep.profiles, (*where, "profiles"))
     same = [other for other in study.sweeps[:index] if other.condition == sweep.condition]
     values = [value for other in same if set(other.profiles) & set(profiles) for value in other.values]
-    known = len(values)
+    earlier_count = len(values)
     loaded = [load_profile(profile, folder=study.folder) for profile in profiles]
-    for number, value in enumerate(given):
-        place: Keys = (*where, "values", number) if sweep.values else (*where, "count")
-        with placed(document, place, place):
+    for number, value in enumerate(raw_values):
+        value_keys: Keys = (*where, "values", number) if sweep.values else (*where, "count")
+        with placed(document, value_keys, value_keys):
             values.append(checked(sweep.condition, value))
             for profile in loaded:
                 altered(profile, sweep.condition, values[-1])
         if values[-1] in values[:-1]:
-            raise document.error(place, f"{sweep.condition} {value} is listed twice")
-    return replace(sweep, values=tuple(values[known:]), count=None, profiles=profiles)
+            raise document.error(value_keys, f"{sweep.condition} {value} is listed twice")
+    return replace(sweep, values=tuple(values[earlier_count:]), count=None, profiles=profiles)
 
 
 def subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:
-    """The named displays of the study, in its order; all for none."""
+    """The named displays in the study's order; all displays if none is named."""
     for number, profile in enumerate(named):
         if profile not in study.display.sources:
             message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
@@ -255,18 +255,18 @@ def subset(study: Study, document: Document, named: tuple[str, ...], where: Keys
 
 
 def check_metrics(study: Study, document: Document) -> None:
-    """Refuse unknown metrics, a headline that is of none of them, and one that needs a larger window.
+    """Refuse unknown metrics, a headline that no metric computes, and a headline that needs a larger window.
 
-    Weights that are missing here are no fault of the study: see ``study.available``.
+    Missing weights are no fault of the config; ``run.refuse_unscored`` reports them.
     """
-    wanted, known = study.protocol.metrics, {metric.name: metric for metric in catalogue()}
+    wanted, metrics = study.protocol.metrics, {metric.name: metric for metric in catalogue()}
     for index, name in enumerate(wanted or ()):
-        if name not in (*known, "speckle_contrast"):
-            message = f"unknown metric '{name}'; {suggest(name, [*known, 'speckle_contrast'])}"
+        if name not in (*metrics, "speckle_contrast"):
+            message = f"unknown metric '{name}'; {suggest(name, [*metrics, 'speckle_contrast'])}"
             raise document.error(("protocol", "metrics", index), message)
     if study.measure == "focus" and study.headline in SCORES:
         return
-    columns = {column: metric for metric in known.values() for column in metric.columns}
+    columns = {column: metric for metric in metrics.values() for column in metric.columns}
     if study.headline not in columns:
         choice = [*columns, *(SCORES if study.measure == "focus" else ())]
         raise document.error(("headline",), f"unknown metric '{study.headline}'; {suggest(study.headline, choice)}")
@@ -278,8 +278,8 @@ def check_metrics(study: Study, document: Document) -> None:
 
 
 def _check_window(metric: Metric, study: Study, document: Document) -> None:
-    for place in displays(study).values() if metric.smallest > SMALLEST_REGION else ():
-        height, width = place.spec.region.shape
+    for display in displays(study).values() if metric.smallest > SMALLEST_REGION else ():
+        height, width = display.spec.region.shape
         if min(height, width) < metric.smallest:
-            message = f"'{place.name}' scores {height} x {width} pixels; {metric.name} needs {metric.smallest} a side"
+            message = f"'{display.name}' scores {height} x {width} pixels; {metric.name} needs {metric.smallest} a side"
             raise document.error(("headline",), message)

@@ -1,13 +1,13 @@
-"""What a solution takes of the machine: wall time, and the most memory beyond what was there before it.
+"""The cost of a solution: wall time, and the peak of memory above the level before it.
 
 These are the only numbers of a table that differ from run to run. So that the same command on the same machine gives
 the same table, and a run that was killed and resumed gives the table of one that was not, the first measurement of
 every solution is kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``) ``/holobench_eval/timings/`` and later runs report it.
-``holoeval run --retime`` measures again. Where the folder cannot be written, every run reports what it measures itself.
+``holoeval run --retime`` measures again. Where the folder cannot be written, every run reports its own measurements.
 
 Linux keeps the largest resident set that a process ever had (``VmHWM`` in ``/proc/self/status``) and sets it back to
 the present one when 5 is written to ``/proc/self/clear_refs`` (proc(5)). Elsewhere memory is not measured.
-On a GPU it is the GPU's memory that counts, of torch's tensors, and the clock waits for the work that is under way.
+On a GPU the memory is that of torch's tensors on it, and the clock waits until the queued work is done.
 """
 
 from __future__ import annotations
@@ -48,15 +48,17 @@ class Cost:
 
 @dataclass(frozen=True)
 class Stopwatch:
-    """Started by ``start()``, read by ``stop()``: memory (resident [KiB], of a GPU [bytes]; None: not measured) and
-    clock at the start."""
+    """Started by ``start()``, read by ``stop()``.
+
+    before: memory at the start, resident [KiB] or of a GPU [bytes] (None: not measured); clock: time at the start [s].
+    """
 
     before: int | None
     clock: float
     device: torch.device = CPU
 
     def stop(self) -> Cost:
-        """The effort since the start."""
+        """The cost since the start."""
         if self.device.type == "cuda" and self.before is not None:
             torch.cuda.synchronize(self.device)
             seconds = time.perf_counter() - self.clock
@@ -68,10 +70,9 @@ class Stopwatch:
 
 
 def start(device: torch.device = CPU) -> Stopwatch:
-    """Set the peak of memory back and start the clock. device: where the solution is computed.
+    """Reset the peak of memory and start the clock. device: where the solution is computed.
 
-    What earlier solutions left behind is given back to the system first: memory that an allocator holds in reserve
-    would be used again without any growth to be seen.
+    Trim the allocator first, so that reused memory shows as growth.
     """
     _collect()
     _give_back()
@@ -84,9 +85,9 @@ def start(device: torch.device = CPU) -> Stopwatch:
 
 
 def _collect() -> None:
-    """Collect garbage; what was there before the first solution, libraries above all, is looked through only once.
+    """Collect garbage, and freeze the objects that exist before the first solution, most of them of libraries.
 
-    To walk through all of it again takes 0.15 s, longer than some methods need to solve a target.
+    Scanning them again would take 0.15 s, longer than some methods need to solve a target.
     """
     gc.collect()
     _freeze()
@@ -130,7 +131,7 @@ def folder() -> Path:
 
 @cache
 def cpu_model() -> str:
-    """The processor's name, as far as the system tells it."""
+    """The processor's name, or its architecture where the system gives no name."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -141,14 +142,15 @@ def cpu_model() -> str:
 
 @cache
 def _torch() -> str:
-    """Its version, read from its metadata once: that takes longer than all the rest of a name."""
+    """The version of torch, cached: reading its metadata takes longer than the rest of ``key``."""
     return version("torch")
 
 
 def timed(study: Study, plan: Plan) -> frozenset[str]:
-    """Cells of the solutions that a study with ``timing: alone`` measures with nothing beside them; none for another.
+    """Cells of the solutions that a study with ``timing: alone`` times without concurrent workers; else none.
 
-    Of every row of the tables it is the last of the first repeat: a method's first solution also loads libraries.
+    Each row of the tables is timed on the last target of the first repeat: a method's first solution also loads
+    libraries.
     """
     if study.timing == "shared":
         return frozenset()
@@ -164,12 +166,17 @@ def timed(study: Study, plan: Plan) -> frozenset[str]:
 
 def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
     """Name of a task's timing: the hash of everything its wall time should depend on. gpu: its name, empty for none."""
-    cell, place = task.cells[0], task.conditions[0]
+    cell, display = task.cells[0], task.conditions[0]
     return digest(
         {
             "method": [cell.method, cell.method_sha256, dict(cell.params), *([cell.captures] if cell.captures else [])],
             "target": [cell.target_sha256, dict(cell.dataset_params)],
-            "display": [repr(place.spec), place.digest, cell.exposure, *([dict(cell.change)] if cell.change else [])],
+            "display": [
+                repr(display.spec),
+                display.digest,
+                cell.exposure,
+                *([dict(cell.change)] if cell.change else []),
+            ],
             "noise": [cell.seed, cell.repeat],
             "learned": [cell.measure, *cell.prepared],
             "measure": cell.measure,
@@ -180,12 +187,12 @@ def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
 
 
 def names() -> frozenset[str]:
-    """Those of all timings that are kept."""
+    """The names of all recorded timings."""
     return frozenset(path.stem for path in folder().glob("*.json"))
 
 
-def known(name: str) -> Cost | None:
-    """The first measurement under a name, None if there is none; of an earlier version, without memory."""
+def recorded(name: str) -> Cost | None:
+    """The first measurement under a name, None if there is none; earlier versions recorded no memory."""
     try:
         content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
         seconds, memory = float(content["seconds"]), content.get("memory_mib")
@@ -196,9 +203,9 @@ def known(name: str) -> Cost | None:
     return effort if all(math.isfinite(size) and size >= 0 for size in sizes) else None
 
 
-def keep(name: str, effort: Cost, again: bool = False) -> Cost:
-    """Note a measurement and return the one to report: the first, or this one when it is measured again."""
-    first = None if again else known(name)
+def keep(name: str, effort: Cost, retime: bool = False) -> Cost:
+    """Record a measurement and return the one to report: the first, or with ``retime`` this one."""
+    first = None if retime else recorded(name)
     if first is not None and (first.memory_mib is not None or effort.memory_mib is None):
         return first
     kept = effort if first is None else Cost(first.seconds, effort.memory_mib)

@@ -13,8 +13,7 @@ from annotated_types import Interval, MinLen
 from ..core import plugins
 from ..core.errors import UserError
 
-LEARNED = "learned"
-"""How a config names the display that is a trained network."""
+LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
 Text = Annotated[str, MinLen(1)]
 
@@ -32,8 +31,8 @@ class Learned:
 class DisplayGrid:
     """The displays of a study.
 
-    profiles: names of profiles or paths of profile files; in their place learned: a trained network, or bench: the file
-    of a real bench (``lab.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
+    profiles: names of profiles or paths of profile files; or learned: a trained network; or bench: the file of a
+    real bench (``lab.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
     exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures). session:
     the folder that stands for the display, when photographs are exchanged as files.
     """
@@ -88,10 +87,10 @@ class Probe:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A change of the displays at test time, by one value after another; methods were prepared without it.
+    """A change of the displays at test time, with a list of values; methods were prepared without it.
 
-    condition: its kind, see ``display.simulated.changes``; values: numbers, or names; count: so many siblings or draws
-    in their place; profiles: the displays that are changed, a subset of the study's.
+    condition: its kind, see ``display.simulated.changes``; values: numbers or names; count: how many siblings or draws
+    to take instead of values; profiles: the displays that are changed, a subset of the study's.
     """
 
     condition: Text

@@ -73,7 +73,7 @@ class Preparation:
     """What a method has to learn before it can solve: the name of its artifact follows from it.
 
     method, params: as in a cell; version: the method's own ``version``, raised when its training changes; folder: the
-    config's folder; place: the display it is trained on; dataset, dataset_params: source of the images; images: name
+    config's folder; display: the one it is trained on; dataset, dataset_params: source of the images; images: name
     and digest of each; held_out: how many of the last only watch the training; captures: the most it may take; seed:
     the study's.
     """
@@ -82,7 +82,7 @@ class Preparation:
     version: int
     params: Mapping[str, Any]
     folder: Path
-    place: Condition
+    display: Condition
     dataset: str
     dataset_params: Mapping[str, Any]
     images: tuple[tuple[str, str], ...]
@@ -91,27 +91,30 @@ class Preparation:
     seed: int
 
     def description(self) -> dict[str, Any]:
-        """Everything that the learned state depends on, as plain JSON values. The version of the harness is not part of
-        it: a faster bench need not cost a day of training; ``provenance.json`` says with which one it was made."""
-        spec = self.place.spec
+        """Everything that the learned state depends on, as plain JSON values.
+
+        The harness version is not part of it, so that a faster bench does not cost a day of training;
+        ``provenance.json`` records it.
+        """
+        spec = self.display.spec
         return {
             "method": self.method,
             "version": self.version,
             "params": dict(self.params),
-            "profile": self.place.name,
-            "profile_version": self.place.version,
+            "profile": self.display.name,
+            "profile_version": self.display.version,
             "panel": list(spec.shape),
             "wavelengths": list(spec.wavelengths),
             "pitch": spec.pitch,
             "distance": spec.distance,
-            "profile_sha256": self.place.digest,
+            "profile_sha256": self.display.digest,
             "training": self.dataset,
             "training_params": dict(self.dataset_params),
             "training_sha256": digest([list(image) for image in self.images]),
             "held_out": self.held_out,
             "captures": self.captures,
             "seed": self.seed,
-            **({"session": self.place.real.session} if self.place.real else {}),
+            **({"session": self.display.real.session} if self.display.real else {}),
         }
 
     @cached_property
@@ -122,15 +125,15 @@ class Preparation:
     @property
     def name(self) -> str:
         """The folder of its artifact: readable, and different for every description."""
-        rows, columns = self.place.spec.shape
+        rows, columns = self.display.spec.shape
         method = self.method.rpartition(":")[2]
-        return f"{method}-{self.place.name}-{rows}x{columns}-{self.id[:10]}"
+        return f"{method}-{self.display.name}-{rows}x{columns}-{self.id[:10]}"
 
 
-def preparation(study: Study, method: str, params: Mapping[str, Any], place: Condition) -> Preparation | None:
-    """What ``method`` has to learn to be shown on ``place``; None for a method that learns nothing.
+def preparation(study: Study, method: str, params: Mapping[str, Any], display: Condition) -> Preparation | None:
+    """What ``method`` has to learn before it is shown on ``display``; None for a method that learns nothing.
 
-    On a learned display a method is trained on the display that this one was learned from.
+    For a learned display, a method is trained on the display that the network was trained on.
     """
     cls = plugins.find("methods", method, study.folder)
     if not getattr(cls, "trains", False):
@@ -141,7 +144,7 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], place: Con
         version=int(getattr(cls, "version", 1)),
         params=params,
         folder=study.folder,
-        place=place.learned.place if place.learned else place,
+        display=display.learned.display if display.learned else display,
         dataset=training.dataset,
         dataset_params=training.params,
         images=study.training_images,
@@ -157,11 +160,11 @@ def displays(study: Study) -> dict[str, Condition]:
     if grid.bench is not None:
         return {grid.bench: _real(study, real_condition(grid.bench, study.folder))}
     if learned is None:
-        shown = {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
-        return {source: _real(study, place) for source, place in shown.items()}
-    place = condition(learned.profile, grid.panel, study.folder)
-    name = f"{learned.method.rpartition(':')[2]} trained on {place.name}"
-    return {LEARNED: replace(place, name=name, learned=preparation(study, learned.method, learned.params, place))}
+        by_source = {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
+        return {source: _real(study, display) for source, display in by_source.items()}
+    display = condition(learned.profile, grid.panel, study.folder)
+    name = f"{learned.method.rpartition(':')[2]} trained on {display.name}"
+    return {LEARNED: replace(display, name=name, learned=preparation(study, learned.method, learned.params, display))}
 
 
 def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
@@ -171,23 +174,23 @@ def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
 
 
 def real_condition(source: str, folder: Path) -> Condition:
-    """Read the file of a real bench without opening its devices. UserError for a file that is none."""
+    """Read the file of a real bench without opening its devices. UserError for an invalid file."""
     path = folder / source
     bench = load_bench_file(path)
     spec = bench.panel.spec(bench.name)
     return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=RealSource(bench=path))
 
 
-def _real(study: Study, place: Condition) -> Condition:
-    """The display with a session folder in its place, if the study has one."""
+def _real(study: Study, display: Condition) -> Condition:
+    """The display, with its photographs from the study's session folder if there is one."""
     folder = study.display.session
     if folder is None:
-        return place
+        return display
     session = read_manifest(folder).session
-    return replace(place, real=replace(place.real or RealSource(), folder=folder, session=session))
+    return replace(display, real=replace(display.real or RealSource(), folder=folder, session=session))
 
 
-def changed(study: Study, source: str, place: Condition) -> list[Condition]:
+def changed(study: Study, source: str, display: Condition) -> list[Condition]:
     """A display as methods were prepared for it, and after every change that the study's sweeps make to it."""
     changes = [
         (sweep.condition, value)
@@ -197,8 +200,8 @@ def changed(study: Study, source: str, place: Condition) -> list[Condition]:
         if value != KINDS[sweep.condition].nominal
     ]
     if not changes:
-        return [place]
-    profile = load_profile(place.source, folder=place.folder)
+        return [display]
+    profile = load_profile(display.source, folder=display.folder)
     eyes = [altered(profile, *change).spec().eye for change in changes]
     pairs = zip(changes, eyes, strict=True)
-    return [place, *(replace(place, change=change, spec=replace(place.spec, eye=eye)) for change, eye in pairs)]
+    return [display, *(replace(display, change=change, spec=replace(display.spec, eye=eye)) for change, eye in pairs)]

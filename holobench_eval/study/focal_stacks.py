@@ -10,17 +10,12 @@ from ..core.errors import UserError
 from ..display import load_profile
 from .displays import Condition
 
-SCORES = ("psnr_linear_infocus", "ssim_linear_infocus")
-"""Scores of the part of a picture that is in focus."""
-VERSION = "infocus 1"
-"""Of these scores; raised whenever a value would change."""
-LENS, STAYS = "refocus", "other_plane"
-"""How the camera meets a plane: the display moves the picture there by a lens, or the hologram stays as it is."""
+SCORES = ("psnr_linear_infocus", "ssim_linear_infocus")  # of the part of a picture that is in focus
+VERSION = "infocus 1"  # of these scores; raised whenever a value would change
+LENS, STAYS = "refocus", "other_plane"  # the display adds a lens for the plane, or leaves the hologram unchanged
 
-Target = tuple[str, str]
-"""Name and digest."""
-Showing = list[tuple[Target, Condition]]
-"""Targets, each with the display that it is shown on."""
+Target = tuple[str, str]  # name and digest
+Showing = list[tuple[Target, Condition]]  # targets, each with the display that it is shown on
 
 
 def planes_of(dataset: Any, name: str) -> dict[str, tuple[str, float]]:
@@ -31,36 +26,36 @@ def planes_of(dataset: Any, name: str) -> dict[str, tuple[str, float]]:
 
 
 def planes_a_scene(planes: Mapping[str, tuple[str, float]]) -> int:
-    """How many targets apart the next scene is: another plane of a scene is no wrong picture of it."""
+    """Planes in each scene: a wrong target has to come from another scene, this many targets on."""
     return len(planes) // len({scene for scene, _ in planes.values()})
 
 
 def showings(
     method: type[Any], group: Sequence[Condition], targets: Sequence[Target], planes: Mapping[str, tuple[str, float]]
 ) -> Iterator[Showing]:
-    """Targets and displays that share a solution of a method, for every solution.
+    """The targets and displays of each solution of a method.
 
-    A method with ``planes = True`` makes one hologram of all planes of a scene, for displays whose planes lie equally
-    far apart; others make one a target, which the display moves to the target's plane.
+    A method with ``planes = True`` computes a hologram for all planes of a scene, for displays with equal plane
+    spacing. Other methods compute a hologram for each target, and the display moves it to the target's plane.
     """
     if not getattr(method, "planes", False):
         for target in targets:
-            yield [(target, _at(place, LENS, planes[target[0]][1])) for place in group]
+            yield [(target, _at(display, LENS, planes[target[0]][1])) for display in group]
         return
     alike: dict[float, list[Condition]] = {}
-    for place in group:
-        alike.setdefault(offset(place, {STAYS: 1.0}), []).append(place)
+    for display in group:
+        alike.setdefault(offset(display, {STAYS: 1.0}), []).append(display)
     for scene in dict.fromkeys(planes[name][0] for name, _ in targets):
         stack = [target for target in targets if planes[target[0]][0] == scene]
-        for places in alike.values():
-            yield [(target, _at(place, STAYS, planes[target[0]][1])) for target in stack for place in places]
+        for subgroup in alike.values():
+            yield [(target, _at(display, STAYS, planes[target[0]][1])) for target in stack for display in subgroup]
 
 
-def _at(place: Condition, kind: str, millimetres: float) -> Condition:
-    return place if millimetres == 0 else replace(place, change=(kind, millimetres))
+def _at(display: Condition, kind: str, millimetres: float) -> Condition:
+    return display if millimetres == 0 else replace(display, change=(kind, millimetres))
 
 
-def offset(place: Condition, change: Mapping[str, Any]) -> float:
-    """How far a cell's plane lies from that of its display [m], on the display's own panel."""
-    full = load_profile(place.source, folder=place.folder).panel.distance
-    return float(sum(change.values())) * 1e-3 * place.spec.distance / full
+def offset(display: Condition, change: Mapping[str, Any]) -> float:
+    """Distance of a cell's plane from the plane of its display [m], scaled to the display's panel."""
+    full = load_profile(display.source, folder=display.folder).panel.distance
+    return float(sum(change.values())) * 1e-3 * display.spec.distance / full

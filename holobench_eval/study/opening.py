@@ -18,31 +18,40 @@ from ..lab.session import session_photographer
 from ..methods.fiducials import fiducial_phases
 from .displays import Condition, RealSource
 
+# Limits on the benches that a process keeps open, their pixels in all and their number; two are always kept.
 OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
-"""Pixels of all benches that a process keeps open, and their number, at most; but two are."""
 
 
-def open_display(place: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench | RealBench:
-    """The bench of a condition, built and calibrated once in a process; a simulated one is computed on ``device``.
+def open_display(display: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench | RealBench:
+    """The bench of a display, built and calibrated once in a process; a simulated bench is computed on ``device``.
 
-    CellError when its calibration cannot be trusted; that too is found out once, not for every cell.
+    CellError when its calibration cannot be trusted; a failed calibration is kept and not repeated for every cell.
     """
-    return _cached(place, seed, device)
+    return _cached(display, seed, device)
 
 
-def simulated(place: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
-    """``open_display`` of a display that does not exist."""
-    bench = _cached(place, seed, device)
+def simulated(display: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
+    """``open_display`` of a simulated display."""
+    bench = _cached(display, seed, device)
     assert isinstance(bench, CalibratedBench)
     return bench
 
 
-def _cached(place: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench:
-    where = None if place.real else device  # a real one is opened once, whoever computes
-    key = (place.source, place.folder, place.digest, place.spec.shape, place.change, place.real, seed, where)
+def _cached(display: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench:
+    where = None if display.real else device  # a real one is opened once, whoever computes
+    key = (
+        display.source,
+        display.folder,
+        display.digest,
+        display.spec.shape,
+        display.change,
+        display.real,
+        seed,
+        where,
+    )
     if key not in _open:
-        _open[key] = _opened(place, seed, device)
-        pixels = place.spec.shape[0] * place.spec.shape[1]
+        _open[key] = _opened(display, seed, device)
+        pixels = display.spec.shape[0] * display.spec.shape[1]
         while len(_open) > max(2, min(OPEN_BENCHES, OPEN_PIXELS // pixels)):
             _open.popitem(last=False)
     _open.move_to_end(key)
@@ -52,12 +61,11 @@ def _cached(place: Condition, seed: int, device: torch.device) -> CalibratedBenc
     return opened
 
 
-_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()
-"""Those used least recently come first."""
+_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()  # least recently used first
 
 
 def forget_sessions() -> None:
-    """Open the benches behind session folders anew when they are next asked for: their files may have changed."""
+    """Drop the real benches, so that the next use opens them anew: files of a session folder may have changed."""
     for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
         del _open[key]
 
@@ -77,34 +85,34 @@ def open_bench(
     return CalibratedBench(bench, seed, fiducial_phases, registered_as)
 
 
-def _opened(place: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
-    if place.real is not None:
-        return _open_real(place, place.real, seed)
-    profile = load_profile(place.source, folder=place.folder)
-    if profile.digest != place.digest:
-        raise UserError(f"profile '{place.source}' has changed since the study was planned; start the run again")
+def _opened(display: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
+    if display.real is not None:
+        return _open_real(display, display.real, seed)
+    profile = load_profile(display.source, folder=display.folder)
+    if profile.digest != display.digest:
+        raise UserError(f"profile '{display.source}' has changed since the study was planned; start the run again")
     unmoved = None
     try:
-        if place.change is not None:
-            if not KINDS[place.change[0]].moves:
-                unmoved = simulated(place.nominal, seed, device)
-            profile = altered(profile, *place.change)
-        opened = open_bench(profile, place.spec.shape, seed, unmoved, device)
+        if display.change is not None:
+            if not KINDS[display.change[0]].moves:
+                unmoved = simulated(display.nominal, seed, device)
+            profile = altered(profile, *display.change)
+        opened = open_bench(profile, display.spec.shape, seed, unmoved, device)
         _ = opened.registration  # calibrated now, so that no method's time includes it
     except CellError as error:
         return error
     return opened
 
 
-def _open_real(place: Condition, source: RealSource, seed: int) -> RealBench:
-    """The bench behind a session folder, or that of devices. UserError for a description that has changed."""
+def _open_real(display: Condition, source: RealSource, seed: int) -> RealBench:
+    """The bench of a session folder or of devices. UserError for a description that has changed since the plan."""
     bench = None if source.bench is None else load_bench_file(source.bench)
-    described = bench or load_profile(place.source, folder=place.folder).scaled(place.spec.shape)
-    if described.digest != place.digest:
-        raise UserError(f"'{place.source}' has changed since the study was planned; start the run again")
+    described = bench or load_profile(display.source, folder=display.folder).scaled(display.spec.shape)
+    if described.digest != display.digest:
+        raise UserError(f"'{display.source}' has changed since the study was planned; start the run again")
     if source.folder is not None:
         photographer = session_photographer(source.folder)
-        return RealBench(place.spec, photographer, described.panel.blaze, described.residual_bound, seed)
+        return RealBench(display.spec, photographer, described.panel.blaze, described.residual_bound, seed)
     assert bench is not None
     assert source.bench is not None
     return open_live(bench, source.bench.parent, seed)

@@ -1,4 +1,4 @@
-"""The grid of cells of a study: which number is measured how. Nothing is computed or written here."""
+"""The grid of cells of a study: every number and how it is measured. Nothing is computed or written here."""
 
 from __future__ import annotations
 
@@ -18,11 +18,9 @@ from .focal_stacks import VERSION as IN_FOCUS
 from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
 from .versions import HARNESS, method_version
 
-REFERENCE = "reference"
-"""The condition of the floor cells."""
-Made = tuple[str, str, Mapping[str, Any]]
-"""Method, its version, parameters."""
-FLOORS = (
+REFERENCE = "reference"  # the condition of the floor cells
+Maker = tuple[str, str, Mapping[str, Any]]  # method, its version, parameters
+FLOORS = (  # what a study without any display would score: see ``holobench_eval.metrics.references``
     "floor_constant",
     "floor_black",
     "floor_speckle",
@@ -30,12 +28,11 @@ FLOORS = (
     "floor_mirrored",
     "floor_shift_1px",
 )
-"""What a study without any display would score: see ``holobench_eval.metrics.references``."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One number of every table: the plain description that is hashed to name its record.
+    """The plain description of a measurement; its hash names the record.
 
     method: registered name or ``file.py:Class``; method_sha256: its version (``versions.method_version``); params:
     all of them; target_sha256: digest of the source image; profile_version, profile_sha256: of the display;
@@ -75,8 +72,8 @@ class Cell:
     session: str = ""
 
     def description(self) -> dict[str, Any]:
-        """The cell as plain JSON values; without ``captures`` where there is no limit, and what is empty of the last
-        two."""
+        """The cell as plain JSON values, without ``captures`` if there is no limit, and without an empty ``change`` or
+        ``session``."""
         plain: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
         plain |= {name: list(plain[name]) for name in ("panel", "metrics", "prepared")}
         plain |= {name: dict(plain[name]) for name in ("params", "dataset_params", "holograms", "change")}
@@ -95,10 +92,9 @@ class Cell:
 
 @dataclass(frozen=True)
 class Task:
-    """Cells that share one solution: a method solves a target once, and the phase is shown on each of the
-    displays.
+    """Cells that share a solution: a method solves a target once, and the phase is shown on each of the displays.
 
-    conditions: the display of each cell; the method meets the first one while it solves. A floor task has no
+    conditions: the display of each cell; the method solves on the first. A floor task has no
     solution and one display, which gives the size of the scored region. preparation: what the method learns first.
     """
 
@@ -109,7 +105,7 @@ class Task:
 
     @property
     def is_floor(self) -> bool:
-        """Whether the cells are references that no method made."""
+        """Whether the cells are floor cells, which have no method."""
         return self.cells[0].condition == REFERENCE
 
 
@@ -131,10 +127,10 @@ class Plan:
         return tuple(cell for task in self.tasks for cell in task.cells)
 
     def preparations(self) -> dict[str, Preparation]:
-        """What has to be learned before the cells can be computed, by its id, each once."""
-        needed = [task.preparation for task in self.tasks]
-        needed += [place.learned for task in self.tasks for place in task.conditions]
-        return {one.id: one for one in needed if one is not None}
+        """Everything that has to be learned before the cells can be computed, by its id."""
+        trainings = [task.preparation for task in self.tasks]
+        trainings += [display.learned for task in self.tasks for display in task.conditions]
+        return {training.id: training for training in trainings if training is not None}
 
 
 def plan(study: Study) -> Plan:
@@ -164,17 +160,19 @@ def plan(study: Study) -> Plan:
     (10, 20)
     """
     targets = [(item, study.dataset.digest(item)) for item in study.dataset.items()]
-    shown = displays(study)
+    displays_by_source = displays(study)
     ground = _Ground(study, _metrics(study))
-    first = next(iter(shown.values()))
+    first = next(iter(displays_by_source.values()))
     apart = planes_a_scene(ground.planes) if study.measure == "focus" else 1
     tasks = [ground.floor(first, target, targets[(i + apart) % len(targets)]) for i, target in enumerate(targets)]
     for entry in study.methods:
-        places = [place for source in entry.profiles for place in changed(study, source, shown[source])]
-        tasks += ground.solutions(entry, places, targets)
-    made = Plan(tuple(tasks))
-    check_unseen(made.preparations(), targets)
-    return made
+        entry_displays = [
+            display for source in entry.profiles for display in changed(study, source, displays_by_source[source])
+        ]
+        tasks += ground.solutions(entry, entry_displays, targets)
+    grid = Plan(tuple(tasks))
+    check_unseen(grid.preparations(), targets)
+    return grid
 
 
 @dataclass(frozen=True)
@@ -197,16 +195,16 @@ class _Ground:
     def cell(
         self,
         target: Target,
-        place: Condition,
+        display: Condition,
         condition: str,
         repeat: int,
-        made: Made,
+        maker: Maker,
         prepared: tuple[str, ...] = (),
         captures: int | None = None,
     ) -> Cell:
-        """A cell; ``target`` is a name and its digest, ``made`` says by what the picture is made."""
+        """A cell; ``target``: name and digest; ``maker``: the method that makes the picture."""
         study = self.study
-        method, version, params = made
+        method, version, params = maker
         holograms = study.holograms
         probe = {"name": holograms.name, "params": holograms.params, "sha256": self.probe_sha256}
         return Cell(
@@ -217,10 +215,10 @@ class _Ground:
             dataset_params=study.targets.params,
             target=target[0],
             target_sha256=target[1],
-            profile=place.name,
-            profile_version=place.version,
-            profile_sha256=place.digest,
-            panel=place.spec.shape,
+            profile=display.name,
+            profile_version=display.version,
+            profile_sha256=display.digest,
+            panel=display.spec.shape,
             condition=condition,
             repeat=repeat,
             seed=study.seed,
@@ -232,88 +230,102 @@ class _Ground:
             holograms=probe if study.measure == "prediction" else {},
             prepared=prepared,
             captures=captures,
-            change=dict([place.change]) if place.change and condition != REFERENCE else {},
-            session=place.real.session if place.real and condition != REFERENCE else "",
+            change=dict([display.change]) if display.change and condition != REFERENCE else {},
+            session=display.real.session if display.real and condition != REFERENCE else "",
         )
 
-    def solutions(self, entry: MethodEntry, shown: list[Condition], targets: list[Target]) -> Iterator[Task]:
+    def solutions(self, entry: MethodEntry, entry_displays: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
         cls = plugins.find("methods", entry.name, self.study.folder)
-        made = (entry.name, method_version(cls), entry.params)
-        for showing in self._showings(cls, shown, targets):
-            places = tuple(place for _, place in showing)
-            own = preparation(self.study, entry.name, entry.params, places[0].nominal)
+        maker = (entry.name, method_version(cls), entry.params)
+        for showing in self._showings(cls, entry_displays, targets):
+            conditions = tuple(display for _, display in showing)
+            own = preparation(self.study, entry.name, entry.params, conditions[0].nominal)
             for repeat in range(self.study.repeats):
                 cells = (
                     self.cell(
-                        target, place, self._condition(place), repeat, made, _ids(own, place.learned), entry.captures
+                        target,
+                        display,
+                        self._condition(display),
+                        repeat,
+                        maker,
+                        _ids(own, display.learned),
+                        entry.captures,
                     )
-                    for target, place in showing
+                    for target, display in showing
                 )
-                yield Task(entry.label, tuple(cells), places, own)
+                yield Task(entry.label, tuple(cells), conditions, own)
 
-    def _showings(self, cls: type[Any], shown: list[Condition], targets: list[Target]) -> Iterator[Showing]:
-        """Targets and displays that share a solution, for every solution."""
+    def _showings(self, cls: type[Any], entry_displays: list[Condition], targets: list[Target]) -> Iterator[Showing]:
+        """The targets and displays of each solution."""
         measure = self.study.measure
-        for group in [(place,) for place in shown] if measure == "prediction" else _sharing(cls, shown):
+        for group in (
+            [(display,) for display in entry_displays] if measure == "prediction" else _sharing(cls, entry_displays)
+        ):
             if measure == "focus":
                 yield from showings(cls, group, targets, self.planes)
             else:
-                yield from ([(target, place) for place in group] for target in targets)
+                yield from ([(target, display) for display in group] for target in targets)
 
-    def _condition(self, place: Condition) -> str:
-        """The name of a display in tables, where planes of a focal stack stand together."""
-        return place.name if self.study.measure == "focus" else place.title
+    def _condition(self, display: Condition) -> str:
+        """The name of a display in tables; the planes of a focal stack share a row."""
+        return display.name if self.study.measure == "focus" else display.title
 
-    def floor(self, place: Condition, target: Target, wrong: Target) -> Task:
-        """The references of a target; ``wrong`` is the target that is shown in its place."""
-        shown = {"target": wrong[0], "target_sha256": wrong[1]}
-        params = {name: shown if name == "floor_wrong_target" else {} for name in FLOORS}
+    def floor(self, display: Condition, target: Target, wrong: Target) -> Task:
+        """The references of a target; ``wrong``: the target whose picture is scored as the wrong one."""
+        wrong_target = {"target": wrong[0], "target_sha256": wrong[1]}
+        params = {name: wrong_target if name == "floor_wrong_target" else {} for name in FLOORS}
         if wrong == target:
             del params["floor_wrong_target"]
         cells = tuple(
-            self.cell(target, place, REFERENCE, 0, (name, "", given), _ids(place.learned))
-            for name, given in params.items()
+            self.cell(target, display, REFERENCE, 0, (name, "", cell_params), _ids(display.learned))
+            for name, cell_params in params.items()
         )
-        return Task("floor", cells, (place,) * len(cells))
+        return Task("floor", cells, (display,) * len(cells))
 
 
-def _ids(*needed: Preparation | None) -> tuple[str, ...]:
-    return tuple(one.id for one in needed if one is not None)
+def _ids(*trainings: Preparation | None) -> tuple[str, ...]:
+    return tuple(training.id for training in trainings if training is not None)
 
 
 def _metrics(study: Study) -> tuple[str, ...]:
-    """Name and version of the metrics that the study names, wherever it is planned; else of all that can be computed
-    here, and the headline's: LPIPS needs weights that may come later."""
+    """Name and version of the study's metrics.
+
+    A study that names none gets all that can be computed here, and the headline's: weights of LPIPS may come later.
+    """
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics
-    known = catalogue(None if weights is None else Path(weights))
+    metrics = catalogue(None if weights is None else Path(weights))
     if wanted is None:
-        wanted = tuple(one.name for one in known if one.available() is None or study.headline in one.columns)
-    computed = [metric for metric in known if metric.name in wanted]
+        wanted = tuple(
+            metric.name for metric in metrics if metric.available() is None or study.headline in metric.columns
+        )
+    computed = [metric for metric in metrics if metric.name in wanted]
     names = [f"{metric.name} {metric.version}" for metric in computed]
     names += ["speckle_contrast"] if "speckle_contrast" in wanted else []
     return (*names, IN_FOCUS) if study.measure == "focus" else tuple(names)
 
 
-def _sharing(cls: type[Any], shown: list[Condition]) -> list[tuple[Condition, ...]]:
-    """Displays grouped so that one solution serves a group.
+def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[tuple[Condition, ...]]:
+    """Displays grouped so that the displays of a group share a solution.
 
-    A method that neither captures nor trains nor looks into the bench knows only the nominal optics, so displays with
-    equal nominal optics get the same phase from it. One that was trained knows the display before any change. One that
-    captures or looks into the bench meets it as it is.
+    A method that neither captures nor trains nor is privileged knows only the nominal optics, so displays with equal
+    nominal optics get the same phase. A trained method knows the display before any change. A method that captures or
+    is privileged solves on each display as it is.
     """
     if any(getattr(cls, property, False) for property in ("camera", "privileged")):
-        return [(place,) for place in shown]
+        return [(display,) for display in entry_displays]
     trains, groups = getattr(cls, "trains", False), dict[Any, list[Condition]]()
-    for place in shown:
-        groups.setdefault((place.name, place.spec) if trains else replace(place.spec, name=""), []).append(place)
+    for display in entry_displays:
+        groups.setdefault((display.name, display.spec) if trains else replace(display.spec, name=""), []).append(
+            display
+        )
     return [tuple(group) for group in groups.values()]
 
 
-def check_unseen(needed: Mapping[str, Preparation], targets: list[tuple[str, str]]) -> None:
+def check_unseen(preparations: Mapping[str, Preparation], targets: list[tuple[str, str]]) -> None:
     """Refuse a study that scores an image it trains on. targets: name and digest of each. UserError names the image."""
     scored = {sha256: name for name, sha256 in targets}
-    for one in needed.values():
-        for item, sha256 in one.images:
+    for training in preparations.values():
+        for item, sha256 in training.images:
             if sha256 in scored:
                 raise UserError(f"training image '{item}' is the scored target '{scored[sha256]}'; train on others")

@@ -1,4 +1,4 @@
-"""How a run shows where it is: a live bar on a terminal, a line every few seconds elsewhere."""
+"""The progress of a run: a live bar on a terminal, a line every few seconds elsewhere."""
 
 from __future__ import annotations
 
@@ -37,37 +37,38 @@ def _untrained(name: str, reason: str) -> str:
 
 @dataclass
 class Follower:
-    """Tells what the newest line of each growing ``training.csv`` says, every so many seconds, from a thread.
+    """Reports the newest row of each growing ``training.csv`` from a thread.
 
-    Workers of any kind write that file, so that it is followed in the same way wherever they run.
+    Workers of any kind write that file, so it is followed in the same way wherever they run. seconds: between two
+    looks; folders: of the artifacts in training, by name; last_lines: the lines reported last, by name.
     """
 
     seconds: float
-    places: dict[str, Path] = field(default_factory=dict)
-    told: dict[str, str] = field(default_factory=dict)
+    folders: dict[str, Path] = field(default_factory=dict)
+    last_lines: dict[str, str] = field(default_factory=dict)
     done: threading.Event = field(default_factory=threading.Event)
 
     def start(self, names: list[tuple[str, Path]], tell: Callable[[str], object]) -> None:
         """Follow the logs in these folders until each has ``ended``."""
-        self.places = dict(names)
+        self.folders = dict(names)
         self.done.clear()
         threading.Thread(target=self._follow, args=(tell,), daemon=True).start()
 
     def ended(self, name: str) -> None:
-        """Follow this one no more."""
-        self.places.pop(name, None)
-        if not self.places:
+        """Stop following this log."""
+        self.folders.pop(name, None)
+        if not self.folders:
             self.done.set()
 
     def _follow(self, tell: Callable[[str], object]) -> None:
         while not self.done.wait(self.seconds):
-            for name, place in list(self.places.items()):
-                rows = read_log(place)
+            for name, folder in list(self.folders.items()):
+                rows = read_log(folder)
                 line = (
                     f"{name}: {', '.join(f'{key} {value}' for key, value in rows[-1].items() if value)}" if rows else ""
                 )
-                if line and self.told.get(name) != line:
-                    self.told[name] = line
+                if line and self.last_lines.get(name) != line:
+                    self.last_lines[name] = line
                     tell(line)
 
 
@@ -82,12 +83,12 @@ class Bar:
     follower: Follower = field(default_factory=lambda: Follower(0.5))
 
     def planned(self, cells: int, missing: int) -> None:
-        """Start at the cells that have a record already."""
+        """Set the bar to the number of missing cells."""
         self.missing = missing
         self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
 
     def training(self, names: list[tuple[str, Path]]) -> None:
-        """Show what is trained, and follow its log."""
+        """Show the number of trainings, and follow their logs."""
         self.progress.update(self.bar, total=self.missing + len(names), description="training")
         self.follower.start(names, lambda line: self.progress.update(self.bar, description=escape(line)))
 
@@ -129,12 +130,12 @@ class Lines:
         self.last = self.clock()
 
     def planned(self, cells: int, missing: int) -> None:
-        """Say what there is to do."""
+        """Write the number of cells to compute."""
         self.total = missing
         self.write(f"{missing} of {cells} cells to compute")
 
     def training(self, names: list[tuple[str, Path]]) -> None:
-        """Say what is trained, and follow its log."""
+        """Name the trainings, and follow their logs."""
         self.write(f"{len(names)} to train: {', '.join(name for name, _ in names)}")
         self.follower.start(names, self.write)
 
@@ -162,7 +163,7 @@ class Lines:
     def _left(self, now: float) -> str:
         if not self.done or self.begun is None:
             return ""
-        training = len(self.follower.places)
+        training = len(self.follower.folders)
         beside = f" besides the {training} in training" * bool(training)
         return f", about {(now - self.begun) / self.done * (self.total - self.done):.0f} s left{beside}"
 

@@ -34,16 +34,18 @@ def describe(
 ) -> dict[str, Any]:
     """Everything about the present run that is not in its config: versions, revision, machine, displays, command.
 
-    device: as it was asked for; gpu: its name, if it is one and known.
+    device: as requested; gpu: its name, empty for a CPU or an unknown GPU.
     """
-    shown = {place.name: place for task in plan.tasks for place in task.conditions}
+    displays = {display.name: display for task in plan.tasks for display in task.conditions}
     return {
         "package": __version__,
         **revision(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
-        "profiles": {name: {"version": place.version, "sha256": place.digest} for name, place in shown.items()},
+        "profiles": {
+            name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
+        },
         "python": platform.python_version(),
         "packages": {name: installed(name) for name in PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
@@ -74,10 +76,9 @@ def _git(folder: Path, *arguments: str) -> str:
 
 
 def begin(output: Path, provenance: dict[str, Any], resumed: bool) -> dict[str, Any]:
-    """Write ``provenance.json`` at the start of a run; runs that this one completes are kept under
-    ``earlier``.
+    """Write ``provenance.json`` at the start of a run, with the runs that it resumes under ``earlier``.
 
-    Written first, so that a run that is killed leaves its trace beside the records it made.
+    Written first, so that a killed run leaves its provenance beside its records.
     """
     earlier = []
     if resumed and (before := read(output)):

@@ -25,11 +25,9 @@ from .scoring.job import Job, Setting
 from .store import Record, Store
 from .training import TrainingJob, train
 
-LATE = 10.0
-"""Seconds after which a record on a shared disk should be seen by all."""
+LATE = 10.0  # s after which all machines should see a record on a shared disk
 Step = TrainingJob | Job
-Made = str | list[Record]
-"""Of a training why it failed, empty if it did not; of a task its records."""
+Result = str | list[Record]  # of a training the reason of its failure, empty for success; of a task its records
 
 
 class Watch(Protocol):
@@ -58,7 +56,7 @@ class Watch(Protocol):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run leaves: a record for every planned cell (``Store.load``), its provenance, and what it computed."""
+    """A record for every planned cell (``Store.load``), the run's provenance, and the number of computed cells."""
 
     records: list[dict[str, Any]]
     provenance: dict[str, Any]
@@ -85,7 +83,7 @@ def run(
 ) -> Outcome:
     """Train what is not trained, compute the missing cells of a plan and write their records.
 
-    An interrupt passes through; every record written before it stays, and the next run goes on from there.
+    An interrupt passes through; earlier records stay, and the next run resumes.
 
     Parameters
     ----------
@@ -106,7 +104,7 @@ def run(
     retime
         Measure wall times again, see ``cost``.
     retrain
-        Train again, and compute again what depends on it.
+        Train again, and compute the dependent cells again.
     device
         Name of where every worker computes, see ``device.find``.
 
@@ -164,72 +162,74 @@ def _compute(
     executor: Executor,
     watch: Watch,
 ) -> None:
-    """Train what missing cells need and is not there, then compute them, those of ``timed`` alone."""
+    """Train what the missing cells still need, then compute them; the cells of ``timed`` run alone."""
     artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
     untrained = _untrained(plan, missing, setting)
     if untrained:
-        watch.training([(needed.name, artifacts.place(needed)) for needed in untrained])
-    unlearned = {needed.id for needed in untrained}
-    trainings = [TrainingJob(needed, setting.artifacts, setting.threads, setting.device) for needed in untrained]
+        watch.training([(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained])
+    unlearned = {preparation.id for preparation in untrained}
+    trainings = [
+        TrainingJob(preparation, setting.artifacts, setting.threads, setting.device) for preparation in untrained
+    ]
     at_work: list[Step] = []
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
     jobs = _jobs(plan, missing, missing if single else timed, setting)
     steps = queue(trainings, jobs, unlearned, at_work)
-    results: Iterator[tuple[Step, Made | Exception]] = executor.map(step, _told(steps, at_work, watch))
-    for one, made in results:
-        at_work.remove(one)
-        if isinstance(one, TrainingJob):
-            reason = made if isinstance(made, str) else artifacts.fail(one.needed, _error(made))
-            unlearned.discard(one.needed.id)
-            watch.trained(one.needed.name, reason)
+    results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, _watched(steps, at_work, watch))
+    for job, result in results:
+        at_work.remove(job)
+        if isinstance(job, TrainingJob):
+            reason = result if isinstance(result, str) else artifacts.fail(job.preparation, _error(result))
+            unlearned.discard(job.preparation.id)
+            watch.trained(job.preparation.name, reason)
         else:
-            records = made if isinstance(made, list) else _lost(one, _error(made), store)
+            records = result if isinstance(result, list) else _lost(job, _error(result), store)
             _refuse_unseen(records, store)
             watch.finished(records)
 
 
 def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
     """Remove what was learned for a plan, and the records that depend on it."""
-    for needed in plan.preparations().values():
-        artifacts.remove(needed)
+    for preparation in plan.preparations().values():
+        artifacts.remove(preparation)
     for cell in plan.cells:
         if cell.prepared:
             store.path(cell.id).unlink(missing_ok=True)
 
 
 def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Preparation]:
-    """What missing cells need and is not there; what is there is checked before anything is computed with it."""
+    """The missing artifacts that missing cells need; existing artifacts are checked before any computation."""
     wanted = {identity for cell in plan.cells if cell.id in missing for identity in cell.prepared}
     artifacts, waiting = Artifacts(setting.artifacts), []
-    for needed in plan.preparations().values():
-        if needed.id in wanted:
-            if artifacts.has(needed):
-                artifacts.load(needed)
+    for preparation in plan.preparations().values():
+        if preparation.id in wanted:
+            if artifacts.has(preparation):
+                artifacts.load(preparation)
             else:
-                waiting.append(needed)
+                waiting.append(preparation)
     return waiting
 
 
 def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: Setting) -> Iterator[Job]:
-    """The tasks with missing cells. alone: cells whose task has nothing beside it."""
+    """The tasks with missing cells. alone: cells whose task runs without concurrent workers."""
     for task in plan.tasks:
         wanted = missing.intersection(cell.id for cell in task.cells)
         if wanted:
             yield Job(task, wanted, setting, alone=not wanted.isdisjoint(alone))
 
 
-def _told(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> Iterator[Step | None]:
-    """The same steps; each is at work when an executor takes it, and the watch is told of tasks."""
-    for one in steps:
-        if one is not None:
-            at_work.append(one)
-        if isinstance(one, Job):
-            watch.started(one.task)
-        yield one
+def _watched(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> Iterator[Step | None]:
+    """The same steps; each is added to ``at_work`` when an executor takes it, and tasks are reported to the watch."""
+    for job in steps:
+        if job is not None:
+            at_work.append(job)
+        if isinstance(job, Job):
+            watch.started(job.task)
+        yield job
 
 
 def _refuse_unseen(records: list[Record], store: Store) -> None:
-    """UserError for records that were written, but not where this process reads them: all results would be holes."""
+    """UserError for records that a worker wrote to a folder that this process does not see."""
     until = time.monotonic() + LATE
     for record in records:
         while not store.path(record.id).exists():
@@ -241,9 +241,9 @@ def _refuse_unseen(records: list[Record], store: Store) -> None:
             time.sleep(0.1)
 
 
-def _error(made: Made | Exception) -> Exception:
-    """What is neither of the two results is an error."""
-    return made if isinstance(made, Exception) else TypeError(f"a worker returned {type(made).__name__}")
+def _error(result: Result | Exception) -> Exception:
+    """The error of a job without a valid result."""
+    return result if isinstance(result, Exception) else TypeError(f"a worker returned {type(result).__name__}")
 
 
 def _lost(job: Job, error: Exception, store: Store) -> list[Record]:
@@ -254,30 +254,30 @@ def _lost(job: Job, error: Exception, store: Store) -> list[Record]:
     return records
 
 
-def step(one: Step) -> Made:
+def step(job: Step) -> Result:
     """Carry out a training (see ``train``) or the cells of a task (see ``work``). This is what a worker runs."""
-    return train(one) if isinstance(one, TrainingJob) else work(one)
+    return train(job) if isinstance(job, TrainingJob) else work(job)
 
 
 def queue(
     trainings: Iterable[TrainingJob], jobs: Iterable[Job], unlearned: set[str], at_work: Collection[Step]
 ) -> Iterator[Step | None]:
-    """Trainings first, since they take longest; then jobs, those that need nothing of ``unlearned`` before the others;
-    at the end, one by one, the jobs that are to be alone.
+    """Trainings first, since they take longest; then the jobs that need nothing of ``unlearned``, then the others; at
+    the end, each by itself, the jobs that run alone.
 
-    unlearned: ids of the preparations that are not there yet; at_work: the steps that were taken; whoever takes the
-    results removes both as they come. None: all that is left waits for a step that is still at work.
+    unlearned: ids of the preparations still to be trained; at_work: the steps that an executor took. The caller removes
+    entries from both as results come. None: all remaining jobs wait for a step that is at work.
     """
     yield from trainings
-    every = list(jobs)
-    waiting = [job for job in every if not job.alone]
+    all_jobs = list(jobs)
+    waiting = [job for job in all_jobs if not job.alone]
     while waiting:
         ready = [job for job in waiting if unlearned.isdisjoint(_needs(job))]
         waiting = [job for job in waiting if not unlearned.isdisjoint(_needs(job))]
         yield from ready
         if not ready:
             yield None
-    for job in every:
+    for job in all_jobs:
         if job.alone:
             while at_work:
                 yield None
@@ -291,23 +291,23 @@ def _needs(job: Job) -> set[str]:
 def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> None:
     """UserError, in one line, if a method of a missing cell says by ``available()`` that it cannot run here.
 
-    Only what is to be computed is asked for: a report of what was computed elsewhere needs no method of its study.
+    Only methods of missing cells are asked: a report of records from elsewhere needs no method of its study.
     """
     seen: set[str] = set()
     for task in plan.tasks:
-        if task.is_floor or not missing.intersection(one.id for one in task.cells):
+        if task.is_floor or not missing.intersection(cell.id for cell in task.cells):
             continue
         for name, params in _used(task.cells[0]):
-            made = canonical([name, params])
-            if made not in seen:
-                seen.add(made)
+            identity = canonical([name, params])
+            if identity not in seen:
+                seen.add(identity)
                 reason = _reason(name, params, folder)
                 if reason is not None:
                     raise UserError(f"method '{name}' cannot run here: {reason}")
 
 
 def refuse_unscored(study: Study) -> None:
-    """UserError, in one line, if a metric that the study names, or that its headline is of, cannot be computed here."""
+    """UserError, in one line, if a metric of the study or of its headline cannot be computed here."""
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics or ()
     for metric in catalogue(None if weights is None else Path(weights)):
         if (metric.name in wanted or study.headline in metric.columns) and (reason := metric.available()):

@@ -28,16 +28,15 @@ from .run import Outcome, Watch, run
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
-OWN = ("photographs", "dead_leaves", "charts")
-"""Datasets that come with the package and read no folder."""
+OWN = ("photographs", "dead_leaves", "charts")  # datasets that come with the package and read no folder
 
 
 @dataclass(frozen=True)
 class Advance:
-    """What an import or export came to.
+    """The result of an import or export.
 
-    study: on the session's display; patterns: of the new round that has to be photographed, none when the study is
-    complete; outcome: of the cells. The study's note says what is to be known of the photographs.
+    study: on the session's display, with notes on the photographs in its ``note``; patterns: of the new round that has
+    to be photographed, none when the study is complete; outcome: of the cells.
     """
 
     study: Study
@@ -56,8 +55,8 @@ def export(
 ) -> Advance:
     """Make a session folder for a study and write its first round of patterns.
 
-    bench: file of the real bench; without it ``display``, one of the study's profiles, says the nominal optics (not
-    needed where the study has one) and the panel's levels have the default convention.
+    bench: file of the real bench; without it ``display``, one of the study's profiles, gives the nominal optics
+    (optional if the study has a single profile), and the panel's levels have the default convention.
     UserError: the folder is not empty, or the study cannot be shown on one real display.
     """
     if folder.exists() and any(folder.iterdir()):
@@ -73,18 +72,18 @@ def export(
         shutil.copyfile(bench, folder / BENCH)
     if named and Path(named).name == named:
         shutil.copyfile(study.folder / named, folder / named)
-    place = next(iter(displays(chosen).values()))
-    spec, described = place.spec, place.digest
+    real_display = next(iter(displays(chosen).values()))
+    spec, described = real_display.spec, real_display.digest
     if spec.bits != 8:
-        raise UserError(f"'{place.name}' has {spec.bits} bits; patterns are written with 8")
-    described_bench = place.real.bench if place.real else None
+        raise UserError(f"'{real_display.name}' has {spec.bits} bits; patterns are written with 8")
+    described_bench = real_display.real.bench if real_display.real else None
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
         session=digest([text, described, str(config), digest(folder.resolve().as_posix())]),
         study_sha256=text,
         bench_sha256=described,
-        display=place.name,
+        display=real_display.name,
         panel=spec.shape,
         wavelengths=spec.wavelengths,
         phase=load_bench_file(described_bench).phase if described_bench else Convention(),
@@ -99,8 +98,8 @@ def export(
 def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], config: Path | None = None) -> Advance:
     """Read the photographs of all rounds so far, score what can be scored, and write the next round if one is needed.
 
-    config: the study's config, where the copy in the folder cannot stand for it (see ``study_of``); say: is told
-    what was found, line by line. UserError with every fault of the photographs; nothing is scored then.
+    config: use this config instead of the copy in the session folder (see ``study_of``); say: gets the findings, line
+    by line. UserError with every fault of the photographs; nothing is scored then.
     """
     refuse_links_out(folder)
     manifest = read_manifest(folder)
@@ -120,11 +119,11 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     for note in photographer.notes:
         say(note)
     try:
-        found = look(_bench(study), photographer, folder / REPORT, say)
+        findings = look(_bench(study), photographer, folder / REPORT, say)
     except Pending:
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
-    notes = [study.note, *photographer.notes, *found]
+    notes = [study.note, *photographer.notes, *findings]
     advance = _advance(study, folder, watch, threads)
     return replace(advance, study=replace(advance.study, note=" ".join(_sentence(note) for note in notes if note)))
 
@@ -135,10 +134,10 @@ def _sentence(note: str) -> str:
 
 
 def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
-    """The study of a session. UserError: another one, or one whose copy may not be trusted with this machine.
+    """The study of a session. UserError for another study, or for a copy that may not be trusted.
 
-    A session folder comes from somewhere else, so its copy of the config is used only where it names nothing but what
-    is installed: code in files, datasets in folders and weights need the user's own config.
+    A session folder comes from elsewhere, so its copy of the config is used only if everything that it names is
+    installed: code in files, datasets in folders and weights need the user's own config.
     """
     path = folder / STUDY if config is None else config
     if not path.is_file() or (config is None and path.is_symlink()):
@@ -149,23 +148,23 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
         raise UserError(f"{path}: {reason}; give --study with your own copy of the config")
     bench = folder / BENCH
     study = _on_one_display(load_study(path), bench if bench.is_file() else None, manifest.display)
-    place = next(iter(displays(study).values()))
-    if place.digest != manifest.bench_sha256:
-        raise UserError(f"'{place.name}' has changed since the session was exported; export a new one")
-    if (place.spec.shape, place.spec.wavelengths) != (tuple(manifest.panel), tuple(manifest.wavelengths)):
-        raise UserError(f"{folder}: the manifest's panel or wavelengths are not those of '{place.name}'")
+    display = next(iter(displays(study).values()))
+    if display.digest != manifest.bench_sha256:
+        raise UserError(f"'{display.name}' has changed since the session was exported; export a new one")
+    if (display.spec.shape, display.spec.wavelengths) != (tuple(manifest.panel), tuple(manifest.wavelengths)):
+        raise UserError(f"{folder}: the manifest's panel or wavelengths are not those of '{display.name}'")
     return replace(study, display=replace(study.display, session=folder))
 
 
 def _is_beside(bench: object, folder: Path) -> bool:
-    """Whether a bench file is one of the session folder's own: data that is read, and devices that are not opened."""
+    """Whether a bench file lies in the session folder; it is only read, and its devices are not opened."""
     return isinstance(bench, str) and Path(bench).name == bench and (folder / bench).is_file()
 
 
 def _reaches_out(path: Path) -> str:
-    """What a config names that is not installed here, empty for nothing.
+    """The first file or dataset of a config that is not part of the package; empty if there is none.
 
-    Datasets that read folders are known by not being in ``OWN``; code in files and profiles in files by their names.
+    A dataset outside ``OWN`` may read folders; code and profiles in files are recognized by their names.
     """
     study = load(path).data
     display = study.get("display")
@@ -174,24 +173,24 @@ def _reaches_out(path: Path) -> str:
 
     def walk(value: object, key: str) -> str:
         if isinstance(value, dict):
-            return next((found for name, item in value.items() if (found := walk(item, str(name)))), "")
+            return next((reason for name, item in value.items() if (reason := walk(item, str(name)))), "")
         if isinstance(value, list):
-            return next((found for item in value if (found := walk(item, key))), "")
+            return next((reason for item in value if (reason := walk(item, key))), "")
         file = isinstance(value, str) and (".py:" in value or value.endswith((".yaml", ".yml")) or "/" in value)
-        told = key in ("title", "note", "label", "source")
-        reaches = (file and not told) or key in ("path", "manifest", "lpips_weights", "weights")
+        is_prose = key in ("title", "note", "label", "source")
+        reaches = (file and not is_prose) or key in ("path", "manifest", "lpips_weights", "weights")
         return f"names a file ({key}: {str(value)[:60]})" if reaches else ""
 
     for section in ("targets", "training"):
-        given = study.get(section)
-        dataset = given.get("dataset", "dead_leaves") if isinstance(given, dict) else "dead_leaves"
+        entry = study.get(section)
+        dataset = entry.get("dataset", "dead_leaves") if isinstance(entry, dict) else "dead_leaves"
         if dataset not in OWN:
             return f"names the dataset '{str(dataset)[:60]}', which may read any folder"
     return walk(study, "")
 
 
 def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:
-    """The study with one display, that photographs can be exchanged for. UserError says what stands against it."""
+    """The study with a single display, for an exchange of photographs. UserError where that is impossible."""
     if study.measure == "focus" or study.sweeps or study.display.learned:
         what = "focal stacks" if study.measure == "focus" else "changes of a display" if study.sweeps else "a network"
         raise UserError(f"{study.file}: a session measures pictures on one real display, not {what}")
@@ -221,8 +220,8 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
 
 
 def _profile(study: Study, display: str | None) -> str:
-    """The profile that a display is named by. UserError: several, or none of the name."""
-    names = {condition(one, study.display.panel, study.folder).name: one for one in study.display.profiles}
+    """The profile of a display's name. UserError if the name is unknown, or missing with several displays."""
+    names = {condition(profile, study.display.panel, study.folder).name: profile for profile in study.display.profiles}
     if display is None and len(names) > 1:
         raise UserError(f"{study.file}: several displays; choose one with --display, or describe yours with --bench")
     if display is None:

@@ -1,4 +1,4 @@
-"""One small file a cell: written whole or not at all, so that a run can be killed at any moment and resumed."""
+"""A small file for each cell, written atomically, so that a run can be killed at any moment and resumed."""
 
 from __future__ import annotations
 
@@ -16,21 +16,20 @@ from ..core.hashing import digest
 from ..core.io import TEMPORARY, file_name, write_atomically
 from .plan import Cell, Plan
 
+# ``missing``: a planned cell without a record; ``Store.load`` gives this state, and no file holds it.
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
-"""``missing`` is the state of a planned cell that has no record; ``Store.load`` gives it and no file holds it."""
 
-ADDED = frozenset({"alone", "memory_mib", "stopped"})
-"""What records of earlier versions lack."""
+ADDED = frozenset({"alone", "memory_mib", "stopped"})  # entries that records of earlier versions lack
 
 
 @dataclass(frozen=True)
 class Record:
-    """What was measured in a cell.
+    """The measurement of a cell.
 
     cell: its description; state: ``done``, or why there is no score in ``reason``; scores: flat metric names
-    to numbers; captures: camera captures the method used; seconds: wall time of the solution; alone: whether
-    nothing else of the run was at work meanwhile (None: not known); memory_mib: the most resident memory that the
-    solution took beyond what was there before it [MiB]; label: the method's name in tables;
+    to numbers; captures: camera captures the method used; seconds: wall time of the solution; alone: whether it
+    was timed without concurrent workers (None: unknown); memory_mib: peak of resident memory above the level before the
+    solution [MiB]; label: the method's name in tables;
     registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
     saturated samples; learned: sha256, captures and seconds of the training that the method needed first; stopped: why
     the display ended the solution, whose best hologram so far was scored (empty: it did not). None: does not apply, as
@@ -85,8 +84,8 @@ class Store:
         return self.folder / f"target-{file_name(target)}.png"
 
     def write(self, record: Record) -> None:
-        """Write a record, whole or not at all. A failure never replaces a score, which was only to be timed again."""
-        if record.state == "failed" and (known := self.read(record.id)) is not None and known.state == "done":
+        """Write a record atomically. A failure never replaces a score: that cell was only to be timed again."""
+        if record.state == "failed" and (earlier := self.read(record.id)) is not None and earlier.state == "done":
             return
         text = json.dumps(vars(record), indent=1, sort_keys=True, allow_nan=False)
         write_atomically(self.path(record.id), f"{text}\n".encode())
@@ -105,15 +104,15 @@ class Store:
     def load(self, plan: Plan) -> list[dict[str, Any]]:
         """A record for every cell of the plan, in its order, under the plan's labels.
 
-        A cell without a record has the state ``missing``, so that no hole in a table is silent.
+        A cell without a record has the state ``missing``, so that every gap in a table is visible.
         """
-        found = []
+        records = []
         for label, cell in plan.labelled():
             record = self.read(cell.id)
             if record is None:
                 record = Record(cell.description(), "missing", label, "no record: not run")
-            found.append({**vars(record), "label": label})
-        return found
+            records.append({**vars(record), "label": label})
+        return records
 
     def missing(
         self, cells: tuple[Cell, ...], retry_failed: bool = False, timed: frozenset[str] = frozenset()
@@ -127,12 +126,12 @@ class Store:
 
     def states(self, cells: tuple[Cell, ...], timed: frozenset[str] = frozenset()) -> dict[str, State]:
         """State of every cell's record, by the cell's id; those of ``timed`` that were not timed alone are missing."""
-        there = {path.stem for path in self.folder.glob("*.json")}  # to open each that is not there takes longer
+        recorded = {path.stem for path in self.folder.glob("*.json")}  # faster than trying to open each missing file
 
         def state(cell: Cell) -> State:
-            record = self.read(cell.id) if cell.id in there else None
-            again = cell.id in timed and record is not None and record.state == "done" and not record.alone
-            return "missing" if record is None or again else record.state
+            record = self.read(cell.id) if cell.id in recorded else None
+            untimed = cell.id in timed and record is not None and record.state == "done" and not record.alone
+            return "missing" if record is None or untimed else record.state
 
         return {cell.id: state(cell) for cell in cells}
 
@@ -153,7 +152,7 @@ class Store:
 
 
 def _checked(path: Path, identity: str, content: Any) -> Record:
-    """The record in a file, after checking that it is one, and the one that the file's name says."""
+    """The record in a file. UserError for invalid content, or a cell that does not match the file's name."""
     names = {item.name for item in fields(Record)}
     if not isinstance(content, dict) or set(content) | ADDED != names:
         raise UserError(f"{path}: not a record of this version; delete the file and run the study again")
@@ -163,7 +162,9 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
     if record.state not in get_args(State) or not isinstance(record.scores, dict):
         raise UserError(f"{path}: unknown state '{record.state}'; delete the file and run the study again")
     numbers = [record.seconds, record.memory_mib, record.registration_residual_px, record.saturated]
-    if not all(_is_number(value) for value in (*record.scores.values(), *filter(_is_told, numbers), record.captures)):
+    if not all(
+        _is_number(value) for value in (*record.scores.values(), *filter(_is_present, numbers), record.captures)
+    ):
         raise UserError(f"{path}: a score or a measurement is not a number; delete the file and run the study again")
     if not all(isinstance(text, str) for text in (record.label, record.reason, record.stopped)):
         raise UserError(f"{path}: label, reason and stopped are texts; delete the file and run the study again")
@@ -174,7 +175,7 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
     return record
 
 
-def _is_told(value: object) -> bool:
+def _is_present(value: object) -> bool:
     return value is not None
 
 

@@ -22,60 +22,59 @@ from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
 from ..lab.real import RealBench
 from . import opening
-from .artifacts import LOG, RECORDS, Artifacts, known
+from .artifacts import LOG, RECORDS, Artifacts, provenance_of
 from .displays import Preparation
 from .plan import Plan
 from .versions import HARNESS, method_version
 
-WAITS = "waits for photographs"
-"""In the place of a reason why a training failed."""
+WAITS = "waits for photographs"  # in place of the reason of a failure
 
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """A preparation and what a worker needs to carry it out. device: name of where it computes, see ``device.find``."""
+    """A preparation and what a worker needs to train it. device: name of where it computes, see ``device.find``."""
 
-    needed: Preparation
+    preparation: Preparation
     folder: Path
     threads: int
     device: str = "cpu"
 
 
 def train(job: TrainingJob) -> str:
-    """Make an artifact, going on where an earlier attempt stopped. Returns why it failed, empty if it did not."""
+    """Make an artifact, resuming an earlier attempt. Returns the reason of a failure, empty for success."""
     artifacts, device = Artifacts(job.folder), find(job.device)
-    with artifacts.locked(job.needed), repeatable(job.threads, device):
-        if artifacts.has(job.needed):
+    with artifacts.locked(job.preparation), repeatable(job.threads, device):
+        if artifacts.has(job.preparation):
             return ""
         try:
-            _train(job.needed, artifacts, job.threads, device)
+            _train(job.preparation, artifacts, job.threads, device)
         except LostDeviceError:
             raise
         except Pending:
-            artifacts.forget_failure(job.needed)
+            artifacts.forget_failure(job.preparation)
             return WAITS
         except (Exception, SystemExit) as error:
-            return artifacts.fail(job.needed, error)
+            return artifacts.fail(job.preparation, error)
         return ""
 
 
-def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torch.device) -> None:
-    method = plugins.build("methods", needed.method, dict(needed.params), needed.folder)
-    images = _images(needed, device)
-    split = len(images) - needed.held_out
-    place = opening.open_display(needed.place, needed.seed, device)
+def _train(preparation: Preparation, artifacts: Artifacts, threads: int, device: torch.device) -> None:
+    method = plugins.build("methods", preparation.method, dict(preparation.params), preparation.folder)
+    images = _images(preparation, device)
+    split = len(images) - preparation.held_out
+    display_bench = opening.open_display(preparation.display, preparation.seed, device)
     bench = TrainingBench(
-        place,
-        needed.method,
+        display_bench,
+        preparation.method,
         images[:split],
         images[split:],
-        artifacts.memory(needed),
-        needed.captures,
-        needed.seed,
+        artifacts.memory(preparation),
+        preparation.captures,
+        preparation.seed,
     )
     state = method.prepare(bench)
     if not isinstance(state, Mapping):
-        raise CellError(f"{needed.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
+        raise CellError(f"{preparation.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
     state = moved(state, CPU)
     facts: dict[str, Any] = {
         "captures": bench.captures,
@@ -88,34 +87,35 @@ def _train(needed: Preparation, artifacts: Artifacts, threads: int, device: torc
         "harness_sha256": HARNESS,
         "made": now(),
     }
-    artifacts.write(needed, state, facts | diagnosis(method, state, place))
+    artifacts.write(preparation, state, facts | diagnosis(method, state, display_bench))
 
 
-def diagnosis(method: object, state: Mapping[str, Any], place: CalibratedBench | RealBench) -> dict[str, Any]:
-    """What a method says of the display it learned, beside the truth, for methods that say something.
+def diagnosis(method: object, state: Mapping[str, Any], display_bench: CalibratedBench | RealBench) -> dict[str, Any]:
+    """A method's estimates of the display, beside the ground truth; empty without ``estimates`` or ``form``.
 
-    estimates: see ``display.estimates.joined``; missing: effects of the bench that the form of the method's model has
-    no term for, each in words, if the method says what its ``form`` is; diagnosis_failed: why there is neither.
-    Of a real bench the truth is not known.
+    estimates: see ``display.estimates.joined``; missing: texts of the bench's effects that the model's ``form`` has no
+    term for; diagnosis_failed: the error, if there was one. A real bench has no ground truth.
     """
     estimates, form = getattr(method, "estimates", None), getattr(method, "form", None)
-    found: dict[str, Any] = {}
+    findings: dict[str, Any] = {}
     try:
         if estimates is not None:
-            known = () if isinstance(place, RealBench) else truth(place.bench)
-            found["estimates"] = joined(estimates(state, place.spec), known)
-        if form is not None and not isinstance(place, RealBench):
-            found["missing"] = [one.text for one in place.bench.profile.effects() if one.name not in form]
+            true_values = () if isinstance(display_bench, RealBench) else truth(display_bench.bench)
+            findings["estimates"] = joined(estimates(state, display_bench.spec), true_values)
+        if form is not None and not isinstance(display_bench, RealBench):
+            findings["missing"] = [
+                effect.text for effect in display_bench.bench.profile.effects() if effect.name not in form
+            ]
     except Exception as error:  # must not cost what was learned
-        found["diagnosis_failed"] = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-    return found
+        findings["diagnosis_failed"] = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    return findings
 
 
-def _images(needed: Preparation, device: torch.device) -> list[TrainingImage]:
+def _images(preparation: Preparation, device: torch.device) -> list[TrainingImage]:
     """The training images at the size of the scored region, on a device."""
-    dataset = plugins.build("datasets", needed.dataset, dict(needed.dataset_params), needed.folder)
-    spec, images = needed.place.spec, []
-    for item, sha256 in needed.images:
+    dataset = plugins.build("datasets", preparation.dataset, dict(preparation.dataset_params), preparation.folder)
+    spec, images = preparation.display.spec, []
+    for item, sha256 in preparation.images:
         if dataset.digest(item) != sha256:
             raise CellError(f"training image '{item}' has changed since the study was planned; start the run again")
         target = dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))
@@ -126,18 +126,18 @@ def _images(needed: Preparation, device: torch.device) -> list[TrainingImage]:
 def keep_training_records(plan: Plan, artifacts: Artifacts, output: Path) -> None:
     """Copy logs and provenance of what a plan had to learn into ``output/training``.
 
-    What is there stays when its artifact is not at hand any more; what the plan does not need goes.
+    Copies stay when their artifact is gone; copies that the plan does not need are removed.
     """
-    needed, names = plan.preparations(), _names(plan)
+    preparations, names = plan.preparations(), _names(plan)
     folder = output / RECORDS
     for old in (*folder.glob("*.json"), *folder.glob("*.csv")):
         if old.stem not in names.values():
             old.unlink()
     for identity, name in names.items():
-        place = artifacts.place(needed[identity])
-        provenance = known(place)
+        artifact_folder = artifacts.folder_of(preparations[identity])
+        provenance = provenance_of(artifact_folder)
         if provenance is not None:
-            log = place / LOG
+            log = artifact_folder / LOG
             write_atomically(folder / f"{name}.csv", log.read_bytes() if log.is_file() else b"")
             write_atomically(folder / f"{name}.json", f"{json.dumps(provenance, indent=1)}\n".encode())
 
@@ -145,14 +145,14 @@ def keep_training_records(plan: Plan, artifacts: Artifacts, output: Path) -> Non
 def _names(plan: Plan) -> dict[str, str]:
     """File names by preparation: the first label that needs it, and the display it is trained on."""
     titles = {
-        task.preparation.id: f"{task.label} {task.preparation.place.name}"
+        task.preparation.id: f"{task.label} {task.preparation.display.name}"
         for task in reversed(plan.tasks)
         if task.preparation
     }
     names: dict[str, str] = {}
-    for identity, needed in plan.preparations().items():
-        title = titles.get(identity, f"display {needed.method} {needed.place.name}")
+    for identity, preparation in plan.preparations().items():
+        title = titles.get(identity, f"display {preparation.method} {preparation.display.name}")
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-.")
-        taken = {name.lower() for name in names.values()}  # some file systems do not tell A from a
+        taken = {name.lower() for name in names.values()}  # some file systems ignore case
         names[identity] = f"{stem}-{identity[:8]}" if stem.lower() in taken or not stem else stem
     return names

@@ -14,12 +14,13 @@ from typing import Any
 
 from ..core.hashing import digest
 
+# Everything between a phase and its score: optics, simulated bench, registration, metrics. A new version is any new
+# text; every cell is then computed again.
 HARNESS = "c99cd6e04659e254efe370a1208c1a90b4a08e6b2ebefb766794ba61e0e9d914"
-"""Everything between a phase and its score: optics, simulated bench, registration, metrics. A new version is any new
-text; it has every cell computed again."""
+# The alignment of a photograph with its target without fiducials (``holoeval score``).
 ALIGNMENT = "bf6ba199e08d4095b8e39ad30dae6362d6e0fc515bce398ded0ee8949f3d5df6"
-"""What puts a photograph on the pixels of its target without a fiducial (``holoeval score``)."""
 
+# Names of versions in records that are older than declared versions; a method that is not listed is named by its own.
 RECORDED = {
     "DoublePhase 1": "43150a62afdb18a7a813171a6289847a0866ad081d8bcb2e08cf5b82ef738669",
     "AntiAliasedDoublePhase 1": "43150a62afdb18a7a813171a6289847a0866ad081d8bcb2e08cf5b82ef738669",
@@ -42,11 +43,10 @@ RECORDED = {
     "OdakSGD 1": "2d9d2d697aed0c8479e93e71bb82ad99955bb6c28539a24e5d58259090a249a9",
     "TorchOpticsAdam 1": "0d28d9a38415f3f296c42991f0f668f26524a6822e603554025f1b1e5d936fa5",
 }
-"""How records name the versions that are older than declared ones; a method that is not here is named by its own."""
 
 
 def method_version(cls: type[Any]) -> str:
-    """What names a method's code in a cell: declared if it ships with the package, else ``code_digest``.
+    """The version of a method's code in a cell: declared if it ships with the package, else ``code_digest``.
 
     A shipped method declares ``version: ClassVar[int]``, 1 if it says nothing. It is raised when the method gives
     other phases, or learns something else: cells that use it are then computed, and artifacts learned, again.
@@ -97,7 +97,7 @@ def _code(file: Path, text: str) -> tuple[str, frozenset[Path]]:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
             node.body = node.body[1:] or [ast.Pass()]
         if isinstance(node, ast.ImportFrom) and 0 < node.level <= len(file.parents):
-            place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
-            for module in (place, *(place / alias.name for alias in node.names)):
+            package = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            for module in (package, *(package / alias.name for alias in node.names)):
                 imported |= {module.parent / f"{module.name}.py", module / "__init__.py"}
     return ast.unparse(tree), frozenset(imported)

@@ -187,7 +187,7 @@ def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(
     artifacts = Artifacts(tmp_path / "artifacts")
     artifacts.write(needed, {"gain": torch.ones(3)}, {"captures": 2, "seconds": 0.5})
     assert artifacts.load(needed).state["gain"].tolist() == [1, 1, 1]
-    place = artifacts.place(needed)
+    place = artifacts.folder_of(needed)
     damage(place)
     with pytest.raises(UserError) as refused:
         artifacts.load(needed)

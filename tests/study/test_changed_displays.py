@@ -47,7 +47,7 @@ def test_a_method_that_sees_the_display_is_solved_under_every_change(tmp_path: P
 def test_a_trained_method_is_trained_once_before_any_change(tmp_path: Path) -> None:
     grid = plan(study_with(tmp_path, SWEEPS, "parametric_model"))
     assert len(grid.preparations()) == 1
-    assert {task.preparation.place.change for task in grid.tasks if task.preparation} == {None}
+    assert {task.preparation.display.change for task in grid.tasks if task.preparation} == {None}
 
 
 def test_the_nominal_value_is_the_unchanged_cell(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def test_a_learned_display_is_one_more_thing_to_learn(tmp_path: Path) -> None:
     (place,) = displays(load_study(config)).values()
     assert place.learned is not None
     assert [needed.params["rounds"] for needed in needs(config)] in ([2, 3], [3, 2])
-    assert {needed.place.name for needed in needs(config)} == {"ideal"}
+    assert {needed.display.name for needed in needs(config)} == {"ideal"}
     assert all(place.learned.id in cell.prepared for cell in grid.cells)
     assert json.loads(json.dumps(grid.cells[-1].description())) == grid.cells[-1].description()
 

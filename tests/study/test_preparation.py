@@ -80,12 +80,12 @@ def test_every_display_is_learned_for_itself_and_once(tmp_path: Path) -> None:
     both = write_profile(tmp_path)[0], "[ideal, mine.yaml]"
     config = write(tmp_path, both, ("count: 1", "count: 2"))
     grid = plan(load_study(config))
-    assert sorted(needed.place.name for needed in grid.preparations().values()) == ["ideal", "mine"]
+    assert sorted(needed.display.name for needed in grid.preparations().values()) == ["ideal", "mine"]
     for task in grid.tasks:
         if not task.is_floor:
             assert task.preparation is not None
             assert [cell.prepared for cell in task.cells] == [(task.preparation.id,)]
-            assert task.preparation.place.name == task.conditions[0].name
+            assert task.preparation.display.name == task.conditions[0].name
 
 
 def test_a_method_that_learns_nothing_needs_nothing(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_a_description_is_plain_and_names_a_folder_inside_that_of_the_artifacts(
     profile.write_text(profile.read_text().replace("name: mine", 'name: "../../up"'))
     (needed,) = needs(write(tmp_path, ("[ideal]", "[mine.yaml]")))
     assert json.loads(json.dumps(needed.description())) == needed.description()
-    assert Artifacts(tmp_path / "artifacts").place(needed).parent == tmp_path / "artifacts"
+    assert Artifacts(tmp_path / "artifacts").folder_of(needed).parent == tmp_path / "artifacts"
 
 
 def test_an_image_that_is_scored_is_not_trained_on(tmp_path: Path) -> None:

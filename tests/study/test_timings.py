@@ -21,12 +21,12 @@ def test_the_first_measurement_is_the_one_reported() -> None:
     assert cost.keep("a", Cost(2.5, 40.0)) == Cost(2.5, 40.0)
     assert cost.keep("a", Cost(9.0, 50.0)) == Cost(2.5, 40.0)
     assert cost.keep("a", Cost(9.0, None)) == Cost(2.5, 40.0)
-    assert cost.known("a") == Cost(2.5, 40.0)
+    assert cost.recorded("a") == Cost(2.5, 40.0)
 
 
 def test_measuring_again_replaces_it() -> None:
     cost.keep("a", Cost(2.5, 40.0))
-    assert cost.keep("a", Cost(9.0, 50.0), again=True) == Cost(9.0, 50.0)
+    assert cost.keep("a", Cost(9.0, 50.0), retime=True) == Cost(9.0, 50.0)
     assert cost.keep("a", Cost(1.0, 10.0)) == Cost(9.0, 50.0)
 
 
@@ -46,7 +46,7 @@ DAMAGED += ['{"seconds": 1, "memory_mib": -1}', '{"seconds": 1, "memory_mib": [2
 def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
     cost.keep("a", Cost(2.5))
     (cost.folder() / "a.json").write_text(content, encoding="latin-1")
-    assert cost.known("a") is None
+    assert cost.recorded("a") is None
     assert cost.keep("a", Cost(3.0)) == Cost(3.0)
 
 

@@ -192,7 +192,7 @@ def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_p
     told: list[str] = []
     follower = Follower(0.01)
     logs = {name: FolderMemory(tmp_path / name) for name in ("one", "two")}
-    follower.start([(name, log.place) for name, log in logs.items()], told.append)
+    follower.start([(name, log.folder) for name, log in logs.items()], told.append)
 
     def tells(line: str) -> None:
         deadline = time.monotonic() + 10

@@ -53,7 +53,7 @@ def artifacts(tmp_path):
 
 
 def finish(artifacts, needed, captures=7):
-    write_atomically(artifacts.place(needed) / "training.csv", LOG.encode())
+    write_atomically(artifacts.folder_of(needed) / "training.csv", LOG.encode())
     artifacts.write(needed, {}, {"captures": captures, "seconds": 61.25})
 
 
@@ -112,14 +112,14 @@ def test_a_preview_says_what_is_trained_unfinished_failed_and_missing(study, art
     assert [(row.state, row.needed_by) for row in before] == [("missing", ("A b",)), ("missing", ("a-b",))]
     assert math.isnan(before[0].captures)
 
-    write_atomically(artifacts.place(second) / "training.csv", LOG.encode())
+    write_atomically(artifacts.folder_of(second) / "training.csv", LOG.encode())
     artifacts.memory(second).save("network", {})
     finish(artifacts, first)
     done, unfinished = trainings(grid, artifacts)
     assert (done.state, done.captures, done.seconds) == ("done", 7, 61.25)
     assert (unfinished.state, unfinished.captures, unfinished.seconds) == ("unfinished", 5, 2.5)
 
-    write_atomically(artifacts.place(second) / FAILURE, b"BudgetError: [no] captures left\n")
+    write_atomically(artifacts.folder_of(second) / FAILURE, b"BudgetError: [no] captures left\n")
     failed = trainings(grid, artifacts)[1]
     assert (failed.state, failed.reason) == ("failed", "BudgetError: [no] captures left")
     console = Console(width=160, record=True, file=open("/dev/null", "w"))  # noqa: PTH123, SIM115
@@ -144,7 +144,7 @@ def test_a_damaged_provenance_is_passed_over(study, artifacts, tmp_path):
     first, _ = grid.preparations().values()
     finish(artifacts, first)
     for damaged in ("{", "[]", json.dumps({"description": 3})):
-        (artifacts.place(first) / "provenance.json").write_text(damaged)
+        (artifacts.folder_of(first) / "provenance.json").write_text(damaged)
         keep_training_records(grid, artifacts, output)
         assert training_records(output) == {}
         assert math.isnan(trainings(grid, artifacts)[0].captures)

@@ -68,7 +68,7 @@ def needs(config: Path) -> list[Preparation]:
 def artifact_of(config: Path) -> Path:
     """The folder of the one artifact of a study."""
     (needed,) = needs(config)
-    return Artifacts(config.parent / "artifacts").place(needed)
+    return Artifacts(config.parent / "artifacts").folder_of(needed)
 
 
 def rounds(folder: Path) -> list[int]:

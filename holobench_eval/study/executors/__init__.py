@@ -18,8 +18,8 @@ class Executor(Protocol):
     """Runs a function over jobs.
 
     ``map`` takes a job from the iterable when it starts it, and yields (job, result) as results come, in any
-    order; a job whose worker was lost gives the exception instead of a result. None in the place of a job: the next
-    waits for one that is at work, ask again when a result has been taken.
+    order; a job whose worker was lost gives the exception instead of a result. None instead of a job: the next job
+    waits for a running one; ask the iterable again after the next result.
     """
 
     @property
@@ -46,16 +46,16 @@ class Serial:
 
 
 NAMES = ("auto", "serial", "local", "slurm", "address")
-ELSEWHERE = ("slurm", "address")
-"""Those whose workers are on other machines and know their own GPUs."""
+ELSEWHERE = ("slurm", "address")  # their workers are on other machines and know their own GPUs
 
 
 def executor(name: str, workers: int | None, small: bool = True, address: str | None = None, gpus: int = 0) -> Executor:
-    """The executor of a name; ``workers`` defaults to the number of GPUs to compute on, without any of processors.
+    """The executor of a name; ``workers`` defaults to the number of GPUs to compute on, or of cores without a GPU.
 
-    "auto" is local where the study's panel is small and there is more than one worker to have, else serial: a small
-    panel does not keep several threads busy, a large one fills the memory. With GPUs it is local where there are
-    several. address: of a running Dask scheduler; gpus: to compute on; for workers elsewhere, 1 if each has one.
+    "auto" is local if the study's panel is small and several workers are available, else serial: a small panel does
+    not keep several threads busy, a large panel fills the memory. With GPUs, "auto" is local
+    if there are several. address: of a running Dask scheduler; gpus: to compute on; for workers elsewhere, 1 if each
+    has one.
     """
     if name not in NAMES:
         raise UserError(f"unknown executor '{name}'; {suggest(name, NAMES)}")
@@ -71,12 +71,12 @@ def executor(name: str, workers: int | None, small: bool = True, address: str | 
         if workers is None:
             raise UserError("--executor slurm needs --workers, how many SLURM jobs to start")
         return Slurm(workers, on_gpu=gpus > 0)
-    many = workers or gpus or _cores()
-    if name == "serial" or (name == "auto" and (many == 1 or not (small or workers or gpus))):
+    count = workers or gpus or _cores()
+    if name == "serial" or (name == "auto" and (count == 1 or not (small or workers or gpus))):
         return Serial()
-    return Local(many, gpus)
+    return Local(count, gpus)
 
 
 def _cores() -> int:
-    """Cores that this process may use; macOS does not tell and gives all of them."""
+    """Cores that this process may use; all cores on macOS, which does not report the limit."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

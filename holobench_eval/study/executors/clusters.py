@@ -19,6 +19,8 @@ from ...core.errors import UserError
 J = TypeVar("J")
 R = TypeVar("R")
 
+# Dask's own, without its MALLOC_TRIM_THRESHOLD_ (it returns every freed tensor to the system, and allocating the next
+# doubles the time of a step), and without its profiler, which samples every worker's stack a hundred times a second.
 WORKER_ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
@@ -26,12 +28,8 @@ WORKER_ENVIRONMENT = {
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
 }
-"""Dask's own, without its MALLOC_TRIM_THRESHOLD_ (that gives every freed tensor back to the system, and getting the
-next one from there doubles the time of a step), and without a look at every worker's stack a hundred times a second."""
-ANSWER = 30.0
-"""Seconds that a scheduler has to answer."""
-GPU = {"GPU": 1}
-"""The resource that a worker with a GPU declares, and that a job on one asks for."""
+ANSWER = 30.0  # s that a scheduler has to answer
+GPU = {"GPU": 1}  # resource that a worker with a GPU declares, and that a job on a GPU requests
 SETTINGS = {
     # A worker lost twice on the same job is the job's fault.
     "distributed.scheduler.allowed-failures": 1,
@@ -46,7 +44,7 @@ SETTINGS = {
 class Local:
     """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try.
 
-    gpus: to compute on, shared out among the workers: where there are several, each worker sees one of them.
+    gpus: to compute on; of several, each worker sees only its own.
     """
 
     workers: int
@@ -153,13 +151,17 @@ class Address:
 
 
 def _usable(client: Any, on_gpu: bool) -> dict[str, Any]:
-    """What the scheduler knows of its workers at this moment, by their names; on_gpu: of those that declare a GPU."""
+    """The scheduler's present information on its workers, by name; on_gpu: only of those that declare a GPU."""
     workers = client.scheduler_info(n_workers=-1)["workers"]
-    return {name: one for name, one in workers.items() if not on_gpu or one["resources"].get("GPU", 0) >= GPU["GPU"]}
+    return {
+        name: worker
+        for name, worker in workers.items()
+        if not on_gpu or worker["resources"].get("GPU", 0) >= GPU["GPU"]
+    }
 
 
 def _there(client: Any, on_gpu: bool) -> int:
-    """Workers that can be used at this moment, at least one so that a job is always waiting for the first."""
+    """The number of usable workers, at least 1 so that a job always waits for the first worker."""
     return max(1, len(_usable(client, on_gpu)))
 
 
@@ -217,8 +219,8 @@ def _declared() -> list[str]:
 
 
 def _bound_to_the_parent() -> Any:
-    """A plugin by which every worker, a restarted one too, leaves Ctrl-C to the process that started it and dies with
-    it: a killed run must not go on training in the background."""
+    """A plugin for every worker, restarted workers included: Ctrl-C is left to the parent process, and a worker dies
+    with its parent, since a killed run must not go on training in the background."""
     from distributed import WorkerPlugin
 
     class BoundToParent(WorkerPlugin):

@@ -2,7 +2,7 @@
 
 from ...core.io import file_name
 
-FILES = "files"  # the measure of pictures that were given as files, and the name of their data set
+FILES = "files"  # the measure of pictures from files, and the name of their data set
 
 
 def alignment_name(method: str, target: str) -> str:

@@ -1,4 +1,4 @@
-"""The folders of ``holoeval score``: every picture is looked at before anything is computed."""
+"""The folders of ``holoeval score``: every picture is checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture file that was read once and found good.
+    """A picture file that was read once and is valid.
 
     shape: ``(C, h, w)``, C = 1 or 3; sha256: of the file; pixels_sha256: of its values.
     """
@@ -54,7 +54,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Folders:
-    """What there is to score.
+    """The pictures to score.
 
     targets: by name; captures: by method and name of the target; notes: sentences that a reader of the scores needs.
     """
@@ -163,7 +163,7 @@ def _decoded(content: bytes, path: Path) -> Values:
 
 
 def _load(image: Image.Image, content: bytes, path: Path) -> None:
-    """Decode all of it once by Pillow, which tells a truncated file where OpenCV fills up."""
+    """Decode the file with Pillow, which reports truncated files that OpenCV would pad."""
     if image.format == "PNG" and PNG_END not in content:
         raise UserError(f"{path}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
     try:
@@ -174,7 +174,7 @@ def _load(image: Image.Image, content: bytes, path: Path) -> None:
 
 
 def _notes(targets: Mapping[str, Picture], captures: Mapping[tuple[str, str], Picture]) -> Iterator[str]:
-    """What the scores cannot tell by themselves."""
+    """Sentences about facts that the scores do not show."""
     lossy = [picture.path.name for picture in (*targets.values(), *captures.values()) if picture.is_jpeg]
     if lossy:
         yield (

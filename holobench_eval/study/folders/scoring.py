@@ -1,4 +1,4 @@
-"""Alignments, scores and pictures of given captures: what ``holoeval score`` computes and keeps."""
+"""The alignments, scores and pictures that ``holoeval score`` computes from captures and keeps."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from .files import Folders, Picture, Values
 CONDITION = "photographed display"
 
 Key = tuple[str, str]  # method and name of the target
-Alignments = dict[Key, Alignment | str]  # or the reasons why there are none
+Alignments = dict[Key, Alignment | str]  # or the reason of a refusal
 Step = Callable[[str], None]  # called with the name of each step
 Draw = Callable[[Path, Values, Warp, Values, Values], None]  # file, capture, warp, matched capture, target
 
@@ -61,7 +61,7 @@ def described(folders: Folders, values: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Scoring:
-    """Given captures, and how they are scored.
+    """Captures from folders, and how they are scored.
 
     store: of records, alignments and pictures; values: how files are read, ``stored`` (as they are), ``srgb``, or
     ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values.
@@ -75,7 +75,7 @@ class Scoring:
 
     @property
     def domain(self) -> str:
-        """In which PSNR and SSIM are given."""
+        """The domain of PSNR and SSIM in the scores' names."""
         return "stored" if self.values == "stored" else "linear"
 
     @cached_property
@@ -108,7 +108,7 @@ class Scoring:
         return records
 
     def alignments(self, step: Step) -> Alignments:
-        """Every capture's own alignment, from what is kept of an earlier run or computed."""
+        """Every capture's own alignment, kept from an earlier run or computed."""
         own: Alignments = {}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
@@ -143,14 +143,14 @@ class Scoring:
         return srgb_encode(torch.from_numpy(values) / bright).numpy()
 
     def common(self, own: Alignments) -> Alignments:
-        """The shared alignments: by frame size and shape of the target, for those that agree or that they fit."""
+        """The shared alignments, by frame size and target shape, of captures that agree with one or that it fits."""
         captures, targets = self.folders.captures, self.folders.targets
         groups: dict[tuple[int, ...], list[Key]] = {}
         for key, picture in captures.items():
             groups.setdefault((*picture.shape, *targets[key[1]].shape), []).append(key)
         placements: Alignments = {}
         for keys in groups.values():
-            common = shared({key: found for key in keys if isinstance(found := own[key], Alignment)})
+            common = shared({key: alignment for key in keys if isinstance(alignment := own[key], Alignment)})
             if common is None:
                 continue
             warp, agreeing = common
@@ -187,19 +187,21 @@ class Scoring:
         return record
 
     def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
-        """PSNR and SSIM by the geometry that another algorithm finds, and how far apart the two are."""
+        """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""
         frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
         light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(compared)
         other = second_warp(gray(light.numpy()), gray(reference.numpy()), first)
         if other is None:
             return {}
         image = torch.from_numpy(sampled(frame, other))
-        again = score(image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored")
-        scores = {f"{name}_{self.domain}_second": again[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
+        other_scores = score(
+            image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored"
+        )
+        scores = {f"{name}_{self.domain}_second": other_scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return scores | {"second_aligner_px": disagreement(first, other)}
 
     def floor(self, name: str) -> list[Record]:
-        """The records of what no method made."""
+        """The records of floor images."""
         names = list(self.folders.targets)
         after = names[names.index(name) + 1 :] + names[: names.index(name)]
         shape = self.folders.targets[name].shape
@@ -270,7 +272,7 @@ class Scoring:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """A kept alignment; None where there is none, or none that can be read."""
+    """A kept alignment; None where it is missing or unreadable."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

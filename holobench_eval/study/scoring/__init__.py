@@ -1,1 +1,1 @@
-"""How a cell becomes scores, a measure a file: a picture, a prediction, a focal stack."""
+"""How a cell is scored, with a file for each measure: picture, prediction, focal stack."""

@@ -15,18 +15,16 @@ from ..store import Record
 from . import focus, picture, prediction
 from .job import Job, Measure, Measured
 
-MEASURES: Mapping[str, Measure] = {
+MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
     "picture": picture.picture,
     "prediction": prediction.prediction,
     "focus": focus.focus,
 }
-"""By the name that a study's config gives as ``measure``."""
-FLOORS: Mapping[str, Measure] = {
+FLOORS: Mapping[str, Measure] = {  # the same for floor images
     "picture": picture.floor,
     "prediction": prediction.floor,
     "focus": focus.floor,
 }
-"""The same for images that no method made."""
 
 
 def work(job: Job) -> list[Record]:
@@ -43,14 +41,14 @@ def work(job: Job) -> list[Record]:
             return []
         except (Exception, SystemExit) as error:
             return [_note_failure(job, cell, error) for cell, _ in job.cells]
-        records = [_recorded(job, cell, place, measured) for cell, place in job.cells]
+        records = [_recorded(job, cell, display, measured) for cell, display in job.cells]
         return [record for record in records if record is not None]
 
 
-def _recorded(job: Job, cell: Cell, place: Condition, measured: Measured) -> Record | None:
+def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> Record | None:
     """The record; None for a cell that waits for a photograph."""
     try:
-        record = measured(cell, place)
+        record = measured(cell, display)
         for name, value in record.scores.items():
             if not math.isfinite(value):
                 raise CellError(f"the score {name} is {value}")

@@ -23,9 +23,9 @@ from .solution import solution
 def focus(job: Job) -> Measured:
     """Solve for one plane, or for all planes of a scene at once, on the display before any change; the result shows the
     phase at any of the task's planes and displays."""
-    cells, place = job.task.cells, job.task.conditions[0].nominal
-    targets = {cell.target: job.target(cell, place) for cell in cells}
-    offsets = {cell.target: offset(place, cell.change) for cell in cells}
+    cells, display = job.task.cells, job.task.conditions[0].nominal
+    targets = {cell.target: job.target(cell, display) for cell in cells}
+    offsets = {cell.target: offset(display, cell.change) for cell in cells}
 
     def solve(method: Any, handle: MeteredDisplay) -> Any:
         pictures = torch.stack(list(targets.values())).to(job.device)
@@ -33,17 +33,17 @@ def focus(job: Job) -> Measured:
             return method.solve_planes(pictures, list(offsets.values()), handle)[None]
         return method.solve(pictures, handle)
 
-    solved = solution(job, place, targets[cells[0].target], solve)
+    solved = solution(job, display, targets[cells[0].target], solve)
     return lambda cell, shown_on: captured(job, solved, cell, shown_on, targets[cell.target], scored)
 
 
 def floor(job: Job) -> Measured:
-    """What images that no display made score on the task's target."""
+    """The scores of floor images on the task's target."""
     return references(job, job.target, scored)
 
 
 def scored(job: Job, cell: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
-    """The scores of the whole picture, and those of what is in focus."""
+    """The scores of the full picture, and of its part in focus."""
     dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
     mask = dataset.mask(cell.target, tuple(wanted.shape[-2:]))
     return protocol_scores(job, cell, image, wanted) | in_focus(image, wanted, mask)

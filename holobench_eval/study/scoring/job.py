@@ -1,4 +1,4 @@
-"""A task with all that a worker needs to compute it."""
+"""A task with everything that a worker needs to compute it."""
 
 from __future__ import annotations
 
@@ -26,21 +26,18 @@ from ..displays import Condition, Preparation
 from ..plan import Cell, Task
 from ..store import Record, Store
 
-TARGETS_KEPT = 16
-"""Targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels."""
+TARGETS_KEPT = 16  # targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels
 
+# Dataset, its parameters as JSON, folder of the config, name of the image and its digest.
 TargetSource = tuple[str, str, Path, str, str]
-"""Dataset, its parameters as JSON, folder of the config, name of the image and its digest."""
 
-Measured = Callable[[Cell, Condition], Record]
-"""Makes the record of a cell on its display."""
-Measure = Callable[["Job"], Measured]
-"""Does for a job what all of its cells share."""
+Measured = Callable[[Cell, Condition], Record]  # makes the record of a cell on its display
+Measure = Callable[["Job"], Measured]  # does the work that all cells of a job share
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a worker needs to know of a run besides its task.
+    """The settings of a run that a worker needs besides its task.
 
     output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
     what trained methods learned; metrics: names of those to compute (None: all); threads: torch threads of a worker;
@@ -64,7 +61,7 @@ class Setting:
 class Job:
     """A task, the cells of it that are wanted, and the setting of the run.
 
-    alone: whether nothing else of the run is at work meanwhile, so that its time can be compared.
+    alone: whether it runs without concurrent workers, so that its time can be compared.
     """
 
     task: Task
@@ -84,7 +81,7 @@ class Job:
 
     @property
     def timing(self) -> str:
-        """The name of its timing; what was measured alone serves a run with one worker, too."""
+        """The name of its timing; a job that ran alone is named as in a run with one worker."""
         workers = 1 if self.alone else max(2, self.setting.workers)  # one on a cluster may be joined by others
         return cost.key(self.task, self.setting.threads, workers, gpu_name(self.device))
 
@@ -92,7 +89,7 @@ class Job:
     def cells(self) -> list[tuple[Cell, Condition]]:
         """The wanted cells and their displays."""
         pairs = zip(self.task.cells, self.task.conditions, strict=True)
-        return [(cell, place) for cell, place in pairs if cell.id in self.wanted]
+        return [(cell, display) for cell, display in pairs if cell.id in self.wanted]
 
     def failed(self, cell: Cell, error: BaseException) -> Record:
         """The record of a cell that has no score, with the reason in one line."""
@@ -104,41 +101,41 @@ class Job:
         """An instance of a method, built anew: no cell may depend on those computed before."""
         return plugins.build("methods", name, dict(params), self.setting.folder)
 
-    def learned(self, needed: Preparation | None) -> Artifact | None:
-        """What a method learned; None if it had nothing to learn. CellError when its training failed."""
-        if needed is None:
+    def learned(self, preparation: Preparation | None) -> Artifact | None:
+        """A method's learned state; None if it has nothing to learn. CellError when its training failed."""
+        if preparation is None:
             return None
         artifacts = Artifacts(self.setting.artifacts)
-        if not artifacts.has(needed):
-            if needed.place.real and not artifacts.has_failed(needed):
+        if not artifacts.has(preparation):
+            if preparation.display.real and not artifacts.has_failed(preparation):
                 raise Pending("its training waits for photographs")
-            raise CellError(f"not trained: {artifacts.failure(needed)}")
-        return artifacts.load(needed)
+            raise CellError(f"not trained: {artifacts.failure(preparation)}")
+        return artifacts.load(preparation)
 
-    def display(self, cell: Cell, place: Condition) -> CalibratedBench | RealBench | LearnedBench:
+    def display(self, cell: Cell, display: Condition) -> CalibratedBench | RealBench | LearnedBench:
         """The display of a cell: a simulated bench, a real one, or a trained network."""
-        needed, learned = place.learned, self.learned(place.learned)
-        if needed is None or learned is None:
-            return opening.open_display(place, cell.seed, self.device)
-        method = self.method(needed.method, needed.params)
-        return LearnedBench(place.spec, method, moved(learned.state, self.device), cell.seed, self.device)
+        preparation, learned = display.learned, self.learned(display.learned)
+        if preparation is None or learned is None:
+            return opening.open_display(display, cell.seed, self.device)
+        method = self.method(preparation.method, preparation.params)
+        return LearnedBench(display.spec, method, moved(learned.state, self.device), cell.seed, self.device)
 
     def source(self, cell: Cell) -> TargetSource:
         """Where the target of a cell comes from."""
         params = canonical(dict(cell.dataset_params))
         return cell.dataset, params, self.setting.folder, cell.target, cell.target_sha256
 
-    def target(self, cell: Cell, place: Condition) -> Tensor:
+    def target(self, cell: Cell, display: Condition) -> Tensor:
         """The target of a cell at the size of the scored region; see ``load_target``."""
-        return load_target(self.source(cell), place)
+        return load_target(self.source(cell), display)
 
 
-def load_target(source: TargetSource, place: Condition) -> Tensor:
+def load_target(source: TargetSource, display: Condition) -> Tensor:
     """A target at the size of the scored region, ``(C, h, w)`` linear light in [0, 1].
 
     CellError for a source that has changed since the study was planned.
     """
-    return _target(source, place.spec.region.shape, len(place.spec.wavelengths)).clone()
+    return _target(source, display.spec.region.shape, len(display.spec.wavelengths)).clone()
 
 
 @lru_cache(maxsize=TARGETS_KEPT)

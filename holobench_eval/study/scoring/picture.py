@@ -1,4 +1,4 @@
-"""A picture against its target: solve, show, photograph, score; and what images that no method made would score."""
+"""A picture against its target: solve, show, photograph, score; and the scores of floor images."""
 
 from __future__ import annotations
 
@@ -24,26 +24,25 @@ from .job import Job, Measured
 from .pictures import write_capture, write_phase, write_thumbnail
 from .solution import Solution, kept, solution
 
-Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]
-"""The scores of an image ``(C, h, w)`` against the wanted one."""
+Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]  # scores of an image ``(C, h, w)`` and its target
 
 
 def picture(job: Job) -> Measured:
     """Solve the task's target on its first display; the result shows the phase on any of its displays."""
-    place = job.task.conditions[0]
-    target = job.target(job.task.cells[0], place)
+    display = job.task.conditions[0]
+    target = job.target(job.task.cells[0], display)
 
     def make() -> Solution:
         own = target[None].to(job.device, copy=True)
-        return solution(job, place, target, lambda method, handle: method.solve(own, handle))
+        return solution(job, display, target, lambda method, handle: method.solve(own, handle))
 
-    in_session = place.real is not None and place.real.folder is not None
+    in_session = display.real is not None and display.real.folder is not None
     solved = kept(job, make) if in_session else make()
     return lambda cell, shown_on: captured(job, solved, cell, shown_on, target)
 
 
 def floor(job: Job) -> Measured:
-    """What images that no display made score on the task's target."""
+    """The scores of floor images on the task's target."""
     return references(job, job.target)
 
 
@@ -53,16 +52,16 @@ def protocol_scores(job: Job, _: Cell, image: Tensor, wanted: Tensor) -> dict[st
 
 
 def captured(
-    job: Job, solved: Solution, cell: Cell, place: Condition, target: Tensor, scored: Scored = protocol_scores
+    job: Job, solved: Solution, cell: Cell, display: Condition, target: Tensor, scored: Scored = protocol_scores
 ) -> Record:
     """Show a solution on a display, photograph it and score it against ``target`` ``(C, h, w)``."""
-    display = job.display(cell, place)
-    capture = display.photograph(
+    bench = job.display(cell, display)
+    capture = bench.photograph(
         solved.phase, target, item=cell.target, repeat=cell.repeat, exposure=cell.exposure, label=job.task.label
     )
     refuse_saturated(capture)
     keep_pictures(job, cell, capture.image, target, solved.phase)
-    scores = scored(job, cell, capture.image, target) | _second_scores(display, capture, target)
+    scores = scored(job, cell, capture.image, target) | _second_scores(bench, capture, target)
     return Record(
         cell=cell.description(),
         state="done",
@@ -80,10 +79,10 @@ def captured(
 
 
 def references(job: Job, wanted: Callable[[Cell, Condition], Tensor], scored: Scored = protocol_scores) -> Measured:
-    """What images that no method made score against what a cell's image is compared with."""
-    cells, place = job.task.cells, job.task.conditions[0]
+    """The scores of the floor images. wanted: gives the picture that a cell's image is compared with."""
+    cells, display = job.task.cells, job.task.conditions[0]
     others = [replace(cell, **cell.params) for cell in cells if cell.params]
-    target, *wrong = (wanted(cell, place) for cell in (cells[0], *others))
+    target, *wrong = (wanted(cell, display) for cell in (cells[0], *others))
     captures = floor_captures(target, wrong, cells[0].seed, cells[0].target)
     write_thumbnail(job.store.target_thumbnail(cells[0].target), target)
 
@@ -95,29 +94,29 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor], scored: Sc
 
 
 def _second_scores(
-    display: CalibratedBench | RealBench | LearnedBench, capture: RectifiedCapture, target: Tensor
+    bench: CalibratedBench | RealBench | LearnedBench, capture: RectifiedCapture, target: Tensor
 ) -> dict[str, float]:
-    """PSNR and SSIM of a real photograph by the geometry that another algorithm found."""
-    image = display.second_image(capture, target) if isinstance(display, RealBench) else None
+    """PSNR and SSIM of a real photograph, aligned by a second algorithm."""
+    image = bench.second_image(capture, target) if isinstance(bench, RealBench) else None
     if image is None:
         return {}
-    again = score(image, target, refine=False, blur=(), metrics=("psnr", "ssim"))
-    return {f"{name}_linear_second": again[f"{name}_linear"] for name in ("psnr", "ssim")}
+    other_scores = score(image, target, refine=False, blur=(), metrics=("psnr", "ssim"))
+    return {f"{name}_linear_second": other_scores[f"{name}_linear"] for name in ("psnr", "ssim")}
 
 
 def refuse_saturated(capture: RectifiedCapture) -> None:
-    """CellError for a capture of which too much is saturated."""
+    """CellError for a capture with too many saturated samples."""
     if capture.saturated > MOST_SATURATED:
         raise CellError(f"{capture.saturated:.2%} of the capture is saturated, more than {MOST_SATURATED:.1%}")
 
 
 def account(learned: Artifact | None) -> dict[str, Any] | None:
-    """What a record says of the training behind it."""
+    """The entries of a record about the training of its method."""
     return None if learned is None else {key: learned.provenance[key] for key in ("sha256", "captures", "seconds")}
 
 
 def keep_pictures(job: Job, cell: Cell, image: Tensor, wanted: Tensor, phase: Tensor) -> None:
-    """Write the thumbnail of an image ``(C, h, w)``, and what else the study wants to keep."""
+    """Write the thumbnail of an image ``(C, h, w)``, and its capture and phase if the study saves them."""
     setting = job.setting
     name = file_name(cell.target) + (f"-{cell.repeat}" if cell.repeat else "") + ".png"
     path = Path(file_name(job.task.label), file_name(cell.condition), name)

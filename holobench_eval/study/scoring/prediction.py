@@ -1,4 +1,4 @@
-"""What a method predicts of the capture of another method's hologram, against that capture (paper 6.1)."""
+"""The predicted capture of another method's hologram, scored against the real capture (paper 6.1)."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def prediction(job: Job) -> Measured:
     Capture and prediction get the factors that match the capture to the target, so that the capture is a picture in
     [0, 1]; the protocol's own match of the prediction follows.
     """
-    task, cell, place = job.task, job.task.cells[0], job.task.conditions[0]
+    task, cell, display = job.task, job.task.cells[0], job.task.conditions[0]
     method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
-    target = job.target(cell, place)
-    phase, capture = _shown(job, cell, place)
+    target = job.target(cell, display)
+    phase, capture = _shown(job, cell, display)
     refuse_saturated(capture)
     wanted, factors = match(capture.image, target)
-    handle = opening.open_display(place, cell.seed, job.device).for_method(
+    handle = opening.open_display(display, cell.seed, job.device).for_method(
         method,
         task.label,
         target.to(job.device),
@@ -74,10 +74,10 @@ def prediction(job: Job) -> Measured:
 
 
 def floor(job: Job) -> Measured:
-    """What images that no display made score on the capture that is to be predicted."""
+    """The scores of floor images on the capture that methods predict."""
 
-    def wanted(cell: Cell, place: Condition) -> Tensor:
-        return match(_shown(job, cell, place)[1].image, job.target(cell, place))[0]
+    def wanted(cell: Cell, display: Condition) -> Tensor:
+        return match(_shown(job, cell, display)[1].image, job.target(cell, display))[0]
 
     return references(job, wanted)
 
@@ -94,19 +94,19 @@ class _Hologram:
     exposure: Exposure
 
 
-def _shown(job: Job, cell: Cell, place: Condition) -> tuple[Tensor, RectifiedCapture]:
+def _shown(job: Job, cell: Cell, display: Condition) -> tuple[Tensor, RectifiedCapture]:
     """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture."""
     name, params = cell.holograms["name"], canonical(dict(cell.holograms["params"]))
     hologram = _Hologram(name, params, job.source(cell), cell.repeat, cell.seed, cell.exposure)
-    return _photographed(hologram, place, job.setting.folder, job.device)
+    return _photographed(hologram, display, job.setting.folder, job.device)
 
 
 @lru_cache(maxsize=64)
 def _photographed(
-    hologram: _Hologram, place: Condition, folder: Path, device: torch.device
+    hologram: _Hologram, display: Condition, folder: Path, device: torch.device
 ) -> tuple[Tensor, RectifiedCapture]:
-    """Solved and photographed once in a process."""
-    bench, target = opening.open_display(place, hologram.seed, device), load_target(hologram.source, place)
+    """The phase of a hologram and its capture, computed once in a process."""
+    bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
     item, own = hologram.source[3], target.to(device, copy=True)
     method = plugins.build("methods", hologram.method, json.loads(hologram.params), folder)
     handle = bench.for_method(method, hologram.method, own, item=item, repeat=hologram.repeat)

@@ -1,4 +1,4 @@
-"""Let a method solve a target; what it made for a session is kept, since its photographs come later."""
+"""Let a method solve a target; solutions of a session are kept, since their photographs come later."""
 
 from __future__ import annotations
 
@@ -22,14 +22,13 @@ from .job import Job
 
 FOLDER = "solutions"
 
-Solve = Callable[[Any, MeteredDisplay], Any]
-"""Calls a method with the handle that it gets of its display."""
+Solve = Callable[[Any, MeteredDisplay], Any]  # calls a method with its handle of the display
 
 
 @dataclass(frozen=True)
 class Solution:
-    """What a method made: the phase ``(C, H, W)`` [rad], the captures and the cost of it, why the display ended it
-    (empty: it did not), and what it had learned."""
+    """A method's phase ``(C, H, W)`` [rad], its captures and cost, why the display ended the solution (empty: it did
+    not), and the learned state."""
 
     phase: Tensor
     captures: int
@@ -38,16 +37,16 @@ class Solution:
     learned: Artifact | None
 
 
-def solution(job: Job, place: Condition, target: Tensor, solve: Solve) -> Solution:
+def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solution:
     """Let the task's method ``solve`` on a display, in the name of the task's first cell.
 
-    target: ``(C, h, w)``, which the display is exposed for. What a method does to its own must not reach the score.
-    What the method is given is on the job's device, and what it made comes back to the CPU.
+    target: ``(C, h, w)``, which the display is exposed for. The method works on a copy, so its changes cannot reach
+    the score. Its inputs are on the job's device; its phase returns to the CPU.
     """
     task, first = job.task, job.task.cells[0]
     learned = job.learned(task.preparation)
     method = job.method(first.method, first.params)
-    handle = job.display(first, place).for_method(
+    handle = job.display(first, display).for_method(
         method,
         task.label,
         target.to(job.device),
@@ -66,14 +65,14 @@ def solution(job: Job, place: Condition, target: Tensor, solve: Solve) -> Soluti
 
 
 def wrong_output(job: Job, function: str, output: Any, wanted: str) -> CellError:
-    """The error for what a method returned in the place of ``wanted``."""
-    found = tuple(output.shape) if isinstance(output, Tensor) else type(output).__name__
-    return CellError(f"{job.task.label}: {function} returned {found}, not {wanted}")
+    """The error for an ``output`` that is not what was wanted."""
+    actual = tuple(output.shape) if isinstance(output, Tensor) else type(output).__name__
+    return CellError(f"{job.task.label}: {function} returned {actual}, not {wanted}")
 
 
 def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[Any, str]:
-    """What ``solve`` returns and an empty line; the best hologram so far and why, if the display ended its captures,
-    whatever the method made of that."""
+    """The output of ``solve`` and an empty reason. If the display ended the captures: the best hologram so far and the
+    reason, however the method handled the end."""
     phase = None
     try:
         phase = solve(method, handle)
@@ -86,12 +85,12 @@ def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[A
 
 
 def kept(job: Job, make: Callable[[], Solution]) -> Solution:
-    """The solution of a task, made once; kept in the output folder by the name of the task's first cell."""
+    """The solution of a task, computed once and kept in the output folder under the id of the task's first cell."""
     path = job.setting.output / FOLDER / f"{job.task.cells[0].id}.pt"
     if path.is_file():
-        known = read_tensors(path)
+        content = read_tensors(path)
         learned = job.learned(job.task.preparation)
-        return Solution(known["phase"], known["captures"], Cost(**known["taken"]), known["stopped"], learned)
+        return Solution(content["phase"], content["captures"], Cost(**content["taken"]), content["stopped"], learned)
     fresh, buffer = make(), io.BytesIO()
     account = {"captures": fresh.captures, "taken": asdict(fresh.cost), "stopped": fresh.stopped}
     torch.save({"phase": fresh.phase, **account}, buffer)
