@@ -99,6 +99,7 @@ def import_file(path: Path) -> ModuleType:
     Exception
         Whatever the file raises while it runs; OSError where it cannot be read.
     """
+    path = path.absolute()  # a file may ask where it is, and its code is identified by where it lies
     unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
     loader = _FromSource(f"holobench_user_{path.stem}_{unique}", str(path))
     module = importlib.util.module_from_spec(ModuleSpec(loader.name, loader, origin=str(path)))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
+from inspect import signature
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter
@@ -136,10 +137,13 @@ def _unknown_keys(cls: Any, mappings: list[tuple[Keys, Any]]) -> Iterator[tuple[
     All mappings of one class are looked at together, since evaluating its annotations takes a tenth of a millisecond.
     """
     mappings = [(where, data) for where, data in mappings if isinstance(data, Mapping)]
-    allowed = [item.name for item in fields(cls) if item.metadata.get("key", True)]
+    known = cls.__dataclass_fields__
+    allowed = [name for name in signature(cls).parameters if name not in known or known[name].metadata.get("key", True)]
     for where, data in mappings:
         yield from (((*where, key), allowed) for key in data if key not in allowed)
-    if not any(isinstance(value, Mapping | list | tuple) for _, data in mappings for value in data.values()):
+    values = [value for _, data in mappings for value in data.values()]
+    items = [item for value in values for _, item in _entries((), value)]
+    if not any(isinstance(item, Mapping) for item in items):  # annotations may name what is imported for types alone
         return
     for key, hint in get_type_hints(cls).items():
         nested = next((part for part in (hint, *get_args(hint)) if is_dataclass(part)), None)

@@ -5,11 +5,14 @@ from .calibrated import CalibratedBench
 from .metered import MeteredDisplay
 from .simulated.profile import Profile, load_profile
 
+MeteredBench = MeteredDisplay  # the name that `holoeval new-method` used to write
+
 __all__ = [
     "CalibratedBench",
     "Capture",
     "Display",
     "DisplaySpec",
+    "MeteredBench",
     "MeteredDisplay",
     "Profile",
     "RectifiedCapture",

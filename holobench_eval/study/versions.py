@@ -65,8 +65,9 @@ def code_digest(cls: type[Any]) -> str:
     again after a change of the method, but not after a change of its documentation. Bases that ship with the package
     count by their declared versions.
     """
+    code = sorted(code_of(cls).values())
     shipped = [method_version(base) for base in cls.__mro__ if _ships(base)]
-    return digest([*sorted(code_of(cls).values()), *shipped])
+    return digest([*code, *shipped]) if code or not shipped else shipped[0]
 
 
 def code_of(cls: type[Any]) -> dict[Path, str]:

@@ -61,3 +61,41 @@ def test_a_file_is_never_run_from_bytecode_of_an_earlier_version(
         file.write_text(METHOD.format(number=number))
         os.utime(file, (1e9, 1e9))
         assert plugins.build("methods", "mine.py:Mine", {}, tmp_path).number == number
+
+
+ABOUT_ITSELF = """
+from __future__ import annotations
+from dataclasses import InitVar, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from nowhere import Nothing
+
+HOME = Path(__file__).parents[1]
+
+@dataclass
+class Mine:
+    steps: tuple[int, ...] = ()
+    start: InitVar[int] = 2
+    cache: ClassVar[Nothing]
+
+    def __post_init__(self, start):
+        self.begun = start
+
+    def solve(self, target, bench):
+        return HOME
+"""
+
+
+def test_a_file_knows_where_it_lies_however_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "mine.py").write_text(ABOUT_ITSELF)
+    monkeypatch.chdir(tmp_path / "inner")
+    assert plugins.build("methods", "mine.py:Mine", {}).solve(None, None) == tmp_path
+
+
+def test_parameters_may_be_lists_and_init_variables_beside_annotations_for_types_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(ABOUT_ITSELF)
+    method = plugins.build("methods", "mine.py:Mine", {"steps": [1, 2], "start": 5}, tmp_path)
+    assert (method.steps, method.begun) == ((1, 2), 5)

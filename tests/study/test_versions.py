@@ -127,3 +127,8 @@ def test_a_users_method_is_another_after_a_new_version_of_its_shipped_base(
     before = method_version(mine)
     monkeypatch.setattr(Wirtinger, "version", 2, raising=False)
     assert method_version(mine) != before
+
+
+def test_a_users_method_without_code_of_its_own_is_its_shipped_base(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(MINE)
+    assert method_version(plugins.find("methods", "mine.py:Method", tmp_path)) == method_version(Wirtinger)

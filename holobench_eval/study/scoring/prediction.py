@@ -87,6 +87,7 @@ class _Hologram:
     """The hologram whose capture is predicted; equal for all methods that predict it. params: as JSON."""
 
     method: str
+    version: str
     params: str
     source: TargetSource
     repeat: int
@@ -97,7 +98,9 @@ class _Hologram:
 def _shown(job: Job, cell: Cell, display: Condition) -> tuple[Tensor, RectifiedCapture]:
     """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture."""
     name, params = cell.holograms["name"], canonical(dict(cell.holograms["params"]))
-    hologram = _Hologram(name, params, job.source(cell), cell.repeat, cell.seed, cell.exposure)
+    hologram = _Hologram(
+        name, cell.holograms["sha256"], params, job.source(cell), cell.repeat, cell.seed, cell.exposure
+    )
     return _photographed(hologram, display, job.setting.folder, job.device)
 
 
