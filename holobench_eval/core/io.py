@@ -84,10 +84,13 @@ def write_png(path: Path, levels: Tensor, bits: int) -> None:
 def decode_levels(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16] | None:
     """The levels of an encoded picture as they are stored, ``(H, W)`` or ``(H, W, C)`` with red first.
 
-    None for what OpenCV cannot read, and for samples of neither 8 nor 16 bits. Pillow would give RGB of 16 bits as 8.
+    None for what OpenCV cannot read, for samples of neither 8 nor 16 bits, and for other than 1, 3 or 4 channels.
+    Pillow would give RGB of 16 bits as 8.
     """
     levels: NDArray[Any] | None = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if levels is None or levels.dtype not in (np.uint8, np.uint16):
+        return None
+    if levels.ndim == 3 and levels.shape[2] not in (3, 4):
         return None
     if levels.ndim == 3:  # OpenCV: blue first; the usual three channels are not copied
         levels = levels[..., ::-1] if levels.shape[2] == 3 else levels[..., [2, 1, 0, 3]]

@@ -29,3 +29,8 @@ def test_what_has_no_levels_of_8_or_16_bits_is_none():
     floating = cv2.imencode(".tiff", np.ones((4, 4), np.float32))[1].tobytes()
     assert decode_levels(floating) is None
     assert decode_levels(b"no picture") is None
+
+
+def test_a_picture_of_two_channels_is_refused_and_no_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: np.zeros((4, 4, 2), np.uint8))
+    assert decode_levels(b"two channels") is None

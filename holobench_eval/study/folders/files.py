@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from ...core.errors import UserError, suggest
-from ...core.io import TEMPORARY
+from ...core.io import TEMPORARY, decode_levels
 from ...datasets.images import PNG_END, opened, read
 from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
 
@@ -152,12 +151,12 @@ def _decoded(content: bytes, path: Path) -> Values:
         alpha = "A" in image.mode or "transparency" in image.info
         raise UserError(f"{path}: an image {'with alpha' if alpha else f'of mode {image.mode}'}; {RIGHT}")
     _load(image, content, path)
-    pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if pixels is None or pixels.dtype not in (np.uint8, np.uint16) or pixels.ndim not in (2, 3):
+    pixels = decode_levels(content)
+    if pixels is None:
         raise UserError(f"{path}: an image that cannot be decoded; {RIGHT}")
     if pixels.ndim == 3 and pixels.shape[2] != 3:
         raise UserError(f"{path}: {pixels.shape[2]} channels (alpha?); {RIGHT}")
-    planes = pixels[None] if pixels.ndim == 2 else pixels[..., ::-1].transpose(2, 0, 1)
+    planes = pixels[None] if pixels.ndim == 2 else pixels.transpose(2, 0, 1)
     full = 255 if pixels.dtype == np.uint8 else 65535
     return np.ascontiguousarray(planes, dtype=np.float32) / np.float32(full)
 
