@@ -14,6 +14,7 @@ from ..core.errors import CellError
 from ..imaging.register import Registration
 from ..optics import AngularSpectrum
 from ..optics.convolution import frequencies
+from ..optics.transfer import transfer_function
 from ..optics.phase import Matrix, refocus
 
 Exposure = Literal["equal", "matched"]
@@ -137,7 +138,7 @@ def _propagator(spec: DisplaySpec, channel: int, dtype: torch.dtype, device: tor
     if any(spec.eye):
         fy, fx = frequencies(model.padded_shape, spec.pitch, device)
         eye = refocus(spec.eye, fy, fx, wavelength, spec.distance)
-        model.transfer = model.transfer * torch.polar(torch.ones_like(eye), eye).to(dtype)
+        model.transfer = transfer_function(model.transfer.values * torch.polar(torch.ones_like(eye), eye).to(dtype))
     return model
 
 

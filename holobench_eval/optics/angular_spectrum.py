@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import torch
-from scipy.fft import next_fast_len
 from torch import Tensor
 
-from .convolution import Convolution, as_used, frequencies, iris
+from .convolution import Convolution, frequencies, iris
 from .padding import DEFAULT_ERROR, Padding, padded_shape
+from .sizes import fast_size
+from .transfer import TransferFunction, transfer_function
 
 LINES = 256
 """Rows or columns of a large grid that a transfer function is made of at a time."""
@@ -124,7 +125,7 @@ class AngularSpectrum(Convolution):
         if dtype is None:
             dtype = torch.complex128 if padding == "reference" else torch.complex64
         padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
-        twice = (int(next_fast_len(2 * shape[0] - 1)), int(next_fast_len(2 * shape[1] - 1)))
+        twice = (fast_size(2 * shape[0] - 1), fast_size(2 * shape[1] - 1))
         optics, where = _Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil), torch.device(device)
         if padding is None and (padded[0] > twice[0] or padded[1] > twice[1]):
             padded = (min(padded[0], twice[0]), min(padded[1], twice[1]))
@@ -170,15 +171,15 @@ class _Optics:
 @lru_cache(maxsize=24)
 def _band_limited_transfer(
     optics: _Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device
-) -> Tensor:
+) -> TransferFunction:
     fy, fx = frequencies(padded, optics.pitch, device)
-    return as_used(optics.sampled(fy, fx, padded).to(dtype))
+    return transfer_function(optics.sampled(fy, fx, padded).to(dtype))
 
 
 @lru_cache(maxsize=24)
 def _cut_off_transfer(
     optics: _Optics, padded: tuple[int, int], grid: tuple[int, int], dtype: torch.dtype, device: torch.device
-) -> Tensor:
+) -> TransferFunction:
     """Transfer function of the kernel of a larger ``grid``, cut off beyond the panel's own size.
 
     The convolution is then linear in the picture: what would wrap around is zero. An axis that is padded by less is
@@ -195,7 +196,7 @@ def _cut_off_transfer(
     transfer = torch.cat(columns, dim=1)
     if cut[1]:
         transfer = torch.cat([_cut(rows, shape[1], padded[1], dim=1) for rows in transfer.split(LINES)])
-    return as_used(transfer)
+    return transfer_function(transfer)
 
 
 def _cut(spectrum: Tensor, size: int, padded: int, dim: int) -> Tensor:

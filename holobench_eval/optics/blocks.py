@@ -1,4 +1,8 @@
-"""Work on large arrays a block at a time, so that a block stays in the cache of the core that works on it."""
+"""Work on large arrays, shared among threads: each takes parts of it and works on these alone.
+
+Were every operation shared instead, the threads would wait for each other after every one, which takes far longer than
+the work as soon as another program wants a core.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from itertools import count, pairwise
 
 import torch
 from torch import Tensor
@@ -18,29 +23,46 @@ BLOCK_BYTES = 2**21
 def in_blocks(work: Callable[[slice], None], like: Tensor, lines: int, elements: int) -> None:
     """Call ``work`` with slices of ``lines`` that hold ``elements`` of the type of ``like`` in all; without gradients.
 
-    Blocks are shared among as many threads as torch has, each working alone: were every operation shared instead, the
-    threads would wait for each other after every one, which takes far longer than the work as soon as another program
-    wants a core. On a GPU there is one block.
+    A block stays in the cache of the core that works on it. On a GPU there is one block.
     """
-    count = min(lines, math.ceil(elements * like.element_size() / BLOCK_BYTES)) if like.is_cpu else 1
-    slices = [slice(lines * block // count, lines * (block + 1) // count) for block in range(count)]
-    threads = torch.get_num_threads()
+    blocks = min(lines, math.ceil(elements * like.element_size() / BLOCK_BYTES)) if like.is_cpu else 1
     work = torch.inference_mode(torch.is_inference_mode_enabled())(torch.no_grad()(work))  # modes are a thread's own
-    if threads == 1 or count == 1:
-        for block in slices:
-            work(block)
+    in_parts(lambda first, last: work(slice(first, last)), lines, blocks)
+
+
+def in_parts(work: Callable[[int, int], object], lines: int, parts: int) -> None:
+    """Call ``work`` with the ends of ``parts`` ranges that make up ``lines``, in as many threads as torch has."""
+    ends = [lines * part // parts for part in range(parts + 1)]
+    threads = min(torch.get_num_threads(), parts)
+    ranges, numbers = list(pairwise(ends)), count()
+    if threads == 1:
+        for first, last in ranges:
+            work(first, last)
         return
+
+    def some() -> None:
+        while (number := next(numbers)) < parts:  # one thread at a time counts on
+            work(*ranges[number])
+
+    before = torch.get_num_threads()
+    helpers = [helper.submit(some) for helper in _helpers(threads - 1)]
+    torch.set_num_threads(1)
     try:
-        for _ in _pool(threads).map(work, slices):
-            pass
+        some()
+        for helper in helpers:
+            if not helper.cancel():
+                helper.result()
     finally:
-        torch.set_num_threads(threads)  # a new thread of the pool has changed what later threads begin with
+        torch.set_num_threads(before)
 
 
 @lru_cache(maxsize=4)
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, "holobench_eval", initializer=torch.set_num_threads, initargs=(1,))
+def _helpers(number: int) -> list[ThreadPoolExecutor]:
+    """Threads with a queue each: of those that wait at one queue, only the first is woken for two tasks at once."""
+    return [
+        ThreadPoolExecutor(1, "holobench_eval", initializer=torch.set_num_threads, initargs=(1,)) for _ in range(number)
+    ]
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pool.cache_clear)  # a child process has none of its parent's threads
+    os.register_at_fork(after_in_child=_helpers.cache_clear)  # a child process has none of its parent's threads

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Any, Protocol
 
 import torch
 from torch import Tensor
 
-from ..core.allocator import LARGEST_KEPT
-from .blocks import in_blocks
 from .padding import IRIS_EDGE
+from .transfer import TransferFunction
 
 
 class Propagator(Protocol):
@@ -37,43 +35,30 @@ class Convolution:
     shape
         Rows and columns of the fields.
     transfer
-        Transfer function on the padded ``fftfreq`` grid, complex.
+        On the padded ``fftfreq`` grid.
     """
 
-    def __init__(self, shape: tuple[int, int], transfer: Tensor) -> None:
+    def __init__(self, shape: tuple[int, int], transfer: TransferFunction) -> None:
         self.shape = shape
         self.transfer = transfer
 
     @property
     def padded_shape(self) -> tuple[int, int]:
         """(rows, columns) of the transform."""
-        return self.transfer.shape[-2], self.transfer.shape[-1]
-
-    def blank(self, *batch: int) -> Tensor:
-        """A dark field for ``convolve``, ``(*batch, H, W)``, or padded where ``convolve`` would pad it."""
-        shape = self.shape if is_large(self.transfer) else self.padded_shape
-        return self.transfer.new_zeros((*batch, *shape))
+        return self.transfer.shape
 
     def forward(self, field: Tensor) -> Tensor:
-        """Propagate ``(..., H, W)`` complex to ``(..., H, W)``; differentiable."""
+        """Propagate ``(..., H, W)`` complex to ``(..., H, W)``, in the precision of the model; differentiable."""
         return self._convolve(field, conjugated=False)
 
     def adjoint(self, field: Tensor) -> Tensor:
         """The adjoint of ``forward``; for a pure phase transfer function this propagates back."""
         return self._convolve(field, conjugated=True)
 
-    @cached_property
-    def conjugate(self) -> Tensor:
-        """The transfer function of the adjoint; formed once, but for large ones: there a block of it is formed at a
-        time, since it would take as much memory as all the rest of a propagation."""
-        conjugate = self.transfer.conj()
-        return conjugate if is_large(conjugate) else conjugate.resolve_conj()
-
     def _convolve(self, field: Tensor, conjugated: bool) -> Tensor:
         if tuple(field.shape[-2:]) != self.shape:
             raise ValueError(f"field is {tuple(field.shape[-2:])}, the propagator was made for {self.shape}")
-        field = field.to(torch.promote_types(field.dtype, self.transfer.dtype))
-        convolved: Tensor = _Convolved.apply(field, self, conjugated)  # type: ignore[no-untyped-call]
+        convolved: Tensor = _Convolved.apply(field.to(self.transfer.dtype), self.transfer, conjugated)  # type: ignore[no-untyped-call]
         return convolved
 
 
@@ -81,69 +66,14 @@ class _Convolved(torch.autograd.Function):
     """The gradient of a convolution is its adjoint; recorded operations would keep every padded array."""
 
     @staticmethod
-    def forward(ctx: Any, field: Tensor, model: Convolution, conjugated: bool) -> Tensor:
-        ctx.model, ctx.conjugated = model, conjugated
-        return convolve(field, model.conjugate if conjugated else model.transfer)
+    def forward(ctx: Any, field: Tensor, transfer: TransferFunction, conjugated: bool) -> Tensor:
+        ctx.transfer, ctx.conjugated = transfer, conjugated
+        return transfer.convolve(field, conjugated)
 
     @staticmethod
     def backward(ctx: Any, *grad: Tensor) -> tuple[Tensor, None, None]:
-        returned: Tensor = _Convolved.apply(grad[0], ctx.model, not ctx.conjugated)  # type: ignore[no-untyped-call]
+        returned: Tensor = _Convolved.apply(grad[0], ctx.transfer, not ctx.conjugated)  # type: ignore[no-untyped-call]
         return returned, None, None
-
-
-def convolve(field: Tensor, transfer: Tensor) -> Tensor:
-    """The first (H, W) samples of the circular convolution of a field ``(..., H, W)``, padded with zeros.
-
-    A field that is padded already stays so: of what is returned, only the panel's part is free of wrapped light.
-    """
-    height, width = field.shape[-2:]
-    padded = transfer.shape
-    if not is_large(transfer):
-        return torch.fft.ifft2(torch.fft.fft2(field, s=padded).mul_(transfer))[..., :height, :width]
-    return _convolve_pruned(field, transfer)
-
-
-def _convolve_pruned(field: Tensor, transfer: Tensor) -> Tensor:
-    """``convolve`` without the padded array.
-
-    Rows are transformed before there are padded ones, and cropped ones are not transformed back. All is done a block
-    of rows or columns at a time, and columns are made contiguous for it.
-    """
-    height, width = field.shape[-2:]
-    padded = transfer.shape
-    spectrum = field.new_empty((*field.shape[:-1], padded[1]))
-
-    def transform(rows: slice) -> None:
-        spectrum[..., rows, :] = torch.fft.fft(field[..., rows, :], n=padded[1])
-
-    def filtered(columns: slice) -> None:
-        column = torch.fft.fft(spectrum[..., columns].transpose(-1, -2), n=padded[0])
-        column = torch.fft.ifft(column.mul_(transfer[:, columns].T))
-        spectrum[..., columns] = column[..., :height].transpose(-1, -2)
-
-    def transform_back(rows: slice) -> None:
-        spectrum[..., rows, :width] = torch.fft.ifft(spectrum[..., rows, :])[..., :width]
-
-    in_blocks(transform, spectrum, height, spectrum.numel())
-    in_blocks(filtered, spectrum, padded[1], spectrum.numel() // height * padded[0])
-    in_blocks(transform_back, spectrum, height, spectrum.numel())
-    return spectrum[..., :width]
-
-
-def is_large(transfer: Tensor) -> bool:
-    """Whether arrays of this size come from the system each time, page by page, which takes longer than a transform of
-    them: they are avoided where it can be done. See ``allocator``."""
-    return transfer.is_cpu and transfer.numel() * transfer.element_size() > LARGEST_KEPT
-
-
-def as_used(transfer: Tensor) -> Tensor:
-    """The same transfer function ``(rows, columns)``, each column contiguous in memory if it is a large one."""
-    return by_columns(transfer) if is_large(transfer) else transfer
-
-
-def by_columns(transfer: Tensor) -> Tensor:
-    """The same transfer function ``(rows, columns)``, each column contiguous in memory."""
-    return transfer.T.contiguous().T
 
 
 def frequencies(shape: tuple[int, int], pitch: float, device: torch.device | str = "cpu") -> tuple[Tensor, Tensor]:

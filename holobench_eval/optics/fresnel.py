@@ -6,11 +6,11 @@ import math
 from functools import lru_cache
 
 import torch
-from torch import Tensor
 
 from .angular_spectrum import check_geometry
-from .convolution import Convolution, as_used, frequencies, iris
+from .convolution import Convolution, frequencies, iris
 from .padding import Padding, padded_shape
+from .transfer import TransferFunction, transfer_function
 
 
 class Fresnel(Convolution):
@@ -64,7 +64,7 @@ def _paraxial_transfer(
     pupil: float | None,
     dtype: torch.dtype,
     device: torch.device,
-) -> Tensor:
+) -> TransferFunction:
     fy, fx = frequencies(padded, pitch, device)
     phase = -math.pi * wavelength * distance * (fy**2 + fx**2)
-    return as_used(torch.polar(iris(fy, fx, pitch, pupil), phase).to(dtype))
+    return transfer_function(torch.polar(iris(fy, fx, pitch, pupil), phase).to(dtype))

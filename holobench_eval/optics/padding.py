@@ -7,7 +7,8 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from scipy.fft import next_fast_len
+
+from .sizes import fast_size
 
 Padding = int | Literal["reference"] | None
 
@@ -90,16 +91,16 @@ def padded_size(
     if padding == "reference":
         padded = 4 * size
         while spread_pixels > size and tail_error(size, spread_pixels, padded) > REFERENCE_ERROR / math.sqrt(2):
-            padded = int(next_fast_len(padded + size // 2))
+            padded = fast_size(padded + size // 2)
         return padded
     if padding is not None:
         if isinstance(padding, bool) or not isinstance(padding, int) or padding < 0:
             raise ValueError(f"padding must be None, 'reference' or a whole number of samples >= 0, got {padding!r}")
-        return int(next_fast_len(size + padding))
-    padded = int(next_fast_len(size + math.ceil(spread_pixels) + (soft_edge or 16)))
+        return fast_size(size + padding)
+    padded = size + math.ceil(spread_pixels) + (soft_edge or 16)
     while soft_edge is None and tail_error(size, spread_pixels, padded) > error / math.sqrt(2):
-        padded = int(next_fast_len(padded + 1))
-    return padded
+        padded += 1 + padded // 256
+    return fast_size(padded)
 
 
 def padded_shape(

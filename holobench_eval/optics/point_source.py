@@ -6,11 +6,12 @@ import math
 from functools import lru_cache
 
 import torch
-from scipy.fft import next_fast_len
 from torch import Tensor
 
 from .angular_spectrum import check_geometry
-from .convolution import Convolution, as_used
+from .convolution import Convolution
+from .sizes import fast_size
+from .transfer import TransferFunction, transfer_function
 
 TAPER = 0.1
 """Half width of the soft edge at the sampling limit, relative to it."""
@@ -93,8 +94,8 @@ def _kernel_transfer(
     distance: float,
     dtype: torch.dtype,
     device: torch.device,
-) -> Tensor:
-    padded = tuple(int(next_fast_len(2 * size - 1)) for size in shape)
+) -> TransferFunction:
+    padded = tuple(fast_size(2 * size - 1) for size in shape)
     offsets = []
     for size, samples in zip(shape, padded, strict=True):
         index = torch.arange(samples, dtype=torch.float64, device=device)
@@ -103,7 +104,7 @@ def _kernel_transfer(
     y, x = offsets[0][:, None], offsets[1][None, :]
     kernel = impulse_response(y, x, wavelength, distance) * pitch**2
     kernel = kernel * _resolved(y, pitch, wavelength, distance) * _resolved(x, pitch, wavelength, distance)
-    return as_used(torch.fft.fft2(kernel).to(dtype))
+    return transfer_function(torch.fft.fft2(kernel).to(dtype))
 
 
 def _resolved(offset: Tensor, pitch: float, wavelength: float, distance: float) -> Tensor:

@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holobench_eval.optics import AngularSpectrum, blocks, convolution
+from holobench_eval.optics import AngularSpectrum
 from holobench_eval.optics.angular_spectrum import angular_spectrum_phase
 from holobench_eval.optics.convolution import frequencies
 from holobench_eval.optics.padding import padded_size, tail_error
@@ -150,29 +150,6 @@ def test_phase_keeps_its_precision_at_long_distances():
 def test_gradients_of_gradients_pass():
     model = AngularSpectrum((12, 10), PITCH, WAVELENGTH, 2e-3, dtype=torch.complex128)
     assert torch.autograd.gradgradcheck(model.forward, white((12, 10), 5).requires_grad_())
-
-
-def test_blocks_of_rows_and_columns_change_nothing(monkeypatch):
-    field = torch.stack([white((70, 50), seed) for seed in range(6)]).view(2, 3, 70, 50)
-    model = AngularSpectrum((70, 50), PITCH, WAVELENGTH, 6e-3, dtype=torch.complex128)
-    padded = torch.fft.ifft2(torch.fft.fft2(field, s=model.padded_shape) * model.transfer)[..., :70, :50]
-    assert relative(model.forward(field), padded) < 1e-14
-    monkeypatch.setattr(convolution, "LARGEST_KEPT", 0)
-    for size in (1, 10_000, 2**30):
-        monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
-        assert relative(model.forward(field), padded) < 1e-14
-
-
-@pytest.mark.parametrize("kept", [0, 2**30])
-def test_light_written_into_a_blank_field_propagates_as_an_unpadded_field_does(monkeypatch, kept):
-    monkeypatch.setattr(convolution, "LARGEST_KEPT", kept)
-    model, fields = AngularSpectrum((23, 18), PITCH, WAVELENGTH, 5e-3), white((2, 23, 18)).to(torch.complex64)
-    blank = model.blank(2)
-    assert blank.shape[-2:] == (model.padded_shape if kept else model.shape)
-    assert not blank.any()
-    blank[:, :23, :18] = fields
-    for transfer, propagate in ((model.transfer, model.forward), (model.conjugate, model.adjoint)):
-        assert relative(convolution.convolve(blank, transfer)[:, :23, :18], propagate(fields)) < 1e-6
 
 
 def test_transfer_functions_are_cached():

@@ -5,7 +5,7 @@ import multiprocessing
 import pytest
 import torch
 
-from holobench_eval.optics import blocks, convolution
+from holobench_eval.optics import blocks, transfer
 from holobench_eval.optics.angular_spectrum import AngularSpectrum
 from holobench_eval.optics.blocks import in_blocks
 
@@ -14,7 +14,7 @@ from holobench_eval.optics.blocks import in_blocks
 def two_threads(monkeypatch):
     """The pool is used with several threads only; the other tests have one."""
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 4096)
-    monkeypatch.setattr(convolution, "LARGEST_KEPT", 0)
+    monkeypatch.setattr(transfer, "LARGEST_KEPT", 0)
     torch.set_num_threads(2)
     yield
     torch.set_num_threads(1)
@@ -36,8 +36,8 @@ def test_every_line_is_worked_on_once():
 
 def test_threads_give_the_numbers_of_one_thread():
     draw = torch.Generator().manual_seed(0)
-    field = torch.randn(2, 70, 50, dtype=torch.complex64, generator=draw).requires_grad_()
-    model = AngularSpectrum((70, 50), 6.4e-6, 532e-9, 6e-3)
+    field = torch.randn(2, 70, 50, dtype=torch.complex128, generator=draw).requires_grad_()
+    model = AngularSpectrum((70, 50), 6.4e-6, 532e-9, 6e-3, dtype=torch.complex128)
     found = []
     for threads in (2, 1):
         torch.set_num_threads(threads)
@@ -50,8 +50,8 @@ def test_threads_give_the_numbers_of_one_thread():
 
 
 def test_inference_mode_reaches_the_threads():
-    model = AngularSpectrum((70, 50), 6.4e-6, 532e-9, 6e-3)
-    field = torch.ones(70, 50, dtype=torch.complex64)
+    model = AngularSpectrum((70, 50), 6.4e-6, 532e-9, 6e-3, dtype=torch.complex128)
+    field = torch.ones(70, 50, dtype=torch.complex128)
     with torch.inference_mode():
         image = model.forward(field)
     assert torch.equal(image.clone(), model.forward(field))

@@ -12,10 +12,11 @@ from torch import Tensor
 
 from ...core.device import CPU
 from ...core.seeds import generator
-from ...optics.convolution import by_columns, frequencies
+from ...optics.convolution import frequencies
 from ...optics.padding import padded_shape
 from ...optics.phase import blaze
 from ...optics.phasor import phasor, squared_modulus
+from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .geometry import Geometry
 from .path import Dust, OpticalPath, panel_spectrum
