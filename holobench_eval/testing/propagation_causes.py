@@ -10,7 +10,7 @@ from itertools import product
 import torch
 from torch import Tensor
 
-from .propagation_reference import INSETS, Grid, Physics, Setting, Transform, difference, propagated
+from .propagation_reference import INSETS, Grid, Physics, Setting, Transform, difference, propagated, sampled_kernel
 
 EXPLAINED = 0.3
 """A mistake is the cause if it leaves at most this share of the difference."""
@@ -71,6 +71,8 @@ def _mistaken(field: Tensor, setting: Setting, physics: Physics) -> Iterator[tup
     """The images of mistakes, simple ones first, each with its name."""
     turned = torch.roll(propagated(field, setting, physics).flip(0, 1), (1, 1), (0, 1))
     yield "turned by 180 degrees: a second fft2 in the place of ifft2", turned
+    sampled = sampled_kernel(field, setting)
+    yield "a kernel that oscillates faster than the pixels sample it; cut it there, and claim a smaller band", sampled
     models: tuple[Physics, Physics] = ("exact", "paraxial") if physics == "exact" else ("paraxial", "exact")
     for sign, model, samples in product((1, -1), models, (2, 1, 4)):
         given = replace(setting, distance=sign * setting.distance)

@@ -93,18 +93,30 @@ def direct_sum(field: Tensor, rows: Tensor, columns: Tensor, distance: float) ->
     Goodman, section 3.5: ``exp(i k rho) / (i lambda rho)`` times the obliquity z / rho, times (1 + i / (k rho)).
     The carrier exp(ikz) is left out.
     """
-    height, width = field.shape
-    y = (rows[:, None] - torch.arange(height)).double() * PITCH
-    x = (columns[:, None] - torch.arange(width)).double() * PITCH
-    out = torch.zeros(len(rows), dtype=torch.complex128)
+    setting, out = Setting((field.shape[0], field.shape[1]), distance), torch.zeros(len(rows), dtype=torch.complex128)
+    y = (rows[:, None] - torch.arange(setting.shape[0])).double() * PITCH
+    x = (columns[:, None] - torch.arange(setting.shape[1])).double() * PITCH
     for point in range(len(rows)):
-        r_squared = y[point][:, None] ** 2 + x[point][None, :] ** 2
-        rho = torch.sqrt(r_squared + distance**2)
-        path = r_squared / (rho + distance)
-        kernel = torch.polar(distance / (WAVELENGTH * rho**2), 2 * math.pi / WAVELENGTH * path - math.pi / 2)
-        kernel = kernel * torch.complex(torch.ones_like(rho), WAVELENGTH / (2 * math.pi * rho))
-        out[point] = (field * kernel).sum() * PITCH**2
+        out[point] = (field * _kernel(y[point], x[point], setting)).sum()
     return out
+
+
+def sampled_kernel(field: Tensor, setting: Setting) -> Tensor:
+    """The sum over source pixels at all pixels, by FFT; wrong where its kernel oscillates faster than they sample."""
+    padded = [2 * size for size in setting.shape]
+    y, x = (setting.pitch * size * torch.fft.fftfreq(size, dtype=torch.float64) for size in padded)
+    spectrum = torch.fft.fft2(field, s=padded) * torch.fft.fft2(_kernel(y, x, setting))
+    return torch.fft.ifft2(spectrum)[: setting.shape[0], : setting.shape[1]]
+
+
+def _kernel(y: Tensor, x: Tensor, setting: Setting) -> Tensor:
+    """What a pixel gives to pixels at offsets ``y`` and ``x`` [m], carrier left out; back in time for z < 0."""
+    r_squared, z = y[:, None] ** 2 + x**2, abs(setting.distance)
+    rho, k = torch.sqrt(r_squared + z**2), 2 * math.pi / setting.wavelength
+    amplitude = setting.pitch**2 * z / (setting.wavelength * rho**2)
+    kernel = torch.polar(amplitude, k * r_squared / (rho + z) - math.pi / 2)
+    kernel = kernel * torch.complex(torch.ones_like(rho), 1 / (k * rho))
+    return kernel if setting.distance > 0 else kernel.conj()
 
 
 RIGHT = Transform()
