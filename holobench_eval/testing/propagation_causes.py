@@ -16,7 +16,7 @@ EXPLAINED = 0.3
 """A mistake is the cause if it leaves at most this share of the difference."""
 
 EXPLAINED_WITH_REST, REST = 0.75, 0.01
-"""The share if a second mistake makes the rest, and the smallest rest, relative to the field, for which it is named."""
+"""The share if a second mistake makes the rest, and the smallest rest, relative to the field, that it is named for."""
 
 CERTAIN = 0.01
 """No other mistake is tried after one that leaves at most this share."""
@@ -28,12 +28,12 @@ MODELS: dict[Physics, str] = {
 }
 GRIDS: dict[Grid, str] = {
     "fftfreq": "",
-    **dict.fromkeys(INSETS, "frequency grid half a sample off (linspace for fftfreq)"),
-    "one off": "frequency grid one sample off (fftshift for ifftshift)",
+    **dict.fromkeys(INSETS, "frequencies half a sample off (linspace for fftfreq)"),
+    "one off": "frequencies one sample off (fftshift for ifftshift)",
 }
 PADDINGS = {
     1: "circular, no zero padding: what leaves on one side comes back on the other",
-    2: "twice the size is too little padding without a band limit",
+    2: "padding to twice the size is too little without a band limit",
 }
 
 
@@ -51,7 +51,7 @@ def cause(field: Tensor, image: Tensor, setting: Setting, physics: Physics) -> s
     words, left = _nearest(field, image, setting, physics, wrong)
     rest = _carrier(left, setting)
     if left < EXPLAINED * wrong or (rest and left < EXPLAINED_WITH_REST * wrong):
-        return f"{words}; {rest}" if rest and left > REST else words
+        return f"{words}; {rest}" if rest else words
     return _displaced(image, right, setting) or _carrier(wrong, setting) or _low_pass(image, right) or UNKNOWN
 
 
@@ -72,7 +72,7 @@ def _mistaken(field: Tensor, setting: Setting, physics: Physics) -> Iterator[tup
     turned = torch.roll(propagated(field, setting, physics).flip(0, 1), (1, 1), (0, 1))
     yield "turned by 180 degrees: a second fft2 in the place of ifft2", turned
     sampled = sampled_kernel(field, setting)
-    yield "a kernel that oscillates faster than the pixels sample it; cut it there, and claim a smaller band", sampled
+    yield "a kernel steeper than the pixels sample: cut it there, and claim a smaller band", sampled
     models: tuple[Physics, Physics] = ("exact", "paraxial") if physics == "exact" else ("paraxial", "exact")
     for sign, model, samples in product((1, -1), models, (2, 1, 4)):
         given = replace(setting, distance=sign * setting.distance)
@@ -86,7 +86,7 @@ def _mistaken(field: Tensor, setting: Setting, physics: Physics) -> Iterator[tup
 
 def _grid_and_padding(samples: int, grid: Grid, limited: bool) -> list[str]:
     if grid != "fftfreq":
-        return [GRIDS[grid], f"at {samples} x the size"]
+        return [GRIDS[grid], f"padded {samples}x"]
     if limited and samples > 1:
         return ["the hard edge of a band limit"]
     return [PADDINGS[samples]] if samples < 4 else []
@@ -103,7 +103,7 @@ def _frequency_offset(pixels: float, setting: Setting) -> str:
     for padding, samples in product((1, 2, 3, 4), (0.5, 1.0)):
         if math.isclose(offset * padding * setting.shape[0] * setting.pitch, samples, rel_tol=0.06):
             known = GRIDS["ends" if samples < 1 else "one off"]
-            return f"{known}, at {padding} x the size"
+            return f"{known}, padded {padding}x"
     if min(abs(pixels - whole) for whole in (-1, -0.5, 0.5, 1)) < 0.02:
         return "a wrong pair of shifts, or the padding cropped at another place"
     return "a wrong frequency grid, or padding cropped at another place"
@@ -113,7 +113,7 @@ def _carrier(error: float, setting: Setting) -> str:
     """Whether an error is as large as that of 2 pi z / lambda in single precision; empty if not."""
     phase = math.tau * abs(setting.distance) / setting.wavelength
     step = 2.0 ** (math.floor(math.log2(phase)) - 23)
-    if not 0.3 < error / (step / math.sqrt(12)) < 6:
+    if error < REST or not 0.3 < error / (step / math.sqrt(12)) < 6:
         return ""
     return f"exp(ikz) formed in float32 (steps of {step:.2g} rad)"
 
@@ -151,11 +151,12 @@ def _displaced(image: Tensor, right: Tensor, setting: Setting) -> str:
 
 
 def _low_pass(image: Tensor, right: Tensor) -> str:
-    """The share of the spectrum that is missing, if it is a large one."""
-    powers = [
-        torch.nn.functional.avg_pool2d(torch.fft.fftshift(torch.fft.fft2(each).abs().square())[None, None], 5, 1)
-        for each in (image, right)
-    ]
+    """The share of the spectrum that is missing, if the rest is as it should be."""
+    seen, wanted = (torch.fft.fftshift(torch.fft.fft2(each)) for each in (image, right))
+    powers = [torch.nn.functional.avg_pool2d(each.abs().square()[None], 5, 1, 2)[0] for each in (seen, wanted)]
     present = powers[1] > 0.1 * powers[1].mean()
-    missing = float((powers[0] < 0.1 * powers[1])[present].double().mean())
-    return f"a low pass: {missing:.0%} of the spectrum is missing" if missing > 0.05 else ""
+    passed = present & (powers[0] > 0.3 * powers[1])
+    missing = 1 - float(passed.sum() / present.sum())
+    if missing < 0.05 or not passed.any() or difference(seen[passed], wanted[passed]) > EXPLAINED:
+        return ""
+    return f"a low pass: {missing:.0%} of the spectrum is missing"

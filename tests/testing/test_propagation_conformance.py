@@ -77,9 +77,9 @@ def turned(self, field):
 
 
 MISTAKES = [
-    ({"flaw": "half a sample", "padding": 2}, "centring", "half a sample off (linspace for fftfreq), at 2 x"),
-    ({"flaw": "half a sample", "padding": 1}, "white field, 96", "half a sample off (linspace for fftfreq), at 1 x"),
-    ({"flaw": "half a sample", "padding": 3}, "white field, 96", "half a sample off (linspace for fftfreq), at 3 x"),
+    ({"flaw": "half a sample", "padding": 2}, "centring", "half a sample off (linspace for fftfreq), padded 2x"),
+    ({"flaw": "half a sample", "padding": 1}, "white field, 96", "half a sample off (linspace for fftfreq), padded 1x"),
+    ({"flaw": "half a sample", "padding": 3}, "white field, 96", "half a sample off (linspace for fftfreq), padded 3x"),
     ({"flaw": "float32 carrier"}, "long direct sum", "float32"),
     ({"flaw": "low pass"}, "white field, 96", "a low pass: 6"),
     ({"flaw": "shift", "padding": 3}, "white field, odd", "fftshift for ifftshift"),
@@ -88,7 +88,7 @@ MISTAKES = [
     ({"padding": 1}, "wrap-around beyond", "circular"),
     ({"padding": 1}, "white field, 96", "circular"),
     ({"padding": 1, "flaw": "limited"}, "wrap-around within", "circular"),
-    ({"padding": 2}, "white field, far", "too little padding"),
+    ({"padding": 2}, "white field, far", "too little without a band limit"),
     ({"flaw": "wrong sign"}, "direct sum", "wrong sign"),
     (
         {"forward": lambda self, field: Written.forward(self, field).flip(0, 1).roll((1, 1), (0, 1))},
@@ -101,6 +101,8 @@ MISTAKES = [
     ({"forward": lambda self, field: Written.forward(self, field).roll(1, 1)}, "centring", "(0.00, 1.00) px aside"),
     ({"forward": lambda self, field: Written.forward(self, field).abs()}, "energy", "float"),
     ({"forward": lambda self, field: Written.forward(self, field)[None]}, "energy", "shape (1, 128, 128)"),
+    ({"forward": lambda self, field: 0 * field}, "white field, 96", "no light at all"),
+    ({"forward": lambda self, field: Written.forward(self, field) ** 3}, "white field, 96", "none of the mistakes"),
     ({"adjoint": Written.forward}, "adjointness", "adjoint: wrong sign"),
     ({"adjoint": Written.forward}, "phase gradient", "times the difference"),
     ({"adjoint": lambda self, field: 2 * self.filtered(field, self.transfer.conj())}, "adjointness", "a factor of 2 "),
