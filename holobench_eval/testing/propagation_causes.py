@@ -34,6 +34,7 @@ GRIDS: dict[Grid, str] = {
 PADDINGS = {
     1: "circular, no zero padding: what leaves on one side comes back on the other",
     2: "padding to twice the size is too little without a band limit",
+    3: "padding to three times the size is too little without a band limit",
 }
 
 
@@ -74,7 +75,7 @@ def _mistaken(field: Tensor, setting: Setting, physics: Physics) -> Iterator[tup
     sampled = sampled_kernel(field, setting)
     yield "a kernel steeper than the pixels sample: cut it there, and claim a smaller band", sampled
     models: tuple[Physics, Physics] = ("exact", "paraxial") if physics == "exact" else ("paraxial", "exact")
-    for sign, model, samples in product((1, -1), models, (2, 1, 4)):
+    for sign, model, samples in product((1, -1), models, (4, 3, 2, 1)):
         given = replace(setting, distance=sign * setting.distance)
         whole = [MODELS[model]] if model != physics else []
         whole += ["wrong sign of the distance or phase"] if sign < 0 else []
@@ -89,7 +90,7 @@ def _grid_and_padding(samples: int, grid: Grid, limited: bool) -> list[str]:
         return [GRIDS[grid], f"padded {samples}x"]
     if limited and samples > 1:
         return ["the hard edge of a band limit"]
-    return [PADDINGS[samples]] if samples < 4 else []
+    return [PADDINGS[samples]] if samples in PADDINGS else []
 
 
 def displacement(dy: float, dx: float, setting: Setting) -> str:

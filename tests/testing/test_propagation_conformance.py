@@ -126,6 +126,11 @@ def test_shifts_that_differ_at_odd_sizes_alone_pass_at_even_ones():
     assert found(written(flaw="shift", padding=3), "white field, 96").verdict == "PASS"
 
 
+def test_no_mistake_is_named_beside_the_one_that_explains_all():
+    assert found(written(flaw="paraxial"), "white field, 96").note == "a paraxial (Fresnel) model"
+    assert found(written(flaw="wrong sign"), "direct sum").note == "wrong sign of the distance or phase"
+
+
 def test_an_exact_model_is_not_the_paraxial_one_that_it_claims_to_be():
     failed = found(Written, "white field, 96", physics="paraxial")
     assert failed.verdict == "FAIL"
