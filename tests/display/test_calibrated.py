@@ -7,7 +7,7 @@ from holobench_eval.display.api import white_irradiance
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.imaging import Registration
 from holobench_eval.study.opening import open_bench
-from holobench_eval.testing.propagation_conformance import gaussian_beam
+from holobench_eval.testing.propagation_reference import gaussian_beam
 
 PANEL = (192, 192)
 

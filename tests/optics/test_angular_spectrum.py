@@ -9,7 +9,7 @@ from holobench_eval.optics import AngularSpectrum
 from holobench_eval.optics.angular_spectrum import angular_spectrum_phase
 from holobench_eval.optics.convolution import frequencies
 from holobench_eval.optics.padding import padded_size, tail_error
-from holobench_eval.testing.propagation_conformance import direct_sum, gaussian_beam
+from holobench_eval.testing.propagation_reference import direct_sum, gaussian_beam
 
 PITCH, WAVELENGTH = 6.4e-6, 517e-9
 
