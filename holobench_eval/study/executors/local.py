@@ -59,7 +59,8 @@ class _Worker(Generic[J]):
     """A process, the parent's end of its channel, the job it has (None: it is idle) and how often it was lost on it."""
 
     def __init__(self, function: Callable[[J], Any], number: int, gpus: int) -> None:
-        self.start = (function, number, gpus, str(Path.cwd()))
+        own = {"CUDA_VISIBLE_DEVICES": one_gpu(number, gpus)} if gpus > 1 else {}
+        self.start = (function, {**os.environ, **ONE_THREAD, **own}, Path.cwd())
         self.job: J | None = None
         self.lost = 0
         self._begin()
@@ -101,14 +102,13 @@ class _Worker(Generic[J]):
         self.channel.close()
 
 
-def _serve(channel: Connection, function: Callable[[Any], Any], number: int, gpus: int, home: str) -> None:
-    """What a worker does: job after job. Ctrl-C is left to the parent process, and a worker dies with its parent, since
-    a killed run must not go on training in the background."""
+def _serve(channel: Connection, function: Callable[[Any], Any], environment: dict[str, str], home: Path) -> None:
+    """What a worker does: job after job, in the folder ``home``. Ctrl-C is left to the parent process. A worker dies
+    with its parent, since a killed run must not go on training in the background."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_the_parent, daemon=True).start()
     os.chdir(home)
-    if gpus > 1:
-        os.environ["CUDA_VISIBLE_DEVICES"] = one_gpu(number, gpus)  # before torch has looked for any
+    os.environ.update(environment)  # torch has not looked for a GPU yet
     while True:
         job = channel.recv()
         try:
