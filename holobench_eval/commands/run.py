@@ -10,8 +10,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from threading import Thread
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,9 +23,8 @@ from .output import console as open_console
 from .output import write_report
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ..study.definition import Study
+    from ..study.displays import Condition
     from ..study.executors import Executor
 
 INTERRUPTED = 130
@@ -45,6 +47,9 @@ def run(
 ) -> None:
     """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
     with _resumable():
+        from ..study.executors import begin
+
+        begin(executor)
         from ..study.artifacts import Artifacts
         from ..study.config import load_study
         from ..study.plan import plan
@@ -58,11 +63,15 @@ def run(
             open_displays(study)
         folder, grid = output_folder(study, output), plan(study)
         many = thread_count(threads, where.workers, study)
-        again = {"retry_failed": retry_failed, "retime": retime, "retrain": retrain}
+        options: dict[str, Any] = {"retry_failed": retry_failed, "retime": retime, "retrain": retrain, "device": device}
+        drawings = sheets(study, folder)
+        beside = drawings if where.workers > 1 else []
+        if where.workers > 1:  # meanwhile this process only waits
+            Thread(target=import_module, args=("holobench_eval.report",), daemon=True).start()
         with watching(console) as watch:
-            outcome = compute(study, grid, folder, where, watch, many, artifacts, device=device, **again)
+            outcome = compute(study, grid, folder, where, watch, many, artifacts, drawings=beside, **options)
         keep_training_records(grid, Artifacts(artifacts), folder)
-        draw_sheets(console, study, folder, thread_count(threads, 1, study))
+        draw_sheets(drawings, thread_count(threads, 1, study))
         write_report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
@@ -100,27 +109,59 @@ def open_displays(study: Study) -> None:
         open_display(display, study.seed)
 
 
-def draw_sheets(console: Console, study: Study, output: Path, threads: int) -> None:
-    """Draw the stages of every display of a study beside its report, where it is not there as this code draws it."""
+@dataclass(frozen=True)
+class Sheet:
+    """The stages of a display, drawn beside the report where they are not there as this code draws them.
+
+    note: how its panel was scaled; seed: of the study.
+    """
+
+    display: Condition
+    note: str
+    seed: int
+    output: Path
+
+    @property
+    def path(self) -> Path:
+        """The picture."""
+        return self.output / "figures" / f"stages-{self.display.name}.png"
+
+    @property
+    def identity(self) -> str:
+        """What the picture is drawn from."""
+        from ..core.hashing import digest
+        from ..study.versions import HARNESS
+
+        return digest([self.display.digest, list(self.display.spec.shape), self.seed, HARNESS])
+
+    def __call__(self) -> None:
+        """Draw it, unless it is there."""
+        from ..report.charts.sheet import drawn_from, save_sheet
+        from ..study.opening import simulated
+
+        if drawn_from(self.path) != self.identity:
+            save_sheet(simulated(self.display, self.seed), self.note, self.path, self.identity)
+
+
+def sheets(study: Study, output: Path) -> list[Sheet]:
+    """The sheet of every display of a study that has stages; learned and real displays have none."""
+    from ..display import load_profile
+    from ..study.displays import condition
+
+    panel, folder = study.display.panel, study.folder
+    return [
+        Sheet(condition(source, panel, folder), load_profile(source, folder).scaling_note(panel), study.seed, output)
+        for source in study.display.profiles
+    ]
+
+
+def draw_sheets(drawings: list[Sheet], threads: int) -> None:
+    """Draw what no worker has drawn. A picture must not cost the report: what is wrong with one is printed."""
     import torch
 
-    from ..core.hashing import digest
-    from ..display import load_profile
-    from ..report.charts.sheet import drawn_from, save_sheet
-    from ..study.displays import condition
-    from ..study.opening import simulated
-    from ..study.versions import HARNESS
-
-    for source in study.display.profiles:  # learned and real displays have no stages
-        display = condition(source, study.display.panel, study.folder)
-        path = output / "figures" / f"stages-{display.name}.png"
-        identity = digest([display.digest, list(display.spec.shape), study.seed, HARNESS])
-        if drawn_from(path) == identity:
-            continue
-        console.print(f"drawing the stages of {display.name}", markup=False)
-        torch.set_num_threads(threads)
-        note = load_profile(source, study.folder).scaling_note(study.display.panel)
+    torch.set_num_threads(threads)
+    for sheet in drawings:
         try:
-            save_sheet(simulated(display, study.seed), note, path, identity)
-        except Exception as error:  # a picture must not cost the report
-            print(f"holoeval: no stage sheet of {display.name}: {error}", file=sys.stderr)
+            sheet()
+        except Exception as error:
+            print(f"holoeval: no stage sheet of {sheet.display.name}: {error}", file=sys.stderr)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,16 +20,19 @@ from .artifacts import Artifacts
 from .definition import Study
 from .displays import Preparation
 from .executors import Executor, Serial
-from .executors.clusters import Address, Local
+from .executors.clusters import Address
+from .executors.local import Local
 from .plan import Cell, Plan, Task
 from .scoring.cell import work
 from .scoring.job import Job, Setting
 from .store import Record, Store
 from .training import TrainingJob, train
 
+DRAWING, DRAWING_SECONDS = "", 3.0  # the label of drawings in the queue, and about what one takes
 LATE = 10.0  # s after which all machines should see a record on a shared disk
-Step = TrainingJob | Job
-Result = str | list[Record]  # of a training the reason of its failure, empty for success; of a task its records
+Drawing = Callable[[], None]  # of a picture that the report needs and that needs no cell
+Step = TrainingJob | Job | Drawing
+Result = str | list[Record] | None  # of a training the reason of its failure, empty for success; of a task its records
 
 
 class Watch(Protocol):
@@ -80,6 +85,7 @@ def run(
     retime: bool = False,
     retrain: bool = False,
     device: str = "cpu",
+    drawings: Sequence[Drawing] = (),
 ) -> Outcome:
     """Train what is not trained, compute the missing cells of a plan and write their records.
 
@@ -107,6 +113,8 @@ def run(
         Train again, and compute the dependent cells again.
     device
         Name of where every worker computes, see ``device.find``.
+    drawings
+        Called by workers that would otherwise wait for the last cells; a failure is the caller's to see.
 
     Returns
     -------
@@ -148,7 +156,7 @@ def run(
             device=device,
         )
         if missing:  # else no worker need be started
-            _compute(plan, missing, timed, setting, executor, watch)
+            _compute(plan, missing, timed, setting, executor, watch, drawings)
         if described.get("ended") is None:
             described = provenance.end(output, described)
         return Outcome(store.load(plan), described, len(missing))
@@ -161,6 +169,7 @@ def _compute(
     setting: Setting,
     executor: Executor,
     watch: Watch,
+    drawings: Sequence[Drawing],
 ) -> None:
     """Train what the missing cells still need, then compute them; the cells of ``timed`` run alone."""
     artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
@@ -171,20 +180,23 @@ def _compute(
     trainings = [
         TrainingJob(preparation, setting.artifacts, setting.threads, setting.device) for preparation in untrained
     ]
-    at_work: list[Step] = []
+    at_work: dict[int, float] = {}
+    expected = {DRAWING: DRAWING_SECONDS}
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
     jobs = _jobs(plan, missing, missing if single else timed, setting)
-    steps = queue(trainings, jobs, unlearned, at_work)
+    steps = queue(trainings, jobs, unlearned, at_work, expected, drawings)
     results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, _watched(steps, at_work, watch))
     for job, result in results:
-        at_work.remove(job)
+        taken = time.monotonic() - at_work.pop(id(job))
         if isinstance(job, TrainingJob):
             reason = result if isinstance(result, str) else artifacts.fail(job.preparation, _error(result))
             unlearned.discard(job.preparation.id)
             watch.trained(job.preparation.name, reason)
-        else:
+        elif isinstance(job, Job):
             records = result if isinstance(result, list) else _lost(job, _error(result), store)
             _refuse_unseen(records, store)
+            if not single:  # of several workers none should begin its longest job at the end
+                expected[job.task.label] = taken
             watch.finished(records)
 
 
@@ -218,11 +230,11 @@ def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: S
             yield Job(task, wanted, setting, alone=not wanted.isdisjoint(alone))
 
 
-def _watched(steps: Iterator[Step | None], at_work: list[Step], watch: Watch) -> Iterator[Step | None]:
-    """The same steps; each is added to ``at_work`` when an executor takes it, and tasks are reported to the watch."""
+def _watched(steps: Iterator[Step | None], at_work: dict[int, float], watch: Watch) -> Iterator[Step | None]:
+    """The same steps; of one that an executor takes ``at_work`` gets ``id`` and time [s], and the watch the task."""
     for job in steps:
         if job is not None:
-            at_work.append(job)
+            at_work[id(job)] = time.monotonic()
         if isinstance(job, Job):
             watch.started(job.task)
         yield job
@@ -255,37 +267,53 @@ def _lost(job: Job, error: Exception, store: Store) -> list[Record]:
 
 
 def step(job: Step) -> Result:
-    """Carry out a training (see ``train``) or the cells of a task (see ``work``). This is what a worker runs."""
-    return train(job) if isinstance(job, TrainingJob) else work(job)
+    """Carry out a training (see ``train``), the cells of a task (see ``work``) or a drawing. A worker runs this."""
+    if isinstance(job, TrainingJob):
+        return train(job)
+    return work(job) if isinstance(job, Job) else job()
 
 
 def queue(
-    trainings: Iterable[TrainingJob], jobs: Iterable[Job], unlearned: set[str], at_work: Collection[Step]
+    trainings: Iterable[TrainingJob],
+    jobs: Iterable[Job],
+    unlearned: set[str],
+    at_work: Collection[object],
+    expected: Mapping[str, float],
+    drawings: Iterable[Drawing] = (),
 ) -> Iterator[Step | None]:
-    """Trainings first, since they take longest; then the jobs that need nothing of ``unlearned``, then the others; at
-    the end, each by itself, the jobs that run alone.
+    """Trainings first, since they take longest; then drawings and jobs, the longest first, a job as soon as it needs
+    nothing of ``unlearned``; at the end, each by itself, the jobs that run alone.
 
-    unlearned: ids of the preparations still to be trained; at_work: the steps that an executor took. The caller removes
-    entries from both as results come. None: all remaining jobs wait for a step that is at work.
+    unlearned: ids of the preparations still to be trained; at_work: the steps that an executor took; expected: seconds
+    that a job takes by its label; a job of another label may take longer than all others. The caller changes all three
+    as results come. None: all remaining jobs wait for a step that is at work.
     """
     yield from trainings
-    all_jobs = list(jobs)
-    waiting = [job for job in all_jobs if not job.alone]
-    while waiting:
-        ready = [job for job in waiting if unlearned.isdisjoint(_needs(job))]
-        waiting = [job for job in waiting if not unlearned.isdisjoint(_needs(job))]
-        yield from ready
+    alone, groups = list[Job](), dict[tuple[str, frozenset[str]], deque[Step]]()
+    for job in jobs:
+        if job.alone:
+            alone.append(job)
+        else:
+            groups.setdefault((job.task.label, _needs(job)), deque()).append(job)
+    if drawings:
+        groups[DRAWING, frozenset()] = deque(drawings)
+    while groups:
+        ready = [group for group in groups if unlearned.isdisjoint(group[1])]
         if not ready:
             yield None
-    for job in all_jobs:
-        if job.alone:
-            while at_work:
-                yield None
-            yield job
+            continue
+        longest = max(ready, key=lambda group: expected.get(group[0], math.inf))
+        yield groups[longest].popleft()
+        if not groups[longest]:
+            del groups[longest]
+    for job in alone:
+        while at_work:
+            yield None
+        yield job
 
 
-def _needs(job: Job) -> set[str]:
-    return {identity for cell, _ in job.cells for identity in cell.prepared}
+def _needs(job: Job) -> frozenset[str]:
+    return frozenset(identity for cell, _ in job.cells for identity in cell.prepared)
 
 
 def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import run as running
 from holobench_eval.study.executors import Serial, clusters, executor
-from holobench_eval.study.executors.clusters import Address, Local, Slurm
+from holobench_eval.study.executors.clusters import Address, Slurm
 from tests.study.test_executors import compute, untimed
 from tests.support.fake_study import fake_work, write_config
 
@@ -155,13 +155,6 @@ def test_a_scheduler_without_a_gpu_says_how_to_start_a_worker_with_one() -> None
         with pytest.raises(UserError, match="declares a GPU; start one with: ") as caught:
             _ = Address(address, on_gpu=True).workers
     assert f'dask worker {address} --nthreads 1 --resources "GPU=1"' in str(caught.value)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("importable")
-@pytest.mark.parametrize(("gpus", "declared"), [(0, {}), (1, {"GPU": 1})])
-def test_local_workers_declare_a_gpu_where_they_compute_on_one(gpus: int, declared: dict[str, float]) -> None:
-    assert [found for _, found in Local(1, gpus).map(resources, range(2))] == [declared] * 2
 
 
 @pytest.fixture

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import torch
@@ -16,7 +14,8 @@ from holobench_eval.core.device import CPU, repeatable
 from holobench_eval.report.sections.appendix import environment
 from holobench_eval.study import cost, provenance
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Local, Serial, clusters, executor
+from holobench_eval.study.executors import Local, Serial, executor
+from holobench_eval.study.executors.local import one_gpu
 from holobench_eval.study.plan import plan
 from tests.study.test_run import compute
 from tests.support import trained_study
@@ -97,15 +96,10 @@ def test_there_are_as_many_workers_as_gpus_unless_asked_otherwise() -> None:
 
 @pytest.mark.parametrize(("seen", "expected"), [(None, ["0", "1", "0"]), ("2,5", ["2", "5", "2"])])
 def test_every_worker_sees_one_gpu(seen: str | None, expected: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    found: list[Any] = []
-    for number in range(3):
-        monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
-        if seen is not None:
-            monkeypatch.setenv("CUDA_VISIBLE_DEVICES", seen)
-        clusters._one_gpu_each(2).setup(SimpleNamespace(name=number))
-        found.append(os.environ["CUDA_VISIBLE_DEVICES"])
-        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "")  # noted, so that it is put back after the test
-    assert found == expected
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    if seen is not None:
+        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", seen)
+    assert [one_gpu(number, 2) for number in range(3)] == expected
 
 
 def test_no_cell_and_no_artifact_depends_on_the_device(tmp_path: Path) -> None:

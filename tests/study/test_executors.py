@@ -1,5 +1,11 @@
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +20,10 @@ from holobench_eval.study.progress import Lines
 from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 
 
-def compute(config: Path, output: Path, chosen: Executor) -> list[dict[str, Any]]:
+def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:
     study = load_study(config)
     watch, artifacts = Lines(lambda line: None), output.parent / "artifacts"
-    return running.run(study, plan(study), output, chosen, watch, threads=1, artifacts=artifacts).records
+    return running.run(study, plan(study), output, chosen, watch, threads=1, artifacts=artifacts, **options).records
 
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -58,6 +64,76 @@ def test_one_solution_of_every_row_is_timed_when_no_worker_does_anything_else(
     overlapping = [any(a < end and start < b for a, b in spans if (a, b) != (start, end)) for start, end in spans]
     assert overlapping[-3:] == [False] * 3
     assert True in overlapping
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_drawings_are_made_beside_the_cells_and_a_failed_one_costs_nothing(tmp_path: Path) -> None:
+    class Both(Serial):
+        def map(self, function: Any, jobs: Any) -> Any:
+            for job in jobs:
+                try:
+                    result = function(job)
+                except Exception as error:
+                    result = error
+                yield job, result
+
+    drawings = [partial(int, "no number"), partial((tmp_path / "picture").write_text, "drawn")]
+    records = compute(write_config(tmp_path), tmp_path / "out", Both(), drawings=drawings)
+    assert {record["state"] for record in records} == {"done"}
+    assert (tmp_path / "picture").read_text() == "drawn"
+
+
+def reciprocal(number: int) -> float:
+    return 1 / number
+
+
+def surroundings(_: int) -> tuple[str, str, str]:
+    time.sleep(0.2)  # so that the other worker takes the other job
+    return os.environ["CUDA_VISIBLE_DEVICES"], os.environ["OMP_NUM_THREADS"], str(Path.cwd())
+
+
+def endless(folder: Path) -> None:
+    (folder / str(os.getpid())).touch()
+    time.sleep(600)
+
+
+@pytest.mark.slow
+def test_an_error_in_a_worker_is_the_result_of_its_job() -> None:
+    results = dict(Local(2).map(reciprocal, [2, 0, 4]))
+    assert (results[2], results[4]) == (0.5, 0.25)
+    assert isinstance(results[0], ZeroDivisionError)
+
+
+@pytest.mark.slow
+def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,5")
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.chdir(tmp_path)
+    found = [surrounding for _, surrounding in Local(2, gpus=2).map(surroundings, range(2))]
+    assert sorted(found) == [("3", "1", str(tmp_path)), ("5", "1", str(tmp_path))]
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
+def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> None:
+    code = "import sys, pathlib; from tests.study.test_executors import Local, endless; "
+    code += "list(Local(2).map(endless, [pathlib.Path(sys.argv[1])] * 2))"
+    run = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path)], cwd=Path(__file__).parents[2], stderr=subprocess.DEVNULL
+    )
+    while len(list(tmp_path.iterdir())) < 2:
+        assert run.poll() is None
+        time.sleep(0.05)
+    run.send_signal(ending)
+    run.wait(timeout=30)
+    deadline = time.monotonic() + 30
+    for worker in tmp_path.iterdir():
+        while Path("/proc", worker.name).exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
 
 
 def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:

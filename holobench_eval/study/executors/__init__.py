@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from ...core.errors import UserError, suggest
-from .clusters import Address, Local, Slurm
+from .clusters import Address, Slurm
+from .local import Local, prepare
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -75,6 +76,12 @@ def executor(name: str, workers: int | None, small: bool = True, address: str | 
     if name == "serial" or (name == "auto" and (count == 1 or not (small or workers or gpus))):
         return Serial()
     return Local(count, gpus)
+
+
+def begin(name: str) -> None:
+    """Start what the executor of a name probably needs, while this process still reads the study."""
+    if name == "local" or (name == "auto" and _cores() > 1):
+        prepare()
 
 
 def _cores() -> int:

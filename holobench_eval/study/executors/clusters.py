@@ -1,12 +1,9 @@
-"""Tasks on the workers of a Dask cluster: processes of this machine, jobs of a SLURM queue, or a running scheduler."""
+"""Tasks on the workers of a Dask cluster: jobs of a SLURM queue, or a running scheduler."""
 
 from __future__ import annotations
 
 import os
 import platform
-import signal
-import threading
-import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,16 +12,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ...core.errors import UserError
+from .local import ONE_THREAD
 
 J = TypeVar("J")
 R = TypeVar("R")
 
-# Dask's own, without its MALLOC_TRIM_THRESHOLD_ (it returns every freed tensor to the system, and allocating the next
-# doubles the time of a step), and without its profiler, which samples every worker's stack a hundred times a second.
 WORKER_ENVIRONMENT = {
-    "OMP_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
+    **ONE_THREAD,
+    # Not its profiler, which samples every worker's stack a hundred times a second.
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
 }
@@ -36,41 +31,7 @@ SETTINGS = {
     "distributed.logging.distributed": "critical",
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.interval": "5s",
-    "distributed.nanny.pre-spawn-environ": WORKER_ENVIRONMENT,
 }
-
-
-@dataclass(frozen=True)
-class Local:
-    """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try.
-
-    gpus: to compute on; of several, each worker sees only its own.
-    """
-
-    workers: int
-    gpus: int = 0
-
-    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
-        """Results as they come. No more jobs are taken than there are workers."""
-        from distributed import Client, LocalCluster
-
-        with (
-            _settings(),
-            LocalCluster(  # type: ignore[no-untyped-call]
-                n_workers=self.workers,
-                resources=GPU if self.gpus else None,
-                threads_per_worker=1,
-                processes=True,
-                memory_limit=0,  # no worker may die because others fill the memory
-                dashboard_address=None,
-                silence_logs=50,
-            ) as cluster,
-            Client(cluster) as client,  # type: ignore[no-untyped-call]
-        ):
-            client.register_plugin(_bound_to_the_parent())
-            if self.gpus > 1:
-                client.register_plugin(_one_gpu_each(self.gpus))
-            yield from _results(client, lambda: self.workers, function, jobs, on_gpu=self.gpus > 0)
 
 
 @dataclass(frozen=True)
@@ -216,34 +177,3 @@ def _declared() -> list[str]:
     import dask
 
     return [*dask.config.get("jobqueue.slurm.worker-extra-args"), "--resources", "GPU=1"]
-
-
-def _bound_to_the_parent() -> Any:
-    """A plugin for every worker, restarted workers included: Ctrl-C is left to the parent process, and a worker dies
-    with its parent, since a killed run must not go on training in the background."""
-    from distributed import WorkerPlugin
-
-    class BoundToParent(WorkerPlugin):
-        def setup(self, worker: object) -> None:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-            threading.Thread(target=_die_with, args=(os.getppid(),), daemon=True).start()
-
-    return BoundToParent()
-
-
-def _one_gpu_each(gpus: int) -> Any:
-    """A plugin by which workers, numbered from 0, take the GPUs in turn, before torch has looked for any."""
-    from distributed import WorkerPlugin
-
-    class OneGpu(WorkerPlugin):
-        def setup(self, worker: Any) -> None:
-            seen = os.environ.get("CUDA_VISIBLE_DEVICES") or ",".join(map(str, range(gpus)))
-            os.environ["CUDA_VISIBLE_DEVICES"] = seen.split(",")[int(worker.name) % gpus]
-
-    return OneGpu()
-
-
-def _die_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)

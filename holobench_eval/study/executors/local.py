@@ -1,0 +1,141 @@
+"""Tasks in worker processes of this machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import connection, forkserver, get_context, parent_process
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+J = TypeVar("J")
+R = TypeVar("R")
+
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+ATTEMPTS = 2  # of a job whose worker dies: a second loss is the job's fault
+PRELOADED = ["holobench_eval.study.run"]  # by the process that workers are forked from, which computes nothing
+_FORK = get_context("forkserver")
+
+
+class KilledWorkerError(Exception):
+    """A worker process died with a job, twice."""
+
+
+@dataclass(frozen=True)
+class Local:
+    """Jobs in worker processes of this machine. A worker that dies costs one job, after a second try.
+
+    gpus: to compute on; of several, each worker sees only its own.
+    """
+
+    workers: int
+    gpus: int = 0
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
+        """Results as they come. No more jobs are taken than there are workers."""
+        waiting = iter(jobs)
+        crew = [_Worker[J](function, number, self.gpus) for number in range(self.workers)]
+        try:
+            while True:
+                for worker in crew:
+                    if worker.job is None and (job := next(waiting, None)) is not None:
+                        worker.take(job)
+                busy = {worker.channel: worker for worker in crew if worker.job is not None}
+                if not busy:
+                    return
+                for channel in connection.wait(list(busy)):
+                    yield from busy[channel].results()  # type: ignore[index]
+        finally:
+            for worker in crew:
+                worker.end()
+
+
+class _Worker(Generic[J]):
+    """A process, the parent's end of its channel, the job it has (None: it is idle) and how often it was lost on it."""
+
+    def __init__(self, function: Callable[[J], Any], number: int, gpus: int) -> None:
+        own = {"CUDA_VISIBLE_DEVICES": one_gpu(number, gpus)} if gpus > 1 else {}
+        self.start = (function, {**os.environ, **ONE_THREAD, **own}, Path.cwd())
+        self.job: J | None = None
+        self.lost = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self.channel, theirs = _FORK.Pipe()
+        self.process = _FORK.Process(target=_serve, args=(theirs, *self.start), daemon=True)
+        prepare()
+        self.process.start()
+        theirs.close()
+
+    def take(self, job: J) -> None:
+        """Start a job."""
+        self.job = job
+        with suppress(BrokenPipeError):  # a dead worker, which ``results`` sees
+            self.channel.send(job)
+
+    def results(self) -> Iterator[tuple[J, Any]]:
+        """The job and its result; nothing where the worker died and another one has the job now."""
+        job = self.job
+        assert job is not None
+        try:
+            result = self.channel.recv()
+        except (EOFError, ConnectionResetError):
+            self.lost += 1
+            self.end()
+            self._begin()
+            if self.lost < ATTEMPTS:
+                self.take(job)
+                return
+            result = KilledWorkerError(f"its worker process died, {ATTEMPTS} times")
+        self.job, self.lost = None, 0
+        yield job, result
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self.process.kill()
+        self.process.join()
+        self.channel.close()
+
+
+def _serve(channel: Connection, function: Callable[[Any], Any], environment: dict[str, str], home: Path) -> None:
+    """What a worker does: job after job, in the folder ``home``. Ctrl-C is left to the parent process. A worker dies
+    with its parent, since a killed run must not go on training in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_die_with_the_parent, daemon=True).start()
+    os.chdir(home)
+    os.environ.update(environment)  # torch has not looked for a GPU yet
+    while True:
+        job = channel.recv()
+        try:
+            result = function(job)
+        except Exception as error:
+            result = error
+        channel.send(result)
+
+
+def one_gpu(number: int, gpus: int) -> str:
+    """The GPU of a worker, numbered from 0, of those that this process may see: workers take them in turn."""
+    seen = os.environ.get("CUDA_VISIBLE_DEVICES") or ",".join(map(str, range(gpus)))
+    return seen.split(",")[number % gpus]
+
+
+def _die_with_the_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+def prepare() -> None:
+    """Start the process that workers are forked from, where it does not run; its imports take more than a second."""
+    before = dict(os.environ)
+    os.environ.update(ONE_THREAD)
+    _FORK.set_forkserver_preload(PRELOADED)
+    forkserver.ensure_running()
+    os.environ.clear()
+    os.environ.update(before)

@@ -1,0 +1,47 @@
+"""What ``holoeval run`` does beside the cells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from holobench_eval.commands.run import Sheet, draw_sheets, sheets
+from holobench_eval.report.charts import sheet as charts
+from holobench_eval.study import opening
+from holobench_eval.study.config import load_study
+from tests.support.fake_study import write_config
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What sheets have been drawn from; no bench is opened."""
+    sources: list[str] = []
+    monkeypatch.setattr(opening, "simulated", lambda display, seed: SimpleNamespace())
+    monkeypatch.setattr(charts, "save_sheet", lambda bench, note, path, source: sources.append(source))
+    return sources
+
+
+def sheet(folder: Path) -> Sheet:
+    (found,) = sheets(load_study(write_config(folder)), folder)
+    return found
+
+
+def test_a_sheet_that_is_there_is_not_drawn_again(
+    tmp_path: Path, drawn: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = sheet(tmp_path)
+    wanted()
+    assert drawn == [wanted.identity]
+    monkeypatch.setattr(charts, "drawn_from", lambda path: wanted.identity if path == wanted.path else "")
+    wanted()
+    assert len(drawn) == 1
+
+
+def test_a_sheet_that_cannot_be_drawn_is_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(opening, "simulated", lambda display, seed: 1 / 0)
+    draw_sheets([sheet(tmp_path)], threads=1)
+    assert capsys.readouterr().err == "holoeval: no stage sheet of ideal: division by zero\n"
