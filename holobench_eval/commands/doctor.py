@@ -36,7 +36,7 @@ MODULES = {"scikit-image": "skimage", "pillow": "PIL", "pyyaml": "yaml", "opencv
 
 LIBRARIES = """
 import importlib, json, sys
-found = {"errors": {}}
+found = {"errors": {}, "kernel": None}
 for name in sys.argv[1:]:
     try:
         importlib.import_module(name)
@@ -46,6 +46,10 @@ if "torch" in sys.modules:
     import torch
     found["threads"] = torch.get_num_threads()
     cuda = torch.cuda.is_available()
+    try:
+        import holobench_eval.optics.fused
+    except Exception as error:
+        found["kernel"] = f"{type(error).__name__}: {error}"[:200]
     found["gpus"] = [torch.cuda.get_device_name(i) for i in range(torch.cuda.device_count())] if cuda else []
 print("\\n" + json.dumps(found))
 """
@@ -147,16 +151,26 @@ def _packages() -> Iterator[Finding]:
             yield Finding(name, "ok", version(name), core=True)
     complete = len(modules) - len(seen["errors"])
     yield Finding("packages", "ok", f"{complete} of {len(modules)} that the core needs can be imported")
+    yield _kernel(seen.get("kernel"))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     yield Finding("CPU", "ok", f"{cores} cores for this process, {seen.get('threads', 'no')} torch threads")
     gpus = seen.get("gpus") or ["none that torch can use; nothing here needs one"]
     yield Finding("GPU", "ok", ", ".join(gpus))
 
 
+def _kernel(fault: str | None) -> Finding:
+    """Whether propagation is compiled for this processor."""
+    if fault is None:
+        return Finding("propagation", "ok", "compiled for this processor")
+    why = f"by torch, at half the speed: the compiled kernel cannot be had ({fault})"
+    return Finding("propagation", "missing", why, _install("numba"))
+
+
 def _required() -> list[str]:
-    """Names of the packages that the core needs, from what was installed."""
+    """Names of the packages that the core needs, from what was installed; it does without the compiler."""
     lines = [line for line in requires("holobench_eval") or () if "extra ==" not in line]
-    return [match[0].lower() for line in lines if (match := re.match(r"[A-Za-z0-9._-]+", line))]
+    names = [match[0].lower() for line in lines if (match := re.match(r"[A-Za-z0-9._-]+", line))]
+    return [name for name in names if name != "numba"]
 
 
 def _opencv() -> Iterator[Finding]:

@@ -14,8 +14,8 @@ from ..core.errors import CellError
 from ..imaging.register import Registration
 from ..optics import AngularSpectrum
 from ..optics.convolution import frequencies
-from ..optics.transfer import transfer_function
 from ..optics.phase import Matrix, refocus
+from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
 DARKEST_MEAN = 0.01  # a target channel darker than this is exposed as if it had this mean: exposure stays finite

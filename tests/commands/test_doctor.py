@@ -57,6 +57,15 @@ def test_devices_and_what_keeps_them_from_answering_are_listed(quick):
     assert (silent.state, silent.found) == ("missing", "2.6; no device answers")
 
 
+def test_a_machine_without_the_compiler_gets_one_line_and_is_not_broken(quick):
+    fault = {"errors": {}, "threads": 2, "gpus": [], "kernel": "ModuleNotFoundError: No module named 'numba'"}
+    quick.setattr(module, "_ask", lambda code, *_: DEVICES if "drivers" in code else fault)
+    lines = [each for each in examine() if "numba" in each.what + each.found + each.remedy]
+    assert [(each.what, each.state, each.remedy, each.broken) for each in lines] == [
+        ("propagation", "missing", "pip install numba", False)
+    ]
+
+
 def test_everything_missing_has_something_to_do(quick):
     assert all(each.remedy for each in examine() if each.state != "ok")
 

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import connection, forkserver, get_context, parent_process
+from multiprocessing import connection, forkserver, get_all_start_methods, get_context, parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -18,8 +18,11 @@ R = TypeVar("R")
 
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 ATTEMPTS = 2  # of a job whose worker dies: a second loss is the job's fault
-PRELOADED = ["holobench_eval.study.run"]  # by the process that workers are forked from, which computes nothing
-_FORK = get_context("forkserver")
+# By the process that workers are forked from, which computes nothing; what cannot be imported is left out. torch's
+# optimisers import its compiler, which takes more than a second.
+PRELOADED = ["holobench_eval.study.run", "holobench_eval.optics.fused", "torch._dynamo"]
+FORKS = "forkserver" in get_all_start_methods()  # not on Windows, where every worker imports on its own
+_CONTEXT = get_context("forkserver" if FORKS else "spawn")
 
 
 class KilledWorkerError(Exception):
@@ -66,8 +69,8 @@ class _Worker(Generic[J]):
         self._begin()
 
     def _begin(self) -> None:
-        self.channel, theirs = _FORK.Pipe()
-        self.process = _FORK.Process(target=_serve, args=(theirs, *self.start), daemon=True)
+        self.channel, theirs = _CONTEXT.Pipe()
+        self.process = _CONTEXT.Process(target=_serve, args=(theirs, *self.start), daemon=True)
         prepare()
         self.process.start()
         theirs.close()
@@ -133,9 +136,11 @@ def _die_with_the_parent() -> None:
 
 def prepare() -> None:
     """Start the process that workers are forked from, where it does not run; its imports take more than a second."""
+    if not FORKS:
+        return
     before = dict(os.environ)
     os.environ.update(ONE_THREAD)
-    _FORK.set_forkserver_preload(PRELOADED)
+    _CONTEXT.set_forkserver_preload(PRELOADED)
     forkserver.ensure_running()
     os.environ.clear()
     os.environ.update(before)
