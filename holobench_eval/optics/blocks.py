@@ -20,7 +20,7 @@ BLOCK_BYTES = 2**21
 """Of a block: measured, 1 to 4 MiB are best for propagations from 256 x 256 to 2160 x 3840 pixels."""
 
 
-def in_blocks(work: Callable[[slice], None], like: Tensor, lines: int, elements: int) -> None:
+def in_blocks(work: Callable[[slice], object], like: Tensor, lines: int, elements: int) -> None:
     """Call ``work`` with slices of ``lines`` that hold ``elements`` of the type of ``like`` in all; without gradients.
 
     A block stays in the cache of the core that works on it. On a GPU there is one block.

@@ -22,7 +22,7 @@ ATTEMPTS = 2  # of a job whose worker dies: a second loss is the job's fault
 # optimisers import its compiler, which takes more than a second.
 PRELOADED = ["holobench_eval.study.run", "holobench_eval.optics.fused", "torch._dynamo"]
 FORKS = "forkserver" in get_all_start_methods()  # not on Windows, where every worker imports on its own
-_CONTEXT = get_context("forkserver" if FORKS else "spawn")
+_CONTEXT = get_context("forkserver") if FORKS else get_context("spawn")
 
 
 class KilledWorkerError(Exception):
