@@ -175,7 +175,7 @@ class SimulatedBench:
         """``_modulated_field`` without a gradient, a block of rows at a time; gain: relative, of the frame."""
         bits, channel = self.profile.panel.bits, maps.geometry.channel
         table = self.profile.lut.phase(torch.arange(2.0**bits), bits, torch.ones(()), channel).numpy()
-        drive = [plane.detach().contiguous().numpy() for plane in (phase, maps.added, maps.lut_gain)]
+        drive = phase.detach().contiguous().numpy(), maps.added.numpy(), maps.lut_gain.numpy()
         share = self.crosstalk.numpy(), self.modulated[:, :, 0, 0].numpy()
         light = maps.amplitude.numpy(), maps.angle.numpy()
         field = torch.empty((self.samples, self.samples, *phase.shape), dtype=torch.complex64)
