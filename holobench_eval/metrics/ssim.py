@@ -6,10 +6,9 @@ similarity", IEEE Trans. Image Process. 13 (2004).
 
 from __future__ import annotations
 
-import math
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,6 +16,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from ..core.compiled import compiled, usable
+from ..optics.blocks import in_blocks
 from .base import Metric, gaussian_taps, gaussian_valid, paired
 
 SIGMA = 1.5
@@ -24,9 +25,9 @@ RADIUS = 5
 C1 = 0.01**2
 C2 = 0.03**2
 STRIP = 2**17  # pixels that are compared together: few enough to stay in the cache
-LARGE = 2**20  # pixels for each thread; to start a thread takes as long as to compare a tenth of them
 
 Plane = NDArray[np.floating]
+TAPS: Plane = np.array(gaussian_taps(SIGMA, RADIUS))
 
 
 class LocalStatistics:
@@ -98,44 +99,82 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
 def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     """``LocalStatistics.means`` without a gradient, on a CPU: strip by strip, in threads where that pays."""
     batch, channels, height, width = image.shape
-    planes = [side.detach().reshape(-1, height, width).numpy() for side in (image, target)]
+    planes = [side.detach().contiguous().view(-1, height, width).numpy() for side in (image, target)]
     inner = height - 2 * RADIUS
     step = max(2 * RADIUS, STRIP // width)
     strips = list(product(range(batch * channels), range(0, inner, step)))
+    sums = _compiled_sums if usable(image, target) else _sums
+    totals = np.empty((len(strips), 2))
 
-    def sums(strip: tuple[int, int]) -> tuple[float, float]:
-        plane, first = strip
-        rows = slice(first, min(first + step, inner) + 2 * RADIUS)
-        return _sums(planes[0][plane, rows], planes[1][plane, rows])
+    def compare(some: slice) -> None:
+        for index in range(len(strips))[some]:
+            plane, first = strips[index]
+            rows = slice(first, min(first + step, inner) + 2 * RADIUS)
+            totals[index] = sums(planes[0][plane, rows], planes[1][plane, rows], TAPS)
 
     # Strips do not depend on the number of threads, and are added in their order: nor does the value.
-    threads = min(torch.get_num_threads(), math.ceil(image.numel() / LARGE))
-    if threads > 1:
-        with ThreadPoolExecutor(threads) as pool:
-            totals = list(pool.map(sums, strips))
-    else:
-        totals = [sums(strip) for strip in strips]
-    added = np.array(totals).reshape(batch, -1, 2).sum(1) / (channels * inner * (width - 2 * RADIUS))
+    in_blocks(compare, image, len(strips), image.numel())
+    added = totals.reshape(batch, -1, 2).sum(1) / (channels * inner * (width - 2 * RADIUS))
     full, structure = torch.from_numpy(added).to(image.dtype).unbind(1)
     return full, structure
 
 
-def _sums(x: Plane, y: Plane) -> tuple[float, float]:
+def _sums(x: Plane, y: Plane, taps: Plane) -> tuple[float, float]:
     """Sums over the windows in a strip (h, W) of two images of the SSIM and of its contrast-structure factor.
 
     The SSIM has only the sum of the two variances, so that four filters do.
     """
-    mean_x, mean_y, squares, products = (_strip_filtered(side) for side in (x, y, x * x + y * y, x * y))
+    inside = (slice(RADIUS, -RADIUS),) * 2
+    filtered = (cv2.sepFilter2D(side, -1, taps, taps)[inside] for side in (x, y, x * x + y * y, x * y))
+    structure, entire = _factors(*filtered)
+    return float(entire.sum(dtype=np.float64)), float(structure.sum(dtype=np.float64))
+
+
+def _factors(mean_x: Any, mean_y: Any, squares: Any, products: Any) -> tuple[Any, Any]:
+    """Contrast-structure factor and SSIM from the filtered images, the sum of their squares and their product."""
     mean_squares, mean_products = mean_x * mean_x + mean_y * mean_y, mean_x * mean_y
     structure = (2 * (products - mean_products) + C2) / (squares - mean_squares + C2)
-    luminance = (2 * mean_products + C1) / (mean_squares + C1)
-    return float((luminance * structure).sum(dtype=np.float64)), float(structure.sum(dtype=np.float64))
+    return structure, structure * (2 * mean_products + C1) / (mean_squares + C1)
 
 
-def _strip_filtered(plane: Plane) -> Plane:
-    """``gaussian_valid`` of one plane."""
-    taps = np.array(gaussian_taps(SIGMA, RADIUS))
-    return np.asarray(cv2.sepFilter2D(plane, -1, taps, taps)[RADIUS:-RADIUS, RADIUS:-RADIUS], dtype=plane.dtype)
+_compiled_factors = compiled(_factors)
+
+
+@compiled
+def _compiled_sums(x: Plane, y: Plane, taps: Plane) -> tuple[float, float]:
+    """``_sums``, each row of windows in one pass: down its columns, then along what they gave.
+
+    A window is symmetric: two pixels at a time have one weight.
+    """
+    width = x.shape[1]
+    inner = width - 2 * RADIUS
+    means_x, means_y, squares, products = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
+    entire, structure = np.zeros(inner), np.zeros(inner)
+    for row in range(RADIUS, x.shape[0] - RADIUS):
+        for c in range(width):
+            u, v, t = x[row, c], y[row, c], taps[RADIUS]
+            a, b, s, p = t * u, t * v, t * (u * u + v * v), t * (u * v)
+            for k in range(1, RADIUS + 1):
+                t = taps[RADIUS + k]
+                u, v, du, dv = x[row - k, c], y[row - k, c], x[row + k, c], y[row + k, c]
+                a += t * (u + du)
+                b += t * (v + dv)
+                s += t * (u * u + v * v + (du * du + dv * dv))
+                p += t * (u * v + du * dv)
+            means_x[c], means_y[c], squares[c], products[c] = a, b, s, p
+        for c in range(inner):
+            m, t = c + RADIUS, taps[RADIUS]
+            a, b, s, p = t * means_x[m], t * means_y[m], t * squares[m], t * products[m]
+            for k in range(1, RADIUS + 1):
+                t = taps[RADIUS + k]
+                a += t * (means_x[m - k] + means_x[m + k])
+                b += t * (means_y[m - k] + means_y[m + k])
+                s += t * (squares[m - k] + squares[m + k])
+                p += t * (products[m - k] + products[m + k])
+            contrast, similarity = _compiled_factors(a, b, s, p)
+            entire[c] += similarity
+            structure[c] += contrast
+    return entire.sum(), structure.sum()
 
 
 METRIC = Metric("ssim", "1", "higher", 1.0, ("linear", "amplitude", "srgb"), ssim, 2 * RADIUS + 1, title="SSIM")

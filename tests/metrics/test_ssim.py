@@ -10,6 +10,7 @@ from skimage.metrics import structural_similarity
 from torch import Tensor
 from torchmetrics.functional.image import multiscale_structural_similarity_index_measure
 
+from holobench_eval.core import compiled
 from holobench_eval.metrics.ms_ssim import ms_ssim
 from holobench_eval.metrics.psnr import psnr
 from holobench_eval.metrics.ssim import C1, ssim
@@ -55,6 +56,18 @@ def test_ssim_of_a_large_image_equals_scikit_image_whatever_the_number_of_thread
         known = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False, "data_range": 1}
         given = structural_similarity(*(side.numpy() for side in pair), channel_axis=0, **known)
         assert float(value) == pytest.approx(given, abs=1e-12)
+
+
+@pytest.mark.parametrize("metric", [ssim, ms_ssim])
+def test_the_value_is_the_same_without_numba(
+    photograph: Photograph, metric: Metric, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = photograph("coffee", 192)
+    image = noisy(target, 0.1)
+    value, single = float(metric(image, target)), float(metric(image.float(), target.float()))
+    monkeypatch.setattr(compiled, "AVAILABLE", False)
+    assert float(metric(image, target)) == pytest.approx(value, abs=1e-12)
+    assert float(metric(image.float(), target.float())) == pytest.approx(single, abs=2e-6)
 
 
 @pytest.mark.parametrize("metric", [ssim, ms_ssim])

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from operator import add, mul
 
 import torch
 from torch import Tensor
 
+from ...core.compiled import usable
 from ...core.device import CPU
 from ...core.seeds import generator
+from ...optics.blocks import in_blocks
 from ...optics.convolution import frequencies
 from ...optics.padding import padded_shape
 from ...optics.phase import blaze
@@ -19,6 +21,8 @@ from ...optics.phasor import phasor, squared_modulus
 from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .geometry import Geometry
+from .kernels import modulate_rows
+from .noise import normal
 from .path import Dust, OpticalPath, panel_spectrum
 from .profile import Profile
 from .stages.panel import straight_through_level
@@ -160,11 +164,29 @@ class SimulatedBench:
 
         The carrier is off. The light that follows no phase is in ``ChannelMaps.path``.
         """
+        if usable(phase) and phase.dtype == maps.amplitude.dtype:
+            return self._compiled_field(phase, maps, flicker * self.drift_gain)
         profile, gain = self.profile, maps.lut_gain * (flicker * self.drift_gain)
         level = straight_through_level(phase + maps.added, profile.panel.bits)
         driven = profile.lut.phase(level, profile.panel.bits, gain, maps.geometry.channel)
         fine = profile.crosstalk.apply(driven, self.crosstalk).view(self.samples, self.samples, *driven.shape)
         return phasor(self.modulated * maps.amplitude, fine + maps.angle)
+
+    def _compiled_field(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Tensor:
+        """``_modulated_field`` without a gradient, a block of rows at a time; gain: relative, of the frame."""
+        bits, channel = self.profile.panel.bits, maps.geometry.channel
+        table = self.profile.lut.phase(torch.arange(2.0**bits), bits, torch.ones(()), channel).numpy()
+        drive = phase.detach().contiguous().numpy(), maps.added.numpy(), maps.lut_gain.numpy()
+        share = self.crosstalk.numpy(), self.modulated[:, :, 0, 0].numpy()
+        light = maps.amplitude.numpy(), maps.angle.numpy()
+        field = torch.empty((self.samples, self.samples, *phase.shape), dtype=torch.complex64)
+        parts = torch.view_as_real(field).flatten(-2).numpy()
+
+        def modulate(rows: slice) -> None:
+            modulate_rows(*drive, gain, table, *share, *light, rows.start, rows.stop, parts)
+
+        in_blocks(modulate, field, len(phase), phase.numel())
+        return field
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane.
@@ -207,14 +229,21 @@ class SimulatedBench:
 
     def photograph(self, phase: Tensor, exposure: Sequence[float], draw: torch.Generator) -> Capture:
         """One colour-sequential capture of ``phase`` ``(C, H, W)`` [rad]."""
-        sensor, frames = self.profile.sensor, []
+        sensor, frames = self.profile.sensor, torch.empty((len(phase), *self.response.shape))
         phase = phase.to(self.device)
-        for channel in range(phase.shape[0]):
+        for channel, frame in enumerate(frames):
             light = self.integrated(phase[channel], channel, self.profile.flicker.gain(draw))
-            light = sample(light, self.grid, self.image_samples).cpu()
-            frames.append(sensor.expose(light, exposure[channel], self.response, draw))
+            key = int(torch.randint(2**63 - 1, (), generator=draw))
+            expose = partial(self._expose, light, exposure[channel], key, frame)
+            in_blocks(expose, light, len(frame), frame.numel())
         gain = tuple(electrons * sensor.counts_per_electron for electrons in exposure)
-        return Capture(torch.stack(frames), sensor.dark, sensor.white, gain[: len(frames)])
+        return Capture(frames, sensor.dark, sensor.white, gain[: len(frames)])
+
+    def _expose(self, light: Tensor, electrons: float, key: int, frame: Tensor, rows: slice) -> None:
+        """Fill rows of a frame ``(Hs, Ws)`` with the counts of ``light``, as ``integrated`` gives it."""
+        seen = sample(light, self.grid[rows], self.image_samples).cpu()
+        noise = normal(key, rows, frame.shape[1])
+        frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise)
 
 
 def present(tensors: Iterable[Tensor | None]) -> Iterator[Tensor]:

@@ -164,7 +164,8 @@ def _chart(axes: list[Axes], workbench: CalibratedBench) -> None:
     levels = torch.linspace(0, 1, 60)
     sensor, draw = bench.profile.sensor, bench.channels[GREEN].geometry.generator("sheet noise")
     patch = torch.ones(40, 40)
-    noise = [float(sensor.expose(patch * level, sensor.full_well, patch, draw).std()) for level in levels]
+    normal = torch.randn(patch.shape, generator=draw)
+    noise = [float(sensor.expose(patch * level, sensor.full_well, patch, normal).std()) for level in levels]
     axes[1].plot(levels * sensor.full_well, noise)
     axes[1].set(title="sensor noise", xlabel="signal [electrons]", ylabel="standard deviation [DN]")
     chart = Charts(names=("tv_lines",))

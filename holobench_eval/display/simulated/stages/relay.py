@@ -12,6 +12,8 @@ import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
 from torch import Tensor
 
+from ....core.compiled import usable
+from ..kernels import sample_rows
 from ..stage import Effect, Stage
 
 if TYPE_CHECKING:
@@ -85,6 +87,10 @@ def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
     pixels = grid.new_tensor([columns / per_pixel - 1, rows / per_pixel - 1])
     scale = pixels * per_pixel / grid.new_tensor([columns - 1.0, rows - 1.0])
     fine = grid if per_pixel == 1 else (grid + 1) * scale - 1
+    if usable(image):
+        seen = torch.empty(grid.shape[:2])
+        sample_rows(image.detach().contiguous().numpy(), fine.contiguous().numpy(), seen.numpy())
+        return seen
     if image.requires_grad and not image.is_cpu:
         return gathered(image, fine)
     return F.grid_sample(image[None, None], fine[None], mode="bilinear", padding_mode="zeros", align_corners=True)[0, 0]

@@ -12,8 +12,10 @@ import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
 from torch import Tensor
 
+from ....core.compiled import usable
 from ....imaging.shifts import correlate
 from ..geometry import Geometry
+from ..kernels import count_rows, counts
 from ..stage import Effect, Stage, percent
 
 if TYPE_CHECKING:
@@ -91,20 +93,24 @@ class Sensor(Stage):
         pattern = torch.randn(rows, columns, generator=geometry.generator("fixed pattern"))
         return falloff * (1 + self.prnu * pattern)
 
-    def expose(self, light: Tensor, electrons: float, response: Tensor, draw: torch.Generator) -> Tensor:
+    def expose(self, light: Tensor, electrons: float, response: Tensor, normal: Tensor) -> Tensor:
         """Counts [DN] ``(Hs, Ws)`` of ``light`` (mean incident light on the panel is 1) at ``electrons`` per unit.
 
         Shot noise is the normal approximation of Poisson noise; its error is below the read noise above 20 e-.
+        normal: standard normal numbers ``(Hs, Ws)``, one for the noise of each pixel.
         """
-        charge = light * response * electrons
-        if self.ambient:
-            charge = charge + response * (self.ambient * self.full_well / self.headroom)
+        ambient = self.ambient * self.full_well / self.headroom
         if not self.noise:
+            charge = response * (light * electrons + ambient)
             return (charge * self.counts_per_electron + self.dark).clamp(max=self.white)
-        deviation = charge.clamp_min(0).add_(self.read_noise**2).sqrt_()
-        charge = torch.randn(charge.shape, generator=draw).mul_(deviation).add_(charge)
-        charge = torch.addcmul(charge, charge, charge, value=-self.nonlinearity / self.full_well)
-        return charge.mul_(self.counts_per_electron).add_(self.dark).round_().clamp_(0, self.white)
+        planes = light.numpy(), response.numpy(), normal.numpy()
+        bend = self.nonlinearity / self.full_well
+        numbers = (self.read_noise**2, bend, self.counts_per_electron, self.dark, self.white)
+        if not usable(light):
+            return torch.from_numpy(counts(planes[1] * (planes[0] * electrons + ambient), planes[2], *numbers))
+        counted = torch.empty(light.shape)
+        count_rows(*planes, electrons, ambient, numbers, counted.numpy())
+        return counted
 
 
 def box_filter(image: Tensor, width: float) -> Tensor:

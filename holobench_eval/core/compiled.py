@@ -1,0 +1,41 @@
+"""Functions that Numba compiles, once on a machine, where it is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor
+
+try:
+    from numba import njit
+except ImportError:
+    njit = None  # type: ignore[assignment]
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+AVAILABLE = njit is not None
+_compile: Any = njit
+_OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}  # a product and a sum are rounded once
+
+
+def compiled(function: Function) -> Function:
+    """A function compiled by Numba, without Numba's own threads: ``optics.blocks.in_blocks`` shares the work.
+
+    Where Numba is not installed it is the function itself, far too slow for images: ask ``usable`` first. Numba
+    compiles again when the file of a function changes, but not when that of a function which it calls does: such
+    functions lie in one file.
+    """
+    if not AVAILABLE:
+        return function
+    try:
+        return _compile(cache=True, **_OPTIONS)(function)
+    except RuntimeError:  # no folder for the cache can be written to
+        return _compile(**_OPTIONS)(function)
+
+
+def usable(*given: Tensor) -> bool:
+    """Whether compiled functions can work on tensors: Numba is there, and they are on the CPU and need no gradient."""
+    differentiated = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in given)
+    return AVAILABLE and not differentiated and all(tensor.is_cpu for tensor in given)

@@ -1,0 +1,200 @@
+"""What every pixel of the panel and of the sensor goes through, compiled: one pass a row, its temporaries in the cache.
+
+Functions without loops also work on whole arrays, where Numba is not installed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.compiled import compiled
+
+Plane = NDArray[np.float32]
+
+F, N, U = np.float32, np.int32, np.uint32  # constants of these types keep float32 what it is
+TURN = 2 * math.pi
+LOW, HALF_WORD = np.uint64(2**32 - 1), np.uint64(32)
+
+
+def philox(column: Any, row: Any, key: tuple[Any, Any]) -> tuple[Any, Any, Any, Any]:
+    """Four random words of 32 bits for a counter (column, row) and a key, all uint64.
+
+    Philox4x32-10: J. K. Salmon, M. A. Moraes, R. O. Dror, D. E. Shaw, "Parallel random numbers: as easy as 1, 2, 3",
+    Proc. SC (2011).
+    """
+    a, b, c, d = column, row, column & np.uint64(0), column & np.uint64(0)
+    first, second = key
+    for _ in range(10):
+        left, right = np.uint64(0xD2511F53) * a, np.uint64(0xCD9E8D57) * c
+        a, b, c, d = (right >> HALF_WORD) ^ b ^ first, right & LOW, (left >> HALF_WORD) ^ d ^ second, left & LOW
+        first, second = (first + np.uint64(0x9E3779B9)) & LOW, (second + np.uint64(0xBB67AE85)) & LOW
+    return a, b, c, d
+
+
+def counts(charge: Any, normal: Any, read: Any, bend: Any, gain: Any, dark: Any, white: Any) -> Any:
+    """Counts [DN] of a charge [electrons] with its noise; see ``Sensor.expose``. read: variance of the read noise;
+    bend: relative loss of response an electron."""
+    charge = charge + normal * np.sqrt(np.maximum(charge, F(0)) + read)
+    return np.minimum(np.maximum(np.rint((charge - bend * (charge * charge)) * gain + dark), F(0)), white)
+
+
+_philox, _counts = compiled(philox), compiled(counts)
+
+
+@compiled
+def sincos(angle: Any) -> tuple[Any, Any]:
+    """Sine and cosine of an angle [rad] of a few turns, float32, within 1e-7; without branches, so that it is
+    vectorised. The polynomials are Chebyshev fits on an eighth of a turn."""
+    quarters = np.rint(angle * F(4 / TURN))
+    x = angle - quarters * F(1.5707855224609375)  # a quarter of a turn in three parts: products with two are exact
+    x = x - quarters * F(1.080334186553955e-05)
+    x = x - quarters * F(9.920935184e-10)
+    q = x * x
+    sine = x + x * q * (F(-0.1666666466) + q * (F(0.008332747485) + q * F(-0.0001958770018)))
+    cosine = F(1) - F(0.5) * q + q * q * (F(0.04166666466) + q * (F(-0.001388830217) + q * F(2.454773904e-05)))
+    n = N(quarters)
+    if n & N(1):
+        sine, cosine = cosine, sine
+    return (-sine if n & N(2) else sine), (-cosine if (n + N(1)) & N(2) else cosine)
+
+
+@compiled
+def log(x: Any) -> Any:
+    """Natural logarithm of a positive number, float32, within 1e-7 of its size or of 1; vectorised as ``sincos``."""
+    bits = np.float32(x).view(np.int32)
+    exponent = (bits - N(0x3F3504F3)) >> N(23)  # of two, so that what remains lies in [sqrt(1/2), sqrt(2))
+    f = np.int32(bits - (exponent << N(23))).view(np.float32) - F(1)
+    p = F(-0.13279585) + f * (F(0.12873202) + f * F(-0.07488439))
+    p = F(0.33333345) + f * (F(-0.2500131) + f * (F(0.20000998) + f * (F(-0.16608536) + f * (F(0.14193764) + f * p))))
+    return f - f * f * (F(0.5) - f * p) + F(exponent) * F(math.log(2))
+
+
+@compiled
+def words(row: int, key: Any, out: Any) -> None:
+    """Random words of a row, ``(4, columns)``."""
+    for i in range(out.shape[1]):
+        a, b, c, d = _philox(np.uint64(i), np.uint64(row), key)
+        out[0, i], out[1, i], out[2, i], out[3, i] = U(a), U(b), U(c), U(d)
+
+
+@compiled
+def pairs(distance: Any, direction: Any, x: Any, y: Any) -> None:
+    """Two normal numbers from two words each (Box and Muller)."""
+    for i in range(x.size):
+        radius = np.sqrt(F(-2) * log((F(N(distance[i] >> U(8))) + F(0.5)) * F(2**-24)))
+        sine, cosine = sincos(F(N(direction[i])) * F(TURN * 2**-32))
+        x[i], y[i] = radius * cosine, radius * sine
+
+
+@compiled
+def normal_rows(first: int, key: Any, out: Any) -> None:
+    """Normal numbers ``(rows, 4, columns)`` of the rows from ``first`` on."""
+    random = np.empty(out.shape[1:], np.uint32)
+    for r in range(out.shape[0]):
+        words(first + r, key, random)
+        pairs(random[0], random[1], out[r, 0], out[r, 1])
+        pairs(random[2], random[3], out[r, 2], out[r, 3])
+
+
+@compiled
+def count_rows(
+    light: Plane, response: Plane, normal: Plane, electrons: float, ambient: float, numbers: Any, out: Plane
+) -> None:
+    """Counts of ``light`` ``(rows, columns)``; see ``Sensor.expose``."""
+    read, bend, gain, dark, white = numbers
+    for r in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            charge = response[r, c] * (light[r, c] * F(electrons) + F(ambient))
+            out[r, c] = _counts(charge, normal[r, c], F(read), F(bend), F(gain), F(dark), F(white))
+
+
+@compiled
+def weigh(at: Any, last: int, pixel: Any, low: Any, high: Any) -> None:
+    """The first of the two pixels on both sides of places ``at``, in reach, and the weights of both; zero outside."""
+    for c in range(at.size):
+        first = np.floor(at[c]) if at[c] > F(0) else F(0)  # NaN too: a pixel of the image
+        first = first if first < F(last - 1) else F(last - 1)
+        pixel[c] = N(first)
+        low[c], high[c] = max(F(1) - abs(at[c] - first), F(0)), max(F(1) - abs(at[c] - first - F(1)), F(0))
+
+
+@compiled
+def sample_rows(image: Plane, grid: Plane, out: Plane) -> None:
+    """Bilinear values of an image at a grid ``(rows, columns, 2)`` of (x, y) in [-1, 1]; see ``relay.sample``."""
+    rows, columns = image.shape
+    size, one = grid.shape[1], np.uint64(1)
+    x, y = np.empty(size, np.float32), np.empty(size, np.float32)
+    left, right, above, below = (np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x))
+    column, row = np.empty(size, np.int32), np.empty(size, np.int32)
+    for r in range(grid.shape[0]):
+        for c in range(size):
+            x[c] = (grid[r, c, 0] + F(1)) * F((columns - 1) / 2)
+            y[c] = (grid[r, c, 1] + F(1)) * F((rows - 1) / 2)
+        weigh(x, columns - 1, column, left, right)
+        weigh(y, rows - 1, row, above, below)
+        for c in range(size):
+            j, i = np.uint64(row[c]), np.uint64(column[c])  # unsigned: not counted from the end
+            upper = image[j, i] * left[c] + image[j, i + one] * right[c]
+            lower = image[j + one, i] * left[c] + image[j + one, i + one] * right[c]
+            out[r, c] = upper * above[c] + lower * below[c]
+
+
+@compiled
+def drive_row(phase: Plane, added: Plane, gain: Plane, factor: float, table: Plane, out: Plane) -> None:
+    """Phase ``(W,)`` [rad] that a row of the panel shows; see ``SimulatedBench._modulated_field``."""
+    levels = F(table.size)
+    level = np.empty(phase.size, np.int32)
+    for c in range(phase.size):
+        steps = np.rint((phase[c] + added[c]) * F(table.size / TURN))
+        wrapped = steps - levels * np.floor(steps / levels)
+        level[c] = N(wrapped if wrapped > F(0) else F(0))  # NaN too: an entry of the table
+        out[c] = gain[c] * F(factor) + F(0) * wrapped  # where NaN stays
+    for c in range(phase.size):
+        out[c] *= table[U(level[c])]
+
+
+@compiled
+def modulate_rows(
+    phase: Plane,
+    added: Plane,
+    gain: Plane,
+    factor: float,
+    table: Plane,
+    taps: Plane,
+    modulated: Plane,
+    amplitude: Plane,
+    angle: Plane,
+    first: int,
+    last: int,
+    out: Plane,
+) -> None:
+    """The light of the sub-samples ``(samples, samples, H, 2 W)``, real and imaginary parts in turn, in rows ``first``
+    to ``last`` of the panel; see ``SimulatedBench._modulated_field``."""
+    height, width = phase.shape
+    samples, reach, rows = len(taps), taps.shape[1] // 2, last - first
+    driven = np.empty((rows + 2 * reach, width + 2 * reach), np.float32)
+    for r in range(len(driven)):
+        row = min(max(first + r - reach, 0), height - 1)
+        drive_row(phase[row], added[row], gain[row], factor, table, driven[r, reach : reach + width])
+        driven[r, :reach] = driven[r, reach]
+        driven[r, reach + width :] = driven[r, reach + width - 1]
+    line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
+    for r in range(rows):
+        for j in range(samples):
+            line[:] = 0
+            for k in range(taps.shape[1]):
+                for c in range(line.size):
+                    line[c] += taps[j, k] * driven[r + k, c]
+            for i in range(samples):
+                fine[:] = angle[first + r]
+                for k in range(taps.shape[1]):
+                    for c in range(width):
+                        fine[c] += taps[i, k] * line[c + k]
+                for c in range(width):
+                    sine, cosine = sincos(fine[c])
+                    light = modulated[j, i] * amplitude[first + r, c]
+                    out[j, i, first + r, 2 * c], out[j, i, first + r, 2 * c + 1] = light * cosine, light * sine
