@@ -27,8 +27,9 @@ from ..core.errors import UserError
 from ..core.seeds import seed
 from .suite import CHECKOUT, Worker, in_turns, suite
 
-STARTS, FEWEST, MOST, SECONDS = 10, 3, 11, 2.0  # turns of a case in one start, and how long it takes them
-TURN_SECONDS = 0.05  # the least length of a turn
+STARTS = 8
+FEWEST, MOST, SECONDS = 3, 41, 2.0  # turns of a case in one start, and how long they take
+TURN_SECONDS, LONG = 0.03, 0.2  # the least length of a turn; a call that is not repeated within one
 # Share of turns at either end that is left out. No median: where arrays lie makes two or three humps of one time.
 DISTURBED = 0.1
 CONFIDENCE = 0.99  # that no unchanged case at all is called changed
@@ -81,14 +82,15 @@ def against(revision: str, cases: Sequence[str], advance: Callable[[str, float, 
             # The process that is started first is a few percent slower, so each version is first as often as the other.
             folders = (here, there) if start % 2 == 0 else (there, here)
             with ExitStack() as stack:
-                workers = {place: stack.enter_context(worker(place, draw.randrange(2**32))) for place in folders}
+                layouts = draw.randrange(2**32)  # the same for both: what they place alike, they time alike
+                workers = {place: stack.enter_context(worker(place, layouts)) for place in folders}
                 for number, case in enumerate(cases):
                     advance(case, start * len(cases) + number, STARTS * len(cases))
                     try:
                         if case not in faults:
                             ratios[case].append(_ratio(case, workers[here], workers[there], draw))
                     except LookupError as error:
-                        faults[case] = str(error)
+                        faults[case] = str(error.args[0])
                         if any(process.ended for process in workers.values()):
                             break  # the other cases go on with the next start
     return [
@@ -123,7 +125,8 @@ def _ratio(case: str, here: Worker, there: Worker, draw: Random) -> float:
     """Logarithm of the ratio of times, over turns of two processes. LookupError: one cannot do the case."""
     for process in (here, there):
         process.ask(case, 1)  # one after the other: two programs' threads on the same cores wait for each other
-    calls = math.ceil(TURN_SECONDS / max(process.ask(case, 1)["seconds"] for process in (here, there)))
+    longest = max(process.ask(case, 1)["seconds"] for process in (here, there))
+    calls = 1 if longest > LONG else max(2, math.ceil(TURN_SECONDS / longest))
     versions = {True: partial(here.ask, case, calls), False: partial(there.ask, case, calls)}
     turns = in_turns(versions, draw, SECONDS, FEWEST, MOST)
     ratios = [math.log(turn[True]["seconds"] / turn[False]["seconds"]) for turn in turns]

@@ -7,10 +7,10 @@ a fresh one. The others share a process with a steady heap. Neither lets two lib
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from random import Random
 from statistics import median, quantiles
@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 
 from ..core.seeds import seed
 from .report import Timing
-from .suite import STEADY, Answer, Case, MissingError, Worker, cases, in_turns
+from .suite import FRESH, STEADY, Answer, Case, MissingError, Worker, cases, in_turns
 
 FRESH_SECONDS, STEADY_SECONDS, SHARED_SECONDS = 1.5, 2.5, 0.8  # of a version's turns
 FEWEST, MOST = 3, 15  # turns
@@ -36,7 +36,7 @@ class Measured:
     def note(self, case: Case, error: LookupError) -> None:
         """Remember why a case has no timing."""
         if isinstance(error, MissingError):
-            names = self.missing.setdefault(str(error), [])
+            names = self.missing.setdefault(error.args[1], [])
             names += [case.version] if case.version not in names else []
         else:
             self.faults[case.name] = str(error)
@@ -57,15 +57,25 @@ def measure(only: str, advance: Callable[[str, float, float], None]) -> Measured
         groups.setdefault(case.group, []).append(case)
     lengths = {group: sum(map(_seconds, rows)) for group, rows in groups.items()}
     measured, draw, done = Measured(), Random(seed("order of turns")), 0.0
-    with TemporaryDirectory() as folder, Worker("--steady", "0", cache=Path(folder), **STEADY) as shared:
+    with TemporaryDirectory() as folder, ExitStack() as stack:
+
+        @cache
+        def process(version: str, steady: bool) -> Worker:
+            options, heap = (("--steady", "0"), STEADY) if steady else (("--fresh",), FRESH)
+            return stack.enter_context(Worker(*options, cache=Path(folder), heap=heap))
+
         for group, rows in groups.items():
             advance(group, done, sum(lengths.values()))
+            fresh: dict[Case, Answer] = {}
             try:
                 if rows[0].apart:
-                    fresh = _alone(rows, Path(folder), draw, measured, FRESH_SECONDS)
-                    steady = _alone(rows, Path(folder), draw, measured, STEADY_SECONDS, **STEADY)
+                    fresh_ones, steady_ones = (
+                        {case: process(case.version, how) for case in rows} for how in (False, True)
+                    )
+                    fresh = _alone(fresh_ones, draw, measured, FRESH_SECONDS)
+                    steady = _alone(steady_ones, draw, measured, STEADY_SECONDS)
                 else:
-                    fresh, steady = {}, _take_turns(dict.fromkeys(rows, shared), draw, measured, SHARED_SECONDS)
+                    steady = _take_turns(dict.fromkeys(rows, process("", True)), draw, measured, SHARED_SECONDS)
             except LookupError as error:  # what could be done once, and then could not
                 measured.faults[group] = str(error)
                 continue
@@ -78,34 +88,18 @@ def _seconds(case: Case) -> float:
     return FRESH_SECONDS + STEADY_SECONDS if case.apart else SHARED_SECONDS
 
 
-def _alone(
-    rows: Sequence[Case], cache: Path, draw: Random, measured: Measured, seconds: float, **heap: str
-) -> dict[Case, Answer]:
-    """Each version in a process of its own, all of which are prepared at the same time."""
-    options = ("--steady", "0") if heap else ("--fresh",)
-    with ExitStack() as stack:
-        workers = {case: stack.enter_context(Worker(*options, cache=cache, **heap)) for case in rows}
-        ready = _from_all(workers, 1, measured)
-        workers = {case: workers[case] for case in ready}
-        answers = _take_turns(workers, draw, measured, seconds)
-        for case, answer in _from_all(workers, "memory", measured).items():
-            answers[case] |= answer
-        for case in answers if heap else ():
-            answers[case] |= workers[case].ask(case.name, "facts")  # one by one: the first makes what the others need
-    return answers
-
-
-def _from_all(workers: Mapping[Case, Worker], request: int | str, measured: Measured) -> dict[Case, Answer]:
-    """What all answer, computed at the same time."""
-    answers = {}
-    for case, worker in workers.items():
-        worker.send(case.name, request)
+def _alone(workers: Mapping[Case, Worker], draw: Random, measured: Measured, seconds: float) -> dict[Case, Answer]:
+    """Each version in a process of its own: what it holds, its turns, and facts of it."""
+    held = {}
+    for case, worker in workers.items():  # all are prepared at the same time
+        worker.send(case.name, "memory")
     for case, worker in workers.items():
         try:
-            answers[case] = worker.receive()
+            held[case] = worker.receive()
         except LookupError as error:
             measured.note(case, error)
-    return answers
+    answers = _take_turns({case: workers[case] for case in held}, draw, measured, seconds)
+    return {case: answer | held[case] | workers[case].ask(case.name, "facts") for case, answer in answers.items()}
 
 
 def _take_turns(workers: Mapping[Case, Worker], draw: Random, measured: Measured, seconds: float) -> dict[Case, Answer]:

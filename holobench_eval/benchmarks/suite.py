@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from random import Random
 from types import TracebackType
@@ -20,12 +21,13 @@ CHECKOUT = Path(__file__).parents[2]
 INSTALL = "pip install -c constraints.txt -e '.[dev]' ('.[dev,peers]' to time others' code, too)"
 # glibc's heap keeps all memory and maps none: read by it when a process begins, and so right for every thread of it.
 STEADY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": str(2**40)}
+FRESH: Mapping[str, str] = {}
 Answer = dict[str, Any]
 Key = TypeVar("Key")
 
 
 class MissingError(LookupError):
-    """A module that a case needs is not installed."""
+    """A module that a case needs is not installed; its name is the second argument."""
 
 
 class Case(NamedTuple):
@@ -73,12 +75,14 @@ class Worker:
     benchmarks
         Folder of the benchmarks.
     heap
-        Settings of its heap, ``STEADY`` or none.
+        Settings of its heap, ``STEADY`` or ``FRESH``.
     """
 
-    def __init__(self, *options: str, cache: Path, benchmarks: Path | None = None, **heap: str) -> None:
+    def __init__(
+        self, *options: str, cache: Path, benchmarks: Path | None = None, heap: Mapping[str, str] = FRESH
+    ) -> None:
         command = [sys.executable, str((benchmarks or suite()) / "worker.py"), *options]
-        surroundings = os.environ | {"XDG_CACHE_HOME": str(cache)} | heap
+        surroundings = os.environ | {"XDG_CACHE_HOME": str(cache)} | dict(heap)
         surroundings.pop("OMP_NUM_THREADS", None)  # every case says how many
         pipe, none = subprocess.PIPE, subprocess.DEVNULL
         self.ended = False
@@ -90,7 +94,10 @@ class Worker:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         if kind is not None:
             self.process.kill()
-        self.process.__exit__(kind, error, at)  # closes its standard input, which ends it
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()  # which ends it
+        self.process.__exit__(kind, error, at)
 
     def send(self, name: str, request: int | str) -> None:
         """Ask for something, and do not wait for it."""
@@ -108,7 +115,7 @@ class Worker:
         self.ended = not line
         answer: Answer = json.loads(line or '{"error": "the process ended"}')
         if "missing" in answer:
-            raise MissingError(answer["missing"])
+            raise MissingError(answer["error"], answer["missing"])
         if "error" in answer:
             raise LookupError(answer["error"])
         return answer

@@ -5,9 +5,9 @@ field at the image plane, for its accuracy. ``peers`` has the versions of other 
 """
 
 import torch
+from heap import as_a_study
 from scene import PITCH, THREADS, WAVELENGTH
 
-from holobench_eval.core.allocator import keep_freed_memory
 from holobench_eval.methods.common import unit_field
 from holobench_eval.methods.losses import intensity_l2
 from holobench_eval.methods.wirtinger import Objective
@@ -19,7 +19,7 @@ class ThisPackage:
     """The step of ``wirtinger``, at the default accuracy."""
 
     def __init__(self, scene):
-        keep_freed_memory()  # as a study does
+        as_a_study()
         spec = scene.spec
         self.phase, self.model = scene.phase, spec.propagator(0)
         self.objective = Objective(self.model, spec.region, scene.target, intensity_l2)

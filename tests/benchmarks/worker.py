@@ -6,7 +6,8 @@ with a line of JSON:
 
 - to a number, how often to call it: the seconds and page faults of a call. The seed decides where arrays lie in each,
   see ``layout``; in a fresh process they lie where they come to lie. What is new is prepared and called once before;
-- to ``memory``: the most bytes that it holds while it is called, beyond what its process had before it was prepared;
+- to ``memory``: the most bytes that it holds while it is called, beyond what its process had before anything was
+  prepared, where each version has a process of its own;
 - to ``facts``: what is to be known of it beside its time.
 
 What cannot be done is answered by its error; ``missing`` names a module that is not installed. ``worker.py --names``
@@ -17,7 +18,6 @@ import json
 import resource
 import sys
 import time
-from contextlib import suppress
 from importlib.machinery import PathFinder
 
 import heap
@@ -50,7 +50,7 @@ def main():
     if option == "--from":
         folder, seed = rest
         sys.meta_path.insert(0, OnlyFrom(folder))
-        serve(Server(Layout(seed), as_a_study))
+        serve(Server(Layout(seed), heap.as_a_study))
     elif option == "--steady":
         serve(Server(Layout(*rest)))
     elif option == "--fresh":
@@ -78,13 +78,6 @@ def serve(server):
         print(json.dumps(answer), flush=True)
 
 
-def as_a_study():
-    with suppress(ModuleNotFoundError):  # of a version that is older than this
-        from holobench_eval.core.allocator import keep_freed_memory
-
-        keep_freed_memory()
-
-
 class Server:
     """The cases of one group at a time, each prepared when it is first asked for.
 
@@ -93,15 +86,14 @@ class Server:
 
     def __init__(self, layout, settle=lambda: None):
         self.layout, self.settle = layout, settle
-        self.cases, self.ready, self.before = None, {}, None
+        self.cases, self.ready, self.before, self.held = None, {}, None, None
 
     def answer(self, name, request):
         work = self.work(name)
         if request == "facts":
             return work.facts()
         if request == "memory":
-            most = heap.peak(lambda: [work.call() for _ in range(3)])
-            return {"bytes": None if most is None or self.before is None else most - self.before}
+            return {"bytes": self.held}
         return self.timed(work.call, int(request))
 
     def work(self, name):
@@ -111,17 +103,24 @@ class Server:
         case = self.cases[name]
         if name not in self.ready:
             self.ready = {other: work for other, work in self.ready.items() if self.cases[other].group == case.group}
-            if case.apart:
-                torch.set_num_threads(1)  # many are prepared at the same time; else threads wait for each other's cores
-                case.shrunk().work().call()  # libraries load more of themselves when they are first used
-                heap.give_back()
-                self.before = heap.resident()
-            self.ready[name] = work = case.work()
-            work.call()
-            if case.apart:
-                heap.give_back()  # what only the preparation needed
+            self.ready[name] = self.alone(case) if case.apart else case.work()
+            self.ready[name].call()
         torch.set_num_threads(case.threads)
         return self.ready[name]
+
+    def alone(self, case):
+        """Prepare the only case of this process, and see how much memory it takes."""
+        torch.set_num_threads(1)  # many processes do so at the same time; threads would wait for each other's cores
+        if self.before is None:
+            case.shrunk().work().call()  # libraries load more of themselves when they are first used
+            heap.give_back()
+            self.before = heap.resident()
+        work = case.work()
+        work.call()
+        heap.give_back()  # what only the preparation needed
+        most = heap.peak(lambda: [work.call() for _ in range(2)])
+        self.held = None if most is None or self.before is None else most - self.before
+        return work
 
     def timed(self, call, calls):
         if self.layout is not None:
