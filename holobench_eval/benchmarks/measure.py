@@ -67,18 +67,17 @@ def measure(only: str, advance: Callable[[str, float, float], None]) -> Measured
         for group, rows in groups.items():
             advance(group, done, sum(lengths.values()))
             fresh: dict[Case, Answer] = {}
+            workers = {case: process(case.version if case.apart else "", True) for case in rows}
             try:
                 if rows[0].apart:
-                    fresh_ones, steady_ones = (
-                        {case: process(case.version, how) for case in rows} for how in (False, True)
-                    )
-                    fresh = _alone(fresh_ones, draw, measured, FRESH_SECONDS)
-                    steady = _alone(steady_ones, draw, measured, STEADY_SECONDS)
+                    others = {case: process(case.version, False) for case in rows}
+                    fresh = _alone(others, draw, measured, FRESH_SECONDS)
+                    steady = _alone(workers, draw, measured, STEADY_SECONDS)
                 else:
-                    steady = _take_turns(dict.fromkeys(rows, process("", True)), draw, measured, SHARED_SECONDS)
+                    steady = _take_turns(workers, draw, measured, SHARED_SECONDS)
+                steady = {case: row | workers[case].ask(case.name, "facts")["facts"] for case, row in steady.items()}
             except LookupError as error:  # what could be done once, and then could not
-                measured.faults[group] = str(error)
-                continue
+                measured.faults[group], steady = str(error), {}
             measured.timings += [_timing(case, steady[case], fresh.get(case)) for case in rows if case in steady]
             done += lengths[group]
     return measured
@@ -89,7 +88,7 @@ def _seconds(case: Case) -> float:
 
 
 def _alone(workers: Mapping[Case, Worker], draw: Random, measured: Measured, seconds: float) -> dict[Case, Answer]:
-    """Each version in a process of its own: what it holds, its turns, and facts of it."""
+    """Each version in a process of its own: its turns, and what it holds."""
     held = {}
     for case, worker in workers.items():  # all are prepared at the same time
         worker.send(case.name, "memory")
@@ -99,7 +98,7 @@ def _alone(workers: Mapping[Case, Worker], draw: Random, measured: Measured, sec
         except LookupError as error:
             measured.note(case, error)
     answers = _take_turns({case: workers[case] for case in held}, draw, measured, seconds)
-    return {case: answer | held[case] | workers[case].ask(case.name, "facts") for case, answer in answers.items()}
+    return {case: answer | held[case] for case, answer in answers.items()}
 
 
 def _take_turns(workers: Mapping[Case, Worker], draw: Random, measured: Measured, seconds: float) -> dict[Case, Answer]:

@@ -37,7 +37,7 @@ class Timed:
         if request == "memory":
             return {"bytes": 10 if self.steady else 20}
         if request == "facts":
-            return {"padded": [8, 9], "error": 0.1}
+            return {"facts": {"padded": [8, 9], "error": 0.1}}
         return {"seconds": (0.5 if self.steady else 1.0) / (1 + ("another" in name)), "faults": 0 if self.steady else 7}
 
 

@@ -46,7 +46,7 @@ def test_a_worker_goes_on_after_what_it_cannot_do(worker):
     with pytest.raises(LookupError, match="KeyError: 'no such case'"):
         worker.ask("no such case", 1)
     assert worker.ask(CASE, 2)["seconds"] > 0
-    assert worker.ask(CASE, "facts")["padded"]
+    assert worker.ask(CASE, "facts")["facts"]["padded"]
     assert not worker.ended
 
 

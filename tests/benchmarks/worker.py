@@ -91,7 +91,7 @@ class Server:
     def answer(self, name, request):
         work = self.work(name)
         if request == "facts":
-            return work.facts()
+            return {"facts": work.facts()}
         if request == "memory":
             return {"bytes": self.held}
         return self.timed(work.call, int(request))
