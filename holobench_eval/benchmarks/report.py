@@ -56,7 +56,7 @@ BESIDE = (
     "error",
     "memory [MiB]",
     "memory, fresh [MiB]",
-    "page faults, fresh",
+    "page faults, steady / fresh",
     "turns",
 )
 SIZES = ("", "padded", "median [ms]", "quartiles [ms]", "bare [ms]", "over bare", "memory bound [ms]")
@@ -177,9 +177,9 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
             "Loss and gradient of the squared intensity error, from a random phase, which fills the band: the hardest "
             "case. Each version has a process of its own. *error*: relative rms error of the field at the image plane "
             "against the reference setting (four times padded, complex128). *over ours*: its median over that of this "
-            "package. *memory*: the most that its process holds during a call beyond what it had before anything was "
-            "prepared. odak's frequencies lie half a sample off, so its picture is displaced; every package's "
-            "documented way is timed, whatever more it computes.",
+            "package. *memory*: the most that its process holds during a call, on one thread, beyond what it had "
+            "before anything was prepared. odak's frequencies lie half a sample off, so its picture is displaced; every "
+            "package's documented way is timed, whatever more it computes.",
             *(f"### {name}\n\n{_compared(rows)}" for name, rows in compared.items()),
         ]
     if pairs:
@@ -264,7 +264,7 @@ def _compared(rows: Sequence[Timing]) -> str:
             "" if row.error is None else f"{row.error:.1e}",
             _mebibytes(row.memory_bytes),
             _mebibytes(row.fresh_memory_bytes),
-            "" if row.fresh_faults is None else f"{row.fresh_faults:,}",
+            "" if row.faults is None or row.fresh_faults is None else f"{row.faults:,} / {row.fresh_faults:,}",
             row.rounds,
         )
         for row in rows
