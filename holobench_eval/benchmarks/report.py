@@ -178,8 +178,8 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
             "case. Each version has a process of its own. *error*: relative rms error of the field at the image plane "
             "against the reference setting (four times padded, complex128). *over ours*: its median over that of this "
             "package. *memory*: the most that its process holds during a call, on one thread, beyond what it had "
-            "before anything was prepared. odak's frequencies lie half a sample off, so its picture is displaced; every "
-            "package's documented way is timed, whatever more it computes.",
+            "before anything was prepared. odak's frequencies lie half a sample off, so its picture is displaced. "
+            "Every package's documented way is timed, whatever more it computes.",
             *(f"### {name}\n\n{_compared(rows)}" for name, rows in compared.items()),
         ]
     if pairs:
