@@ -21,7 +21,7 @@ from .report import Timing
 from .suite import FRESH, STEADY, Answer, Case, MissingError, Worker, cases, in_turns
 
 FRESH_SECONDS, STEADY_SECONDS, SHARED_SECONDS = 1.5, 2.5, 0.8  # of a version's turns
-FEWEST, MOST = 5, 15  # turns
+FEWEST, MOST = 3, 15  # turns
 TURN_SECONDS, LONG = 0.05, 0.4  # the least length of a turn; a call that is not repeated within one
 
 
