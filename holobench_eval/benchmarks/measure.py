@@ -20,7 +20,7 @@ from ..core.seeds import seed
 from .report import Timing
 from .suite import FRESH, STEADY, Answer, Case, MissingError, Worker, cases, in_turns
 
-FRESH_SECONDS, STEADY_SECONDS, SHARED_SECONDS = 1.5, 2.5, 0.8  # of a version's turns
+FRESH_SECONDS, STEADY_SECONDS, SHARED_SECONDS = 1.0, 2.0, 0.8  # of a version's turns
 FEWEST, MOST = 3, 15  # turns
 TURN_SECONDS, LONG = 0.05, 0.4  # the least length of a turn; a call that is not repeated within one
 
@@ -71,6 +71,7 @@ def measure(only: str, advance: Callable[[str, float, float], None]) -> Measured
             try:
                 if rows[0].apart:
                     others = {case: process(case.version, False) for case in rows}
+                    process("", True).ask(rows[0].name, "reference")  # in none of those whose memory is measured
                     fresh = _alone(others, draw, measured, FRESH_SECONDS)
                     steady = _alone(workers, draw, measured, STEADY_SECONDS)
                 else:

@@ -8,12 +8,14 @@ with a line of JSON:
   see ``layout``; in a fresh process they lie where they come to lie. What is new is prepared and called once before;
 - to ``memory``: the most bytes that it holds while it is called, beyond what its process had before anything was
   prepared, where each version has a process of its own;
-- to ``facts``: what is to be known of it beside its time.
+- to ``facts``: what is to be known of it beside its time;
+- to ``reference``: nothing, but errors of its scene are known at once from then on.
 
 What cannot be done is answered by its error; ``missing`` names a module that is not installed. ``worker.py --names``
 lists all cases: group, version, and whether each version has a process of its own.
 """
 
+import gc
 import json
 import resource
 import sys
@@ -89,6 +91,9 @@ class Server:
         self.cases, self.ready, self.before, self.held = None, {}, None, None
 
     def answer(self, name, request):
+        if request == "reference":
+            known()[name].scene.reference()
+            return {}
         work = self.work(name)
         if request == "facts":
             return {"facts": work.facts()}
@@ -102,11 +107,19 @@ class Server:
             self.settle()
         case = self.cases[name]
         if name not in self.ready:
-            self.ready = {other: work for other, work in self.ready.items() if self.cases[other].group == case.group}
+            if any(self.cases[other].group != case.group for other in self.ready):
+                self.forget()
             self.ready[name] = self.alone(case) if case.apart else case.work()
             self.ready[name].call()
         torch.set_num_threads(case.threads)
         return self.ready[name]
+
+    def forget(self):
+        self.ready.clear()
+        if self.layout is not None:
+            self.layout.held.clear()
+        gc.collect()
+        heap.give_back()
 
     def alone(self, case):
         """Prepare the only case of this process, and see how much memory it takes."""
