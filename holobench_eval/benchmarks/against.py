@@ -28,7 +28,7 @@ from ..core.seeds import seed
 from .suite import CHECKOUT, Worker, in_turns, suite
 
 STARTS = 8
-FEWEST, MOST, SECONDS = 3, 41, 1.7  # turns of a case in one start, and how long they take
+FEWEST, MOST, SECONDS = 3, 41, 1.5  # turns of a case in one start, and how long they take
 TURN_SECONDS, LONG = 0.03, 0.2  # the least length of a turn; a call that is not repeated within one
 # Share of turns at either end that is left out. No median: where arrays lie makes two or three humps of one time.
 DISTURBED = 0.1
