@@ -7,7 +7,7 @@ a fresh one. The others share a process with a steady heap. Neither lets two lib
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cache, partial
@@ -57,31 +57,41 @@ def measure(only: str, advance: Callable[[str, float, float], None]) -> Measured
         groups.setdefault(case.group, []).append(case)
     lengths = {group: sum(map(_seconds, rows)) for group, rows in groups.items()}
     measured, draw, done = Measured(), Random(seed("order of turns")), 0.0
-    with TemporaryDirectory() as folder, ExitStack() as stack:
-
-        @cache
-        def process(version: str, steady: bool) -> Worker:
-            options, heap = (("--steady", "0"), STEADY) if steady else (("--fresh",), FRESH)
-            return stack.enter_context(Worker(*options, cache=Path(folder), heap=heap))
-
-        for group, rows in groups.items():
-            advance(group, done, sum(lengths.values()))
-            fresh: dict[Case, Answer] = {}
-            workers = {case: process(case.version if case.apart else "", True) for case in rows}
-            try:
-                if rows[0].apart:
-                    others = {case: process(case.version, False) for case in rows}
-                    process("", True).ask(rows[0].name, "reference")  # in none of those whose memory is measured
-                    fresh = _alone(others, draw, measured, FRESH_SECONDS)
-                    steady = _alone(workers, draw, measured, STEADY_SECONDS)
-                else:
-                    steady = _take_turns(workers, draw, measured, SHARED_SECONDS)
-                steady = {case: row | workers[case].ask(case.name, "facts")["facts"] for case, row in steady.items()}
-            except LookupError as error:  # what could be done once, and then could not
-                measured.faults[group], steady = str(error), {}
-            measured.timings += [_timing(case, steady[case], fresh.get(case)) for case in rows if case in steady]
-            done += lengths[group]
+    with TemporaryDirectory() as folder:
+        for apart in (True, False):  # the processes of those apart end before the others are timed
+            with ExitStack() as stack:
+                start = cache(partial(_start, stack, Path(folder)))
+                for group, rows in groups.items():
+                    if rows[0].apart is apart:
+                        advance(group, done, sum(lengths.values()))
+                        measured.timings += _timings(rows, start, draw, measured)
+                        done += lengths[group]
     return measured
+
+
+def _start(stack: ExitStack, cache: Path, heap: str, version: str = "") -> Worker:
+    """A process with a heap, ``steady`` or ``fresh``, for a version or for all; it ends with the stack."""
+    options, settings = {"steady": (("--steady", "0"), STEADY), "fresh": (("--fresh",), FRESH)}[heap]
+    return stack.enter_context(Worker(*options, cache=cache, heap=settings))
+
+
+def _timings(rows: Sequence[Case], start: Callable[..., Worker], draw: Random, measured: Measured) -> list[Timing]:
+    """Of the versions of a group that can be timed."""
+    fresh: dict[Case, Answer] = {}
+    try:
+        if rows[0].apart:
+            workers = {case: start("steady", case.version) for case in rows}
+            start("fresh", "reference").ask(rows[0].name, "reference")  # where no version's memory is measured
+            fresh = _alone({case: start("fresh", case.version) for case in rows}, draw, measured, FRESH_SECONDS)
+            steady = _alone(workers, draw, measured, STEADY_SECONDS)
+        else:
+            workers = dict.fromkeys(rows, start("steady"))
+            steady = _take_turns(workers, draw, measured, SHARED_SECONDS)
+        steady = {case: row | workers[case].ask(case.name, "facts")["facts"] for case, row in steady.items()}
+    except LookupError as error:  # what could be done once, and then could not
+        measured.faults[rows[0].group] = str(error)
+        return []
+    return [_timing(case, steady[case], fresh.get(case)) for case in rows if case in steady]
 
 
 def _seconds(case: Case) -> float:

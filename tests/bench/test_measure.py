@@ -70,9 +70,11 @@ def test_a_version_that_is_compared_has_times_and_memory_of_both_heaps(measured)
 
 def test_each_compared_version_has_processes_of_its_own_and_steady_ones_a_steady_heap(measured):
     measured(CASES)
-    *alone, shared = started
-    assert [process.names for process in alone] == 2 * [{case.name} for case in CASES[:3]]
-    assert shared.names == {CASES[0].name, CASES[3].name}  # it makes the reference for all
+    steady, reference, fresh, shared = started[:3], started[3], started[4:7], started[7]
+    assert [process.names for process in steady + fresh] == 2 * [{case.name} for case in CASES[:3]]
+    assert [process.steady for process in started] == [True, True, True, False, False, False, False, True]
+    assert reference.names == {CASES[0].name}
+    assert shared.names == {CASES[3].name}
     assert all(process.heap == (suite.STEADY if process.steady else {}) for process in started)
 
 
@@ -86,7 +88,7 @@ def test_what_is_not_installed_is_no_fault_and_what_breaks_is(measured):
 def test_a_version_keeps_its_process_for_all_distances(measured):
     other = [Case("gradient step, elsewhere", case.version, True) for case in CASES[:2]]
     assert len(measured([*CASES[:2], *other])[0].timings) == 4
-    assert len(started) == 2 * 2 + 1
+    assert len(started) == 2 * 2 + 1  # and one for the reference
 
 
 def test_progress_is_in_seconds_of_turns(measured):
