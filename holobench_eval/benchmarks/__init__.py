@@ -1,1 +1,1 @@
-"""How fast the package is: timed by pytest-benchmark beside others, and one commit against another."""
+"""How fast the package is: beside others' code, and one commit against another."""

@@ -2,22 +2,21 @@
 
 A machine's speed changes from minute to minute, and a process's from start to start (where its memory lies, say). So
 each version has a process of its own, with the benchmarks of its own checkout, started anew several times; within a
-start the two take turns, and only ratios of neighbours count. The interval is Student's, over the starts.
+start the two take turns at each case, and only ratios of neighbours count. The interval is Student's, over the starts.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import random
 import shutil
 import subprocess
-import sys
 import tomllib
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from random import Random
 from statistics import mean
 from tempfile import TemporaryDirectory
 from typing import Literal
@@ -26,10 +25,11 @@ from scipy import stats
 
 from ..core.errors import UserError
 from ..core.seeds import seed
-from .suite import CHECKOUT, suite
+from .suite import CHECKOUT, Worker, in_turns, suite
 
-STARTS, TURNS = 12, 21
-TURN_SECONDS = 0.05  # the least length of a turn
+STARTS = 8
+FEWEST, MOST, SECONDS = 3, 41, 1.5  # turns of a case in one start, and how long they take
+TURN_SECONDS, LONG = 0.03, 0.2  # the least length of a turn; a call that is not repeated within one
 # Share of turns at either end that is left out. No median: where arrays lie makes two or three humps of one time.
 DISTURBED = 0.1
 CONFIDENCE = 0.99  # that no unchanged case at all is called changed
@@ -40,11 +40,10 @@ COMPARED = (
     "propagation, 256x256, 20 mm | holobench_eval",
     "propagation, 540x960, 100 mm | holobench_eval",
     "approximator, preset small, 256x256, 100 mm | forward and backward",
-    "study | one cell: Wirtinger, 100 iterations, 192x192, three colours",
+    "study | one cell: Wirtinger, 20 iterations, 118x118, three colours",
 )
 
 Verdict = Literal["slower", "faster", "unchanged", "not in both"]
-Worker = subprocess.Popen[str]
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class Comparison:
     reason: str = ""
 
 
-def against(revision: str, cases: Sequence[str], advance: Callable[[str, int, int], None]) -> list[Comparison]:
+def against(revision: str, cases: Sequence[str], advance: Callable[[str, float, float], None]) -> list[Comparison]:
     """Compare the working tree with a git revision.
 
     Parameters
@@ -69,28 +68,45 @@ def against(revision: str, cases: Sequence[str], advance: Callable[[str, int, in
     cases
         Names of benchmarks.
     advance
-        Called at each start of the two versions with the case, the starts done and their number.
+        Called before each case with its name, the cases of all starts that are done and their number.
     """
     suite()  # without a checkout there is nothing to lay out
     with TemporaryDirectory() as folder:
         here, there = Path(folder) / "here", Path(folder) / "there"
         _lay_out(CHECKOUT, here)
         _lay_out(_extract(revision, Path(folder) / "archive"), there)
-        draw = random.Random(seed("order of turns"))
+        draw = Random(seed("order of turns"))
         ratios: dict[str, list[float]] = {case: [] for case in cases}
         faults: dict[str, str] = {}
         for start in range(STARTS):
-            for number, case in enumerate(cases):
-                advance(case, start * len(cases) + number, STARTS * len(cases))
-                try:
-                    if case not in faults:
-                        ratios[case].append(_start(case, here, there, start % 2 == 0, draw))
-                except LookupError as error:
-                    faults[case] = str(error)
+            # The process that is started first is a few percent slower, so each version is first as often as the other.
+            folders = (here, there) if start % 2 == 0 else (there, here)
+            with ExitStack() as stack:
+                layouts = draw.randrange(2**32)  # the same for both: what they place alike, they time alike
+                workers = {place: stack.enter_context(worker(place, layouts)) for place in folders}
+                for number, case in enumerate(cases):
+                    advance(case, start * len(cases) + number, STARTS * len(cases))
+                    try:
+                        if case not in faults:
+                            ratios[case].append(_ratio(case, workers[here], workers[there], draw))
+                    except LookupError as error:
+                        faults[case] = str(error.args[0])
+                        if any(process.ended for process in workers.values()):
+                            break  # the other cases go on with the next start
     return [
-        Comparison(case, "not in both", reason=faults[case]) if case in faults else judge(case, logarithms, len(cases))
+        judge(case, logarithms, len(cases))
+        if case not in faults
+        else Comparison(case, "not in both", reason=faults[case])
         for case, logarithms in ratios.items()
     ]
+
+
+def worker(folder: Path, layouts: int = 0) -> Worker:
+    """A process that times benchmarks, with the package and the benchmarks of a folder and no others.
+
+    layouts: seed of where arrays lie in memory, which is drawn anew for each answer.
+    """
+    return Worker("--from", str(folder), str(layouts), cache=folder / "cache", benchmarks=folder / "benchmarks")
 
 
 def judge(case: str, logarithms: Sequence[float], cases: int) -> Comparison:
@@ -105,43 +121,16 @@ def judge(case: str, logarithms: Sequence[float], cases: int) -> Comparison:
     return Comparison(case, verdict, ratio, lower, upper)
 
 
-def _start(case: str, here: Path, there: Path, here_first: bool, draw: random.Random) -> float:
-    """Logarithm of the ratio of times, over turns of two fresh processes. LookupError: one cannot do the case.
-
-    The process that is started first is a few percent slower, so each version should be first as often as the other.
-    """
-    folders = (here, there) if here_first else (there, here)
-    with ExitStack() as stack:
-        workers = {folder: stack.enter_context(worker(folder, draw.randrange(2**32))) for folder in folders}
-        for process in workers.values():
-            stack.callback(process.kill)
-        calls = max(1, math.ceil(TURN_SECONDS / max(_timed(process, case, 1) for process in workers.values())))
-        ratios = []
-        for _ in range(TURNS):
-            seconds = {folder: _timed(workers[folder], case, calls) for folder in draw.sample(folders, 2)}
-            ratios.append(math.log(seconds[here] / seconds[there]))
+def _ratio(case: str, here: Worker, there: Worker, draw: Random) -> float:
+    """Logarithm of the ratio of times, over turns of two processes. LookupError: one cannot do the case."""
+    for process in (here, there):
+        process.ask(case, 1)  # one after the other: two programs' threads on the same cores wait for each other
+    longest = max(process.ask(case, 1)["seconds"] for process in (here, there))
+    calls = 1 if longest > LONG else max(2, math.ceil(TURN_SECONDS / longest))
+    versions = {True: partial(here.ask, case, calls), False: partial(there.ask, case, calls)}
+    turns = in_turns(versions, draw, SECONDS, FEWEST, MOST)
+    ratios = [math.log(turn[True]["seconds"] / turn[False]["seconds"]) for turn in turns]
     return float(stats.trim_mean(ratios, DISTURBED))
-
-
-def worker(folder: Path, layouts: int = 0) -> Worker:
-    """A process that times benchmarks on request, with the package and the benchmarks of a folder and no others.
-
-    layouts: seed of where arrays lie in memory, which is drawn anew for each answer.
-    """
-    command = [sys.executable, str(folder / "benchmarks" / "worker.py"), "--from", str(folder), str(layouts)]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
-
-
-def _timed(process: Worker, case: str, calls: int) -> float:
-    assert process.stdin is not None
-    assert process.stdout is not None
-    process.stdin.write(f"{case}\t{calls}\n")
-    process.stdin.flush()
-    answer = json.loads(process.stdout.readline() or '{"error": "the process ended"}')
-    if "seconds" not in answer:
-        raise LookupError(answer["error"])
-    return float(answer["seconds"])
 
 
 def _extract(revision: str, folder: Path) -> Path:

@@ -17,7 +17,10 @@ from .suite import THREADS
 
 COPIED = 256 * 2**20  # bytes, far more than a cache holds
 BUSY = 0.5  # load above which times of short calls are more the scheduler's than the code's
-PACKAGES = ("torch", "numpy", "opencv-python-headless", "scikit-image", "odak", "torchoptics", "pytest-benchmark")
+PACKAGES = (
+    *("torch", "numpy", "numba", "rocket-fft", "opencv-python-headless", "scikit-image"),
+    *("ducc0", "odak", "torchoptics", "jax", "chromatix"),
+)
 
 
 def load() -> float | None:
@@ -28,8 +31,17 @@ def load() -> float | None:
         return None
 
 
-def describe(load_before: float | None) -> dict[str, Any]:
-    """What a reader needs to judge the timings of this run. load_before: the ``load`` when it was started."""
+def few_processors() -> None:
+    """From now on this process and those it starts run on as many processors as there are to be threads.
+
+    Not every library can be told how many threads to have; all count the processors they may run on.
+    """
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
+
+
+def describe(load_before: float | None, load_after: float | None) -> dict[str, Any]:
+    """What a reader needs to judge the timings of this run: the machine, and its ``load`` before and after."""
     return {
         **revision(),
         "date": now(),
@@ -40,6 +52,7 @@ def describe(load_before: float | None) -> dict[str, Any]:
         "threads": THREADS,
         "bandwidth": bandwidth(),
         "load_before": load_before,
+        "load_after": load_after,
     }
 
 

@@ -6,23 +6,61 @@ import csv
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import astuple, fields
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import UserError
 from ..core.io import write_atomically
 from ..report.charts.style import COLOURS, GREY, new_figure, save, style
-from ..report.markdown import table
-from .suite import Timing
+from ..report.markdown import bullets, table
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds that one version takes for its group's work: median and quartiles over ``rounds`` turns, steady heap.
+
+    rows, columns: of its padded transforms; error: relative rms error of its field at the image plane; memory_bytes:
+    the most that it held; faults: of pages, in a call; the last three: the same in a fresh process. None: not measured.
+    """
+
+    group: str
+    version: str
+    median_s: float
+    lower_s: float
+    upper_s: float
+    rounds: int
+    rows: int | None = None
+    columns: int | None = None
+    error: float | None = None
+    memory_bytes: float | None = None
+    faults: int | None = None
+    fresh_s: float | None = None
+    fresh_memory_bytes: float | None = None
+    fresh_faults: int | None = None
+
 
 TIMINGS, MACHINE, REPORT, CHART = "timings.csv", "machine.json", "report.md", "ratios.png"
 OURS, BARE = "holobench_eval", "bare transforms"
 COLUMNS = tuple(field.name for field in fields(Timing))
-TEXTS, WHOLE_NUMBERS, ANY_SIGN = ("group", "version"), ("rounds", "rows", "columns"), ("error", "memory_bytes")
-BESIDE = ("version", "median [ms]", "quartiles [ms]", "over ours", "padded", "error", "memory [MiB]", "calls")
+TEXTS, WHOLE_NUMBERS = ("group", "version"), ("rounds", "rows", "columns", "faults", "fresh_faults")
+ANY_SIGN = ("error", "memory_bytes", "faults", "fresh_memory_bytes", "fresh_faults")
+BESIDE = (
+    "version",
+    "median [ms]",
+    "quartiles [ms]",
+    "over ours",
+    "fresh [ms]",
+    "over ours, fresh",
+    "padded",
+    "error",
+    "memory [MiB]",
+    "memory, fresh [MiB]",
+    "page faults, steady / fresh",
+    "turns",
+)
 SIZES = ("", "padded", "median [ms]", "quartiles [ms]", "bare [ms]", "over bare", "memory bound [ms]")
-OTHERS = ("", "version", "median [ms]", "quartiles [ms]", "over the first", "calls")
+OTHERS = ("", "version", "median [ms]", "quartiles [ms]", "over the first", "turns")
 PASSES = 8  # times that four transforms read or write their array, if each reads and writes it once
 COMPLEX64 = 8  # bytes
 LARGEST = 10**15  # no measurement is as large, in any unit used here
@@ -99,8 +137,8 @@ def groups(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
 
 
 def beside_others(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
-    """The groups in which others do the same work as this package, at an accuracy of their own."""
-    return {name: rows for name, rows in groups(timings).items() if sum(row.error is not None for row in rows) > 1}
+    """The groups in which others do the same work as this package, in processes of their own."""
+    return {name: rows for name, rows in groups(timings).items() if any(row.fresh_s is not None for row in rows)}
 
 
 def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
@@ -118,40 +156,79 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
         for row in rows
         if name not in compared and name not in pairs
     ]
-    dirty = ", with changes" if machine.get("dirty") else ""
-    packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
-    load = machine.get("load_before")
-    busy = "" if load is None else f"; load before: {load}"
     parts = [
         "# Speed",
-        "Medians of repeated calls in one run, after a warm-up, with arrays at new places in memory for each, on "
-        f"{machine['threads']} threads of {machine['cpu']} ({machine['platform']}), {machine['date']}; revision "
-        f"{machine['revision']}{dirty}; Python {machine['python']}, {packages}{busy}. Memory copies "
-        f"{bandwidth / 1e9:.1f} GB/s (read and written). Compare ratios, not seconds; another machine has others. "
-        "`holoeval bench` makes this report.",
+        f"Medians over turns of one run, in which the versions of the same work alternate, on {machine['threads']} "
+        f"threads of {_made_on(machine)}. Memory copies {bandwidth / 1e9:.1f} GB/s (read and written). Compare ratios, "
+        "not seconds; another machine has others. `holoeval bench` makes this report.",
+        "*Steady*: the C library's heap keeps all memory, so that no call of any version waits for new pages; arrays "
+        "lie at new places in each turn. *Fresh*: a process as any program starts it, in which large arrays come from "
+        "the system each time, unless a package prevents it, as this one does. Everything is measured in a steady heap "
+        "unless it says otherwise, and ratios in a steady heap are those to quote.",
     ]
+    if absent := _absent(machine):
+        parts.append(bullets(absent))
     if compared:
         parts += [
             "## One gradient step beside others",
+            f"Times over that of {OURS}, steady (fresh). Where a number is below 1, the other is faster.",
+            _headline(compared),
+            f"![Times over that of {OURS}, for each version and distance]({CHART})",
             "Loss and gradient of the squared intensity error, from a random phase, which fills the band: the hardest "
-            "case. *error*: relative rms error of the field at the image plane against the reference setting (four "
-            "times padded, complex128). *over ours*: its median over that of this package. *memory*: the most that a "
-            "process of its own holds beyond what it had before. odak's frequencies lie half a sample off, so its "
-            "picture is displaced; every package's documented way is timed, whatever more it computes.",
-            f"![Times over that of holobench_eval, for each version and distance]({CHART})",
+            "case. Each version has a process of its own. *error*: relative rms error of the field at the image plane "
+            "against the reference setting (four times padded, complex128). *over ours*: its median over that of this "
+            "package. *memory*: the most that its process holds during a call, on one thread, beyond what it had "
+            "before anything was prepared. odak's frequencies lie half a sample off, so its picture is displaced. "
+            "Every package's documented way is timed, whatever more it computes.",
             *(f"### {name}\n\n{_compared(rows)}" for name, rows in compared.items()),
         ]
     if pairs:
         parts += [
             "## Sizes and distances",
-            "*bare* is the same number of Fourier transforms of the padded size and nothing else; *memory bound* what "
-            f"{PASSES} passes of a step over the padded array ({PASSES // 2} for a propagation) would take at the "
-            "bandwidth above. Padding is what the stated accuracy needs.",
+            "*bare* is the same number of Fourier transforms of the padded size by torch and nothing else; *memory "
+            f"bound* what {PASSES} passes of a step over the padded array ({PASSES // 2} for a propagation) would take "
+            "at the bandwidth above. Padding is what the stated accuracy needs.",
             table(SIZES, [_size(name, *pair, bandwidth) for name, pair in pairs.items()]),
         ]
     if others:
         parts += ["## The rest", table(OTHERS, others)]
     return "\n\n".join(map(str, parts)) + "\n"
+
+
+def _made_on(machine: dict[str, Any]) -> str:
+    """Processor, date, revision, packages and load."""
+    dirty = ", with changes" if machine.get("dirty") else ""
+    packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
+    loads = [(when, machine.get(f"load_{when}")) for when in ("before", "after")]
+    busy = "".join(f"; load {when}: {load}" for when, load in loads if load is not None)
+    return (
+        f"{machine['cpu']} ({machine['platform']}), {machine['date']}; revision {machine['revision']}{dirty}; Python "
+        f"{machine['python']}, {packages}{busy}"
+    )
+
+
+def _absent(machine: dict[str, Any]) -> list[str]:
+    """A line for each package that is not installed, and for each case that failed."""
+    missing = [
+        f"Not timed, since {name} is not installed: {'; '.join(of)}" for name, of in machine.get("missing", {}).items()
+    ]
+    return missing + [f"Not timed: {name}: {reason}" for name, reason in machine.get("faults", {}).items()]
+
+
+def _headline(compared: dict[str, list[Timing]]) -> Any:
+    """A row a version, a column a group: its time over that of this package."""
+    versions = dict.fromkeys(row.version for rows in compared.values() for row in rows if row.version != OURS)
+    lines = [(version, *(_ratios(rows, version) for rows in compared.values())) for version in versions]
+    return table(("", *compared), lines)
+
+
+def _ratios(rows: Sequence[Timing], version: str) -> str:
+    ours, other = _version(rows, OURS), _version(rows, version)
+    if ours is None or other is None:
+        return ""
+    if ours.fresh_s is None or other.fresh_s is None:
+        return f"{other.median_s / ours.median_s:.2f}"
+    return f"{other.median_s / ours.median_s:.2f} ({other.fresh_s / ours.fresh_s:.2f})"
 
 
 def _version(rows: Sequence[Timing], ending: str) -> Timing | None:
@@ -170,6 +247,10 @@ def _padded(row: Timing) -> str:
     return f"{row.rows}x{row.columns}" if row.rows else ""
 
 
+def _mebibytes(size: float | None) -> str:
+    return "" if size is None else f"{size / 2**20:.0f}"
+
+
 def _compared(rows: Sequence[Timing]) -> str:
     ours = _version(rows, OURS)
     lines = [
@@ -177,9 +258,13 @@ def _compared(rows: Sequence[Timing]) -> str:
             row.version,
             *_times(row),
             "" if ours is None else f"{row.median_s / ours.median_s:.2f}",
+            "" if row.fresh_s is None else _milliseconds(row.fresh_s),
+            "" if ours is None or not row.fresh_s or not ours.fresh_s else f"{row.fresh_s / ours.fresh_s:.2f}",
             _padded(row),
             "" if row.error is None else f"{row.error:.1e}",
-            "" if row.memory_bytes is None else f"{row.memory_bytes / 2**20:.0f}",
+            _mebibytes(row.memory_bytes),
+            _mebibytes(row.fresh_memory_bytes),
+            "" if row.faults is None or row.fresh_faults is None else f"{row.faults:,} / {row.fresh_faults:,}",
             row.rounds,
         )
         for row in rows
@@ -198,7 +283,10 @@ def _size(name: str, ours: Timing, bare: Timing, bandwidth: float) -> tuple[str,
 
 
 def chart(timings: Sequence[Timing], path: Path) -> None:
-    """Bars: the time of every version of a step over this package's, a panel a distance; nothing without rivals."""
+    """Times of every version of a step over this package's, a panel a distance: bars, dots where the process is fresh.
+
+    Without rivals nothing.
+    """
     compared = [(rows, ours) for rows in beside_others(timings).values() if (ours := _version(rows, OURS))]
     if not compared:
         path.unlink(missing_ok=True)  # of benchmarks that were timed before
@@ -217,10 +305,15 @@ def chart(timings: Sequence[Timing], path: Path) -> None:
             axis.set_title(rows[0].group, loc="left")
             for position, (row, ratio) in enumerate(zip(rows, ratios, strict=True)):
                 words = f"{f'{ratio:.0f}' if ratio >= 10 else f'{ratio:.2g}'}  ({1e3 * row.median_s:.0f} ms)"
+                furthest = ratio
+                if row.fresh_s is not None and ours.fresh_s is not None:
+                    fresh = row.fresh_s / ours.fresh_s
+                    axis.plot(fresh, position, "o", color="black", markersize=3)
+                    furthest = max(ratio, 1.03 * fresh)
                 on_line = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
-                axis.text(ratio * 1.03, position, words, va="center", fontsize=8, bbox=on_line)
+                axis.text(furthest * 1.03, position, words, va="center", fontsize=8, bbox=on_line)
             axis.xaxis.set_major_formatter("{x:g}")
         axes[0].set_xlim(right=3 * longest)  # shared by all
-        axes[-1].set_xlabel("time over that of holobench_eval")
+        axes[-1].set_xlabel("time over that of holobench_eval; bars: steady heap, dots: fresh process")
         figure.tight_layout()
         save(figure, path)

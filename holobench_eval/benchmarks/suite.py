@@ -1,41 +1,46 @@
-"""The benchmarks of a checkout, ``tests/benchmarks``: run by pytest-benchmark, or one at a time by their worker."""
+"""The benchmarks of a checkout, ``tests/benchmarks``, and the processes that time them."""
 
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
-from dataclasses import dataclass
-from importlib.util import find_spec
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from random import Random
+from types import TracebackType
+from typing import Any, NamedTuple, Self, TypeVar
 
 from ..core.errors import UserError
 
 THREADS = 2
 CHECKOUT = Path(__file__).parents[2]
 INSTALL = "pip install -c constraints.txt -e '.[dev]' ('.[dev,peers]' to time others' code, too)"
+# glibc's heap keeps all memory and maps none: read by it when a process begins, and so right for every thread of it.
+STEADY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": str(2**40)}
+FRESH: Mapping[str, str] = {}
+Answer = dict[str, Any]
+Key = TypeVar("Key")
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Seconds that one version takes for its group's work: median and quartiles over ``rounds`` calls.
+class MissingError(LookupError):
+    """A module that a case needs is not installed; its name is the second argument."""
 
-    rows, columns: of its padded transforms; error: relative rms error of its field at the image plane; memory_bytes:
-    the most that it held. None where there is none.
-    """
+
+class Case(NamedTuple):
+    """A benchmark: group and version of it, and whether it has a process of its own."""
 
     group: str
     version: str
-    median_s: float
-    lower_s: float
-    upper_s: float
-    rounds: int
-    rows: int | None = None
-    columns: int | None = None
-    error: float | None = None
-    memory_bytes: float | None = None
+    apart: bool
+
+    @property
+    def name(self) -> str:
+        """As its worker knows it."""
+        return f"{self.group} | {self.version}"
 
 
 def suite() -> Path:
@@ -46,55 +51,86 @@ def suite() -> Path:
     return folder
 
 
-def measure(only: str | None) -> tuple[list[Timing], bool]:
-    """Time all benchmarks, or those whose names hold ``only``; pytest prints how far it is.
-
-    Returns
-    -------
-    tuple of list and bool
-        The timings, and whether all could be timed.
-
-    Raises
-    ------
-    UserError
-        None could be timed.
-    """
-    benchmarks = suite()
-    if find_spec("pytest_benchmark") is None:
-        raise UserError(f"pytest-benchmark is not installed; in the checkout: {INSTALL}")
-    with TemporaryDirectory() as folder:
-        results = Path(folder) / "results.json"
-        command = [sys.executable, "-m", "pytest", str(benchmarks), "--benchmark-enable", "--benchmark-only", "-vv"]
-        command += ["--benchmark-quiet", f"--benchmark-json={results}", "--no-header", "-p", "no:cacheprovider"]
-        done = subprocess.run([*command, f"--only={only}"] if only else command, cwd=CHECKOUT, check=False)
-        if done.returncode == 5:
-            raise UserError(f"no benchmark's name holds '{only}'")
-        rows = json.loads(results.read_text(encoding="utf-8"))["benchmarks"] if results.exists() else []
-    if not rows:
-        raise UserError(f"the benchmarks ended with {done.returncode}; what pytest printed says why")
-    return [_timing(row["stats"], row["extra_info"]) for row in rows], done.returncode == 0
-
-
-def _timing(stats: dict[str, Any], extra: dict[str, Any]) -> Timing:
-    rows, columns = extra.get("padded") or (None, None)
-    work = extra["group"], extra["version"]
-    return Timing(*work, stats["median"], stats["q1"], stats["q3"], stats["rounds"], rows, columns, extra.get("error"))
-
-
-def names(only: str) -> list[str]:
+def cases(only: str) -> list[Case]:
     """The benchmarks whose names hold a text. UserError: none does."""
-    matching = [name for name in json.loads(_ask("--names").stdout) if only in name]
+    command = [sys.executable, str(suite() / "worker.py"), "--names"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise UserError(f"the benchmarks cannot be listed: {(done.stderr.splitlines() or ['no reason given'])[-1]}")
+    matching = [case for row in json.loads(done.stdout) if only in (case := Case(*row)).name]
     if not matching:
         raise UserError(f"no benchmark's name holds '{only}'")
     return matching
 
 
-def peak_memory(timing: Timing) -> float | None:
-    """The most bytes that a version holds while it works, in a process of its own; None where it cannot be told."""
-    done = _ask("--memory", f"{timing.group} | {timing.version}")
-    return json.loads(done.stdout) if done.returncode == 0 else None
+class Worker:
+    """A process that times benchmarks on request, see its file; it ends when it is left.
+
+    Parameters
+    ----------
+    options
+        ``--steady SEED``, ``--fresh`` or ``--from FOLDER SEED``.
+    cache
+        Folder for what the process keeps between runs.
+    benchmarks
+        Folder of the benchmarks.
+    heap
+        Settings of its heap, ``STEADY`` or ``FRESH``.
+    """
+
+    def __init__(
+        self, *options: str, cache: Path, benchmarks: Path | None = None, heap: Mapping[str, str] = FRESH
+    ) -> None:
+        command = [sys.executable, str((benchmarks or suite()) / "worker.py"), *options]
+        surroundings = os.environ | {"XDG_CACHE_HOME": str(cache)} | dict(heap)
+        surroundings.pop("OMP_NUM_THREADS", None)  # every case says how many
+        pipe, none = subprocess.PIPE, subprocess.DEVNULL
+        self.ended = False
+        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=none, text=True, env=surroundings)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if kind is not None:
+            self.process.kill()
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()  # which ends it
+        self.process.__exit__(kind, error, at)
+
+    def send(self, name: str, request: int | str) -> None:
+        """Ask for something, and do not wait for it."""
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(f"{name}\t{request}\n")
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            return  # who waits for the answer is told
+
+    def receive(self) -> Answer:
+        """The answer to what was asked for. LookupError, or MissingError: there is none, with the reason."""
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        self.ended = not line
+        answer: Answer = json.loads(line or '{"error": "the process ended"}')
+        if "missing" in answer:
+            raise MissingError(answer["error"], answer["missing"])
+        if "error" in answer:
+            raise LookupError(answer["error"])
+        return answer
+
+    def ask(self, name: str, request: int | str) -> Answer:
+        """Ask and wait."""
+        self.send(name, request)
+        return self.receive()
 
 
-def _ask(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(suite() / "worker.py"), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def in_turns(
+    versions: Mapping[Key, Callable[[], Answer]], draw: Random, seconds: float, fewest: int, most: int
+) -> list[dict[Key, Answer]]:
+    """Answers of all versions, turn by turn, in another order each, until the seconds have passed."""
+    began, turns = time.monotonic(), list[dict[Key, Answer]]()
+    while len(turns) < fewest or (len(turns) < most and time.monotonic() - began < seconds):
+        turns.append({key: versions[key]() for key in draw.sample(list(versions), len(versions))})
+    return turns

@@ -1,11 +1,7 @@
 """One revision against another: what the verdict says, and that two processes really take turns with two packages."""
 
-import math
 import re
 import subprocess
-from collections import Counter
-from contextlib import contextmanager
-from pathlib import Path
 from random import Random
 from types import SimpleNamespace
 
@@ -30,50 +26,86 @@ def test_a_verdict_needs_certainty_and_size(logarithms, verdict):
     assert found.lower < found.ratio < found.upper
 
 
-def test_each_version_is_started_first_as_often_as_the_other(monkeypatch):
-    first = {"a": [], "b": []}
-    monkeypatch.setattr(against, "_lay_out", lambda *_: None)
-    monkeypatch.setattr(against, "_extract", lambda *_: None)
-    monkeypatch.setattr(against, "_start", lambda case, *rest: first[case].append(rest[2]) or len(first[case]) / 100)
-    assert [one.case for one in against.against("HEAD", list(first), lambda *_: None)] == ["a", "b"]
-    for starts in first.values():
-        assert sum(starts) == len(starts) / 2 == against.STARTS / 2
+HERE, THERE = "here", "there"
 
 
-HERE, THERE = Path("here"), Path("there")
+class Timed:
+    """A process that takes given seconds a call, or gives a reason why it cannot; ``asked``: names and requests."""
+
+    def __init__(self, place="", seconds=0.2, fault=None, ended=False):
+        self.place, self.seconds, self.fault, self.ended, self.asked = place, seconds, fault, ended, []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def ask(self, name, request):
+        self.asked.append((name, request))
+        if self.fault is not None and name == self.fault:
+            raise LookupError(f"no {name}")
+        return {"seconds": self.seconds(len(self.asked)) if callable(self.seconds) else self.seconds}
 
 
 @pytest.fixture
 def started(monkeypatch):
-    """Processes that take 0.3 s a call here and 0.2 s there; the places and seeds they were started with."""
-    begun = []
+    """The processes that a comparison starts, in their order, with places and seeds; ``make`` decides what they do."""
+    begun = SimpleNamespace(workers=[], seeds=[], make=lambda place: Timed(place, 0.3 if place == HERE else 0.2))
 
-    @contextmanager
-    def worker(place, layouts):
-        begun.append((place, layouts))
-        yield SimpleNamespace(place=place, kill=lambda: None)
+    def worker(folder, layouts=0):
+        begun.seeds.append(layouts)
+        begun.workers.append(begun.make(folder.name))
+        return begun.workers[-1]
 
     monkeypatch.setattr(against, "worker", worker)
-    monkeypatch.setattr(against, "_timed", lambda one, *_: 0.3 if one.place == HERE else 0.2)
+    monkeypatch.setattr(against, "_lay_out", lambda *_: None)
+    monkeypatch.setattr(against, "_extract", lambda *_: None)
+    monkeypatch.setattr(against, "SECONDS", 0.0)
     return begun
 
 
-@pytest.mark.parametrize("here_first", [True, False])
-def test_a_slower_working_tree_has_a_ratio_above_one_whichever_is_started_first(started, here_first):
-    assert math.exp(against._start("case", HERE, THERE, here_first, Random(1))) == pytest.approx(1.5)
-    assert [place for place, _ in started] == ([HERE, THERE] if here_first else [THERE, HERE])
-    assert len({layouts for _, layouts in started}) == 2
+def test_a_slower_working_tree_has_a_ratio_above_one_and_each_version_is_first_as_often(started):
+    steps = []
+    found = against.against("HEAD", ["a", "b"], lambda *step: steps.append(step))
+    assert [(one.case, one.verdict) for one in found] == [("a", "slower"), ("b", "slower")]
+    assert found[0].ratio == pytest.approx(1.5)
+    first = [worker.place for worker in started.workers[::2]]
+    assert first.count(HERE) == first.count(THERE) == against.STARTS / 2
+    assert started.seeds[::2] == started.seeds[1::2]  # arrays lie alike in both versions, and elsewhere in each start
+    assert len(set(started.seeds)) == against.STARTS
+    assert steps == [
+        (case, 2 * start + place, 2 * against.STARTS) for start in range(8) for place, case in enumerate("ab")
+    ]
 
 
-def test_disturbed_turns_do_not_count(started, monkeypatch):
-    turns = Counter()
+def test_a_case_that_one_version_lacks_is_told_and_the_others_are_compared(started):
+    started.make = lambda place: Timed(place, fault="a" if place == THERE else None)
+    lacking, compared = against.against("HEAD", ["a", "b"], lambda *_: None)
+    assert (lacking.verdict, lacking.reason) == ("not in both", "no a")
+    assert compared.verdict == "unchanged"
 
-    def timed(one, *_):
-        turns[one.place] += 1
-        return 5.0 if one.place == HERE and turns[HERE] in (4, 9) else 0.2
 
-    monkeypatch.setattr(against, "_timed", timed)
-    assert against._start("case", HERE, THERE, True, Random(1)) == 0
+def test_a_process_that_ends_takes_no_other_case_with_it(started):
+    started.make = lambda place: Timed(place, fault="a", ended=len(started.workers) < 2)
+    lacking, compared = against.against("HEAD", ["a", "b"], lambda *_: None)
+    assert lacking.verdict == "not in both"
+    assert compared.verdict == "unchanged"
+    assert not any(name == "b" for worker in started.workers[:2] for name, _ in worker.asked)
+
+
+def test_disturbed_turns_do_not_count(monkeypatch):
+    monkeypatch.setattr(against, "SECONDS", 60.0)
+    here = Timed(HERE, lambda call: 5.0 if call in (4, 9) else 0.2)
+    assert against._ratio("case", here, Timed(THERE), Random(1)) == 0
+    assert len(here.asked) == 2 + against.MOST
+
+
+def test_short_calls_are_repeated_within_a_turn_and_long_ones_are_not():
+    for seconds, calls in ((0.001, 30), (0.1, 2), (1.0, 1)):
+        here = Timed(HERE, seconds)
+        against._ratio("case", here, Timed(THERE, seconds), Random(1))
+        assert {request for _, request in here.asked[2:]} == {calls}
 
 
 def test_more_cases_widen_every_interval():
@@ -121,33 +153,6 @@ def test_without_git_there_is_nothing_to_compare_with(tmp_path, monkeypatch):
         against._extract("HEAD", tmp_path)
 
 
-class Replies:
-    """A worker that answers with given seconds."""
-
-    def __init__(self, replies):
-        self.replies, self.asked = iter(replies), []
-        self.stdin = self.stdout = self
-
-    def write(self, text):
-        self.asked.append(text)
-
-    def flush(self):
-        pass
-
-    def readline(self):
-        return next(self.replies, "")
-
-
-def test_a_worker_that_cannot_do_the_case_gives_its_reason():
-    with pytest.raises(LookupError, match="KeyError: no such case"):
-        against._timed(Replies(['{"error": "KeyError: no such case"}\n']), "case", 1)
-    with pytest.raises(LookupError, match="the process ended"):
-        against._timed(Replies([]), "case", 1)
-    worker = Replies(['{"seconds": 0.5}\n'])
-    assert against._timed(worker, "a case", 3) == 0.5
-    assert worker.asked == ["a case\t3\n"]
-
-
 @pytest.mark.slow
 def test_a_slower_copy_is_seen_and_imported_from_its_own_folder(tmp_path):
     """The worker times the package of its folder: one with a sleep in the propagation takes longer by the sleep."""
@@ -159,11 +164,11 @@ def test_a_slower_copy_is_seen_and_imported_from_its_own_folder(tmp_path):
     assert "    height, width = field.shape[-2:]\n" in text
     sleeping = "    __import__('time').sleep(1)\n    height, width = field.shape[-2:]\n"
     file.write_text(text.replace("    height, width = field.shape[-2:]\n", sleeping, 1))
-    case = "propagation, 256x256, 7 mm | holobench_eval"
+    case = "propagation, 256x256, 20 mm | holobench_eval"
     seconds = []
     for place in (here, there):
         with against.worker(place) as worker:
-            seconds.append(against._timed(worker, case, 1))
+            seconds.append(worker.ask(case, 1)["seconds"])
     assert seconds[0] >= 1 > seconds[1]
 
 
@@ -173,10 +178,10 @@ def test_what_a_version_lacks_is_not_taken_from_another(tmp_path):
     against._lay_out(suite.CHECKOUT, tmp_path)
     package = tmp_path / "holobench_eval"
     (package / "core" / "allocator.py").unlink()
-    case = "propagation, 256x256, 7 mm | holobench_eval"
+    case = "propagation, 256x256, 20 mm | holobench_eval"
     lacking = pytest.raises(LookupError, match=r"No module named 'holobench_eval\.core\.allocator'")
     with against.worker(tmp_path) as worker, lacking:
-        against._timed(worker, case, 1)
+        worker.ask(case, 1)
     for user, line in (
         ("optics/convolution.py", "LARGEST_KEPT = 2**25"),
         ("core/device.py", "keep_freed_memory = int"),
@@ -185,35 +190,14 @@ def test_what_a_version_lacks_is_not_taken_from_another(tmp_path):
         assert lines == 1
         (package / user).write_text(text)
     with against.worker(tmp_path) as worker:
-        assert against._timed(worker, case, 1) > 0
+        assert worker.ask(case, 1)["seconds"] > 0
 
 
 def test_cases_that_are_compared_by_default_exist():
-    names = suite.names("|")
-    assert set(against.COMPARED) <= set(names)
-    with pytest.raises(UserError, match="no benchmark's name holds 'nothing of the kind'"):
-        suite.names("nothing of the kind")
-
-
-def test_every_case_has_a_name_of_its_own():
-    names = suite.names("|")
-    assert len(names) == len(set(names))
+    assert set(against.COMPARED) <= {case.name for case in suite.cases("|")}
 
 
 def test_the_benchmarks_of_an_installed_package_are_missed_in_one_line(monkeypatch, tmp_path):
     monkeypatch.setattr(suite, "CHECKOUT", tmp_path)
-    for call in (suite.suite, lambda: suite.measure(None), lambda: against.against("HEAD", [], print)):
-        with pytest.raises(UserError, match=r"no benchmarks in .*; in a checkout: pip install"):
-            call()
-
-
-def test_a_plain_install_is_told_what_benchmarks_need(monkeypatch):
-    monkeypatch.setattr(suite, "find_spec", lambda name: None)
-    with pytest.raises(UserError, match=r"pytest-benchmark is not installed.*'\.\[dev\]'"):
-        suite.measure(None)
-
-
-def test_peak_memory_counts_what_is_held():
-    group = "propagation, 256x256, 7 mm"
-    held = suite.peak_memory(suite.Timing(group, "holobench_eval", 1, 1, 1, 1))
-    assert held is None or 0 < held < 2**31
+    with pytest.raises(UserError, match=r"no benchmarks in .*; in a checkout: pip install"):
+        against.against("HEAD", [], print)

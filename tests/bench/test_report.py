@@ -5,7 +5,7 @@ import json
 import pytest
 
 from holobench_eval.benchmarks import report
-from holobench_eval.benchmarks.suite import Timing
+from holobench_eval.benchmarks.report import Timing
 from holobench_eval.core.errors import UserError
 
 MACHINE = {
@@ -21,12 +21,12 @@ MACHINE = {
 }
 STEP = "gradient step, 1080x1920, 20 mm"
 TIMINGS = [
-    Timing(STEP, "four bare transforms", 0.04, 0.039, 0.041, 21, 1344, 2156),
-    Timing(STEP, "holobench_eval", 0.06, 0.059, 0.062, 21, 1344, 2156, 0.009, 2e8),
-    Timing(STEP, "autograd, twice padded", 0.3, 0.29, 0.32, 9, 2160, 3840, 0.01, 5e8),
-    Timing("propagation, 256x256, 7 mm", "two bare transforms", 1e-3, 1e-3, 1e-3, 21, 300, 300),
-    Timing("propagation, 256x256, 7 mm", "holobench_eval", 1.5e-3, 1e-3, 2e-3, 21, 300, 300),
-    Timing("metric, three channels", "psnr", 0.02, 0.02, 0.02, 21),
+    Timing(STEP, "four bare transforms", 0.04, 0.039, 0.041, 15, 1344, 2156, None, 1e8, 0, 0.05, 1e8, 0),
+    Timing(STEP, "holobench_eval", 0.06, 0.059, 0.062, 15, 1344, 2156, 0.009, 2e8, 0, 0.06, 2e8, 0),
+    Timing(STEP, "autograd, twice padded", 0.15, 0.14, 0.16, 9, 2160, 3840, 0.01, 5e8, 0, 0.3, 4e8, 81000),
+    Timing("propagation, 256x256, 7 mm", "two bare transforms", 1e-3, 1e-3, 1e-3, 15, 300, 300, faults=0),
+    Timing("propagation, 256x256, 7 mm", "holobench_eval", 1.5e-3, 1e-3, 2e-3, 15, 300, 300, faults=0),
+    Timing("metric, three channels", "psnr", 0.02, 0.02, 0.02, 15, faults=3),
 ]
 
 
@@ -36,9 +36,24 @@ def test_timings_survive_the_file():
 
 def test_ratios_are_over_this_package_and_bare_transforms():
     text = report.text(TIMINGS, MACHINE)
-    assert "| autograd, twice padded | 300 | 290 to 320 | 5.00 | 2160x3840 | 1.0e-02 | 477 | 9 |" in text
+    assert "| autograd, twice padded | 150 | 140 to 160 | 2.50 | 300 | 5.00 | 2160x3840 | 1.0e-02 | 477 | 381 |" in text
     # 8 bytes, 4 passes, 300 x 300 samples, 10 GB/s
     assert "| propagation, 256x256, 7 mm | 300x300 | 1.5 | 1 to 2 | 1 | 1.50 | 0.288 |" in text
+
+
+def test_the_headline_is_the_steady_ratio_and_losses_stand_beside_wins():
+    text = report.text(TIMINGS, MACHINE)
+    assert "| autograd, twice padded | 2.50 (5.00) |" in text
+    assert "| four bare transforms | 0.67 (0.83) |" in text
+
+
+def test_what_was_not_timed_and_the_load_are_told():
+    loads = {"load_before": 0.1, "load_after": 1.9}
+    absent = {"missing": {"jax": ["JAX, twice padded", "chromatix"]}, "faults": {"metric | psnr": "it broke"}}
+    text = report.text(TIMINGS, MACHINE | loads | absent)
+    assert "- Not timed, since jax is not installed: JAX, twice padded; chromatix\n" in text
+    assert "- Not timed: metric \\| psnr: it broke" in text
+    assert "; load before: 0.1; load after: 1.9." in text
 
 
 def test_a_report_follows_from_its_timings(tmp_path):
@@ -80,9 +95,9 @@ def test_a_bandwidth_that_nothing_has_is_a_problem(tmp_path, bandwidth):
         ("0.06,0.059", "0,0.059", "median_s is 0.0, should be positive"),
         ("0.06,0.059", "nan,0.059", "median_s is nan"),
         ("0.06,0.059", "inf,0.059", "median_s is inf"),
-        ("0.0015,0.001,0.002,21,300,300", "0.0015,0.001,0.002,0,300,300", "rounds is 0"),
-        ("0.0015,0.001,0.002,21,300,300", "0.0015,0.001,0.002,21,,", "rows and columns are missing"),
-        ("0.0015,0.001,0.002,21,300,300", f"0.0015,0.001,0.002,21,300,1{400 * '0'}", "columns is 1000"),
+        ("0.0015,0.001,0.002,15,300,300", "0.0015,0.001,0.002,0,300,300", "rounds is 0"),
+        ("0.0015,0.001,0.002,15,300,300", "0.0015,0.001,0.002,15,,", "rows and columns are missing"),
+        ("0.0015,0.001,0.002,15,300,300", f"0.0015,0.001,0.002,15,300,1{400 * '0'}", "columns is 1000"),
         ("psnr", 200_000 * "x", "field larger than field limit"),
     ],
 )

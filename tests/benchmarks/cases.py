@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 from typing import Any
 
-import steps
 import torch
-from scene import Scene
+from peers import OF_JAX, PEERS
+from scene import THREADS, Scene
+from steps import BARE, OURS, STEPS
 
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.pipeline import SimulatedBench
@@ -22,13 +23,10 @@ from holobench_eval.study.progress import watching
 from holobench_eval.study.run import run
 
 PAPER = (1080, 1920)
-COMPARED = [Scene(PAPER, distance) for distance in (0.02, 0.1, 0.2)]
-SIZES = [
-    Scene(panel, distance)
-    for panel in ((256, 256), (540, 960), PAPER, (2160, 3840))
-    for distance in (0.007, 0.02, 0.1, 0.2)
-]
-STEP, PROPAGATION = "gradient step", "propagation"
+DISTANCES = (0.02, 0.1, 0.2)
+COMPARED = [Scene(PAPER, distance) for distance in DISTANCES]
+SIZES = [Scene(panel, distance) for panel in ((256, 256), (540, 960), PAPER, (2160, 3840)) for distance in DISTANCES]
+STEP, PROPAGATION, SSIM = "gradient step", "propagation", "SSIM, one channel"
 TRIVIAL = """
 from dataclasses import dataclass
 
@@ -52,12 +50,17 @@ class Work:
 
 @dataclass(frozen=True)
 class Case:
-    """group: the same work; version: who does it. make: prepares it for a scene, or without one."""
+    """group: the same work; version: who does it. make: prepares it for a scene, or without one.
+
+    threads: of torch; apart: each version is timed in a process of its own, which it may find fresh or steady.
+    """
 
     group: str
     version: str
     make: Callable[..., Work]
     scene: Scene | None = None
+    threads: int = THREADS
+    apart: bool = False
 
     @property
     def name(self):
@@ -71,14 +74,18 @@ class Case:
         return self if self.scene is None else replace(self, scene=self.scene.shrunk())
 
 
-def of_scenes(kind, scenes, makers):
+def of_scenes(kind, scenes, makers, **settings):
     """A case for every scene and version; makers: what prepares the work, by version."""
-    return [Case(f"{kind}, {scene.name}", version, make, scene) for scene in scenes for version, make in makers.items()]
+    return [
+        Case(f"{kind}, {scene.name}", version, make, scene, **settings)
+        for scene in scenes
+        for version, make in makers.items()
+    ]
 
 
 def gradient_step(version):
     def make(scene):
-        work = steps.STEPS[version](scene)
+        work = version(scene)
 
         def facts():
             padded = {"padded": list(work.padded)}
@@ -90,6 +97,10 @@ def gradient_step(version):
         return Work(work.step, facts)
 
     return make
+
+
+def gradient_steps(versions):
+    return {name: gradient_step(version) for name, version in versions.items()}
 
 
 def propagation(scene, spec=None):
@@ -173,7 +184,8 @@ def study(text):
     """A study, from its plan to its last record, in a folder of its own each time."""
 
     def make():
-        folder = Path(mkdtemp())
+        kept = TemporaryDirectory(ignore_cleanup_errors=True)
+        folder = Path(kept.name)
         (folder / "trivial.py").write_text(TRIVIAL)
         (folder / "study.yaml").write_text(text)
         loaded = load_study(folder / "study.yaml")
@@ -181,9 +193,9 @@ def study(text):
         def call():
             from rich.console import Console
 
-            output = Path(mkdtemp(dir=folder))
-            with watching(Console(quiet=True)) as watch:
-                run(loaded, plan.plan(loaded), output, Serial(), watch, torch.get_num_threads(), folder / "artifacts")
+            with watching(Console(quiet=True)) as watch, TemporaryDirectory(dir=kept.name) as output:
+                artifacts = folder / "artifacts"
+                run(loaded, plan.plan(loaded), Path(output), Serial(), watch, torch.get_num_threads(), artifacts)
 
         return Work(call)
 
@@ -206,21 +218,32 @@ methods: [trivial.py:Trivial]
 repeats: 50
 """
 
+SMALL_CELL = """
+title: a small cell
+seed: 1
+display: {profiles: [leto-aged], panel: [118, 118]}
+targets: {dataset: photographs, params: {names: [astronaut]}}
+methods: [{name: wirtinger, params: {iterations: 20}}]
+"""
+
 AT_100_MM = [Scene(PAPER, 0.1)]
 CASES = [
-    *of_scenes(STEP, COMPARED, {version: gradient_step(version) for version in steps.STEPS}),
+    *of_scenes(STEP, COMPARED, gradient_steps(STEPS | PEERS), apart=True),
+    *of_scenes(STEP, COMPARED, gradient_steps(OF_JAX), apart=True, threads=1),
     *of_scenes(
         STEP,
         [scene for scene in SIZES if scene not in COMPARED],
-        {version: gradient_step(version) for version in (steps.BARE, steps.OURS)},
+        gradient_steps({version: STEPS[version] for version in (BARE, OURS)}),
     ),
-    *of_scenes(PROPAGATION, SIZES, {"two bare transforms": two_transforms, steps.OURS: propagation}),
+    *of_scenes(PROPAGATION, SIZES, {"two bare transforms": two_transforms, OURS: propagation}),
     *of_scenes(
         "capture",
         AT_100_MM,
         {"ideal propagation": its_propagation, "1 sub-sample": capture(1), "3 sub-samples": capture(3)},
     ),
-    *of_scenes("SSIM, one channel", AT_100_MM, {"scikit-image": ssim_of_scikit_image, steps.OURS: ssim_here}),
+    *of_scenes(SSIM, AT_100_MM, {"scikit-image, one thread": ssim_of_scikit_image}, threads=1),
+    *of_scenes(SSIM, AT_100_MM, {f"{OURS}, one thread": ssim_here}, threads=1),
+    *of_scenes(SSIM, AT_100_MM, {f"{OURS}, two threads": ssim_here}),
     *of_scenes(
         "metric, three channels",
         AT_100_MM,
@@ -232,5 +255,6 @@ CASES = [
         {"forward": network(False), "forward and backward": network(True)},
     ),
     Case("study", "one cell: Wirtinger, 100 iterations, 192x192, three colours", study(ONE_CELL)),
+    Case("study", "one cell: Wirtinger, 20 iterations, 118x118, three colours", study(SMALL_CELL)),
     Case("study", "50 trivial cells, 118x118", study(TRIVIAL_CELLS)),
 ]

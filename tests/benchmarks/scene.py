@@ -1,7 +1,10 @@
 """The panel, distance and picture that propagations and gradient steps are timed with."""
 
+import os
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
+from pathlib import Path
+from tempfile import gettempdir
 
 import torch
 from torch import Tensor
@@ -9,6 +12,7 @@ from torch import Tensor
 from holobench_eval.display import DisplaySpec, Region
 from holobench_eval.optics import AngularSpectrum
 
+THREADS = 2
 PITCH, WAVELENGTH = 6.4e-6, 517e-9
 SHRINK = 8
 
@@ -53,13 +57,16 @@ class Scene:
 
     def error(self, field: Tensor) -> float:
         """Relative rms error of the field ``(H, W)`` at the image plane, a constant factor aside."""
-        exact = _reference(self)
+        exact = self.reference()
         field = field.reshape(exact.shape).to(exact.dtype)
         field = field * ((field.conj() * exact).sum() / (field.abs() ** 2).sum())
         return float((field - exact).norm() / exact.norm())
 
-
-@cache
-def _reference(scene: Scene) -> Tensor:
-    model = AngularSpectrum(scene.panel, PITCH, WAVELENGTH, scene.distance, padding="reference")
-    return model.forward(torch.polar(torch.ones_like(scene.phase[0]), scene.phase[0]).to(torch.complex128))
+    def reference(self) -> Tensor:
+        """The exact field: from the cache's folder, if a process was there before; it takes seconds and gigabytes."""
+        file = Path(os.environ.get("XDG_CACHE_HOME", gettempdir()), f"{self.name}.pt")
+        if not file.is_file():
+            model = AngularSpectrum(self.panel, PITCH, WAVELENGTH, self.distance, padding="reference")
+            light = torch.polar(torch.ones_like(self.phase[0]), self.phase[0]).to(torch.complex128)
+            torch.save(model.forward(light), file)
+        return torch.load(file)

@@ -1,15 +1,12 @@
-"""One gradient step of the squared intensity error, by this package and by others. All compute the same gradient.
+"""One gradient step of the squared intensity error, by this package and by anybody. All compute the same gradient.
 
 Each version is made for a scene, with whatever it can prepare; ``step()`` gives loss and gradient, and ``field()`` the
-field at the image plane, for its accuracy.
+field at the image plane, for its accuracy. ``peers`` has the versions of other packages.
 """
 
-import logging
-from contextlib import chdir
-from tempfile import TemporaryDirectory
-
 import torch
-from scene import PITCH, WAVELENGTH
+from heap import as_a_study
+from scene import PITCH, THREADS, WAVELENGTH
 
 from holobench_eval.methods.common import unit_field
 from holobench_eval.methods.losses import intensity_l2
@@ -22,6 +19,7 @@ class ThisPackage:
     """The step of ``wirtinger``, at the default accuracy."""
 
     def __init__(self, scene):
+        as_a_study()
         spec = scene.spec
         self.phase, self.model = scene.phase, spec.propagator(0)
         self.objective = Objective(self.model, spec.region, scene.target, intensity_l2)
@@ -42,11 +40,36 @@ class FourTransforms:
 
     def __init__(self, scene):
         self.padded = scene.spec.propagator(0).padded_shape
-        self.fields = torch.randn(self.padded, dtype=torch.complex64)
+        self.fields, self.spectrum, self.fields_again = torch.randn(3, *self.padded, dtype=torch.complex64)
 
     def step(self):
         for _ in range(2):
             torch.fft.ifft2(torch.fft.fft2(self.fields))
+
+
+class FourPreallocated(FourTransforms):
+    """Into arrays that are there, by torch; it copies the result into them."""
+
+    def step(self):
+        for _ in range(2):
+            torch.fft.ifft2(torch.fft.fft2(self.fields, out=self.spectrum), out=self.fields_again)
+
+
+class FourOfDucc(FourTransforms):
+    """Into arrays that are there, by ducc0, the successor of pocketfft (GPL: not even an optional dependency)."""
+
+    def __init__(self, scene):
+        import ducc0
+
+        super().__init__(scene)
+        self.c2c = ducc0.fft.c2c
+        self.arrays = self.fields.numpy(), self.spectrum.numpy()
+
+    def step(self):
+        fields, spectrum = self.arrays
+        for _ in range(2):
+            self.c2c(fields, axes=(0, 1), out=spectrum, nthreads=THREADS)
+            self.c2c(spectrum, axes=(0, 1), forward=False, inorm=2, out=spectrum, nthreads=THREADS)
 
 
 class Autograd:
@@ -68,9 +91,7 @@ class GoodEngineer(Autograd):
 
     def __init__(self, scene):
         super().__init__(scene, (2 * side for side in scene.panel))
-        fy, fx = frequencies(self.padded, PITCH)
-        phase = angular_spectrum_phase(fy**2 + fx**2, WAVELENGTH, scene.distance)
-        self.transfer = torch.polar(torch.ones_like(phase), phase).to(torch.complex64)
+        self.transfer = cached_transfer(scene, self.padded)
 
     def field(self):
         rows, columns = self.phase.shape[-2:]
@@ -78,63 +99,18 @@ class GoodEngineer(Autograd):
         return torch.fft.ifft2(torch.fft.fft2(light, s=self.padded) * self.transfer)[..., :rows, :columns]
 
 
-class Odak(Autograd):
-    """odak's documented way: ``propagate_beam`` with its band-limited angular spectrum, twice padded."""
-
-    def __init__(self, scene):
-        super().__init__(scene, (2 * side for side in scene.panel))
-        with TemporaryDirectory() as folder, chdir(folder):  # its import opens a log in the working directory
-            import odak.learn.wave as wave
-        log = logging.getLogger("odak")
-        for handler in tuple(log.handlers):
-            log.removeHandler(handler)
-            handler.close()
-        log.setLevel(logging.ERROR)
-        self.wave, self.distance, self.number = wave, scene.distance, wave.wavenumber(WAVELENGTH)
-
-    def field(self):
-        light = self.wave.generate_complex_field(torch.ones_like(self.phase[0]), self.phase[0])
-        return self.wave.propagate_beam(
-            light,
-            self.number,
-            self.distance,
-            PITCH,
-            WAVELENGTH,
-            propagation_type="Bandlimited Angular Spectrum",
-            zero_padding=[True, False, True],
-        )[None]
+def cached_transfer(scene, padded):
+    """The angular spectrum's transfer function, complex64, of a padded shape."""
+    fy, fx = frequencies(padded, PITCH)
+    phase = angular_spectrum_phase(fy**2 + fx**2, WAVELENGTH, scene.distance)
+    return torch.polar(torch.ones_like(phase), phase).to(torch.complex64)
 
 
-class TorchOptics(Autograd):
-    """torchoptics' documented way: a system of one phase modulator; double precision, as is its default.
-
-    padding: added to each side, in panels; 0.5 pads twice, and 2 is torchoptics' own default.
-    """
-
-    def __init__(self, scene, padding):
-        import torchoptics
-        from torchoptics.elements import PhaseModulator
-
-        self.pad = [round(padding * side) for side in scene.panel]
-        super().__init__(scene, (side + 2 * pad for side, pad in zip(scene.panel, self.pad, strict=True)))
-        modulator = PhaseModulator(torch.nn.Parameter(scene.phase[0].clone()), z=0, spacing=PITCH)
-        self.system, self.distance = torchoptics.System(modulator), scene.distance
-        (self.leaf,) = self.system.parameters()
-        even = torch.ones(scene.panel, dtype=torch.complex128)
-        self.light = torchoptics.Field(even, wavelength=WAVELENGTH, z=0, spacing=PITCH)
-        self.target = scene.target.double()
-
-    def field(self):
-        field = self.system.measure_at_z(self.light, self.distance, propagation_method="ASM", asm_pad=self.pad)
-        return field.data[None]
-
-
-BARE, OURS, AUTOGRAD = "four bare transforms", "holobench_eval", "autograd, twice padded"
+BARE, OURS = "four bare transforms", "holobench_eval"
 STEPS = {
     BARE: FourTransforms,
+    "four preallocated transforms": FourPreallocated,
+    "four preallocated transforms, ducc0": FourOfDucc,
     OURS: ThisPackage,
-    AUTOGRAD: GoodEngineer,
-    "odak": Odak,
-    "torchoptics, twice padded": lambda scene: TorchOptics(scene, 0.5),
-    "torchoptics, its default": lambda scene: TorchOptics(scene, 2.0),
+    "autograd, twice padded": GoodEngineer,
 }

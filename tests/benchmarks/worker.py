@@ -1,23 +1,32 @@
-"""Times cases on request, so that two processes with two versions of the package can take turns.
+"""Times cases on request, so that processes with versions of a case, or of the package, can take turns.
 
-``worker.py --from FOLDER SEED``, the package being taken from there, reads lines from standard input: a case's name and
-how often to call it. Answers each with a line of JSON: seconds, or why there is none; the seed decides where arrays lie
-in each, see ``layout``. ``worker.py --names`` lists all;
-``worker.py --memory NAME`` prints the most memory that a case holds while it is called, in bytes, beyond what its
-process had before it was prepared.
+``worker.py --from FOLDER SEED`` takes the package from the folder; ``worker.py --steady SEED`` and
+``worker.py --fresh`` as it is installed. Each reads lines from standard input, a case's name and a request, and answers
+with a line of JSON:
+
+- to a number, how often to call it: the seconds and page faults of a call. The seed decides where arrays lie in each,
+  see ``layout``; in a fresh process they lie where they come to lie. What is new is prepared and called once before;
+- to ``memory``: the most bytes that it holds while it is called, beyond what its process had before anything was
+  prepared, where each version has a process of its own;
+- to ``facts``: what is to be known of it beside its time;
+- to ``reference``: nothing, but errors of its scene are known at once from then on.
+
+What cannot be done is answered by its error; ``missing`` names a module that is not installed. ``worker.py --names``
+lists all cases: group, version, and whether each version has a process of its own.
 """
 
+import gc
 import json
+import resource
 import sys
 import time
-from contextlib import suppress
 from importlib.machinery import PathFinder
 
+import heap
 import torch
 from layout import Layout
 
 PACKAGE = "holobench_eval"
-THREADS = 2
 SETTLED = 0.03
 """Seconds until the idle threads of another process, which took the turn before, have stopped watching for work: they
 keep a core busy for up to 20 ms."""
@@ -43,58 +52,100 @@ def main():
     if option == "--from":
         folder, seed = rest
         sys.meta_path.insert(0, OnlyFrom(folder))
-        serve(Layout(seed))
-    elif option == "--memory":
-        print(json.dumps(memory(known()[rest[0]])))
+        serve(Server(Layout(seed), heap.as_a_study))
+    elif option == "--steady":
+        serve(Server(Layout(*rest)))
+    elif option == "--fresh":
+        serve(Server(None))
     elif option == "--names":
-        print(json.dumps(list(known())))
+        print(json.dumps([[case.group, case.version, case.apart] for case in known().values()]))
 
 
 def known():
     """All cases by name. Nothing of the package is imported before it is known where it comes from."""
     from cases import CASES
 
-    torch.set_num_threads(THREADS)
-    with suppress(ModuleNotFoundError):  # of a version that is older than this
-        from holobench_eval.core.allocator import keep_freed_memory
-
-        keep_freed_memory()  # as a study does
     return {case.name: case for case in CASES}
 
 
-def serve(layout):
-    ready = {}
+def serve(server):
     for line in sys.stdin:
-        name, _, calls = line.rstrip("\n").rpartition("\t")
+        name, _, request = line.rstrip("\n").rpartition("\t")
         try:
-            if name not in ready:
-                ready = {name: known()[name].work().call}
-                ready[name]()
-            layout.redraw()
-            time.sleep(SETTLED)
-            if int(calls) > 1:  # a single call is a long one, beside which the pages of new places are nothing
-                ready[name]()
-            started = time.perf_counter()
-            for _ in range(int(calls)):
-                ready[name]()
-            answer = {"seconds": (time.perf_counter() - started) / int(calls)}
+            answer = server.answer(name, request)
         except Exception as error:  # of the other version of the package, which may lack what is timed
             answer = {"error": f"{type(error).__name__}: {error}"}
+            if isinstance(error, ModuleNotFoundError):
+                answer["missing"] = error.name
         print(json.dumps(answer), flush=True)
 
 
-def memory(case):
-    """Bytes; None where the system does not tell."""
-    from holobench_eval.study import cost
+class Server:
+    """The cases of one group at a time, each prepared when it is first asked for.
 
-    case.shrunk().work().call()  # libraries load more of themselves when they are first used
-    before = cost.start().before
-    work = case.work()
-    work.call()
-    watch = cost.start()  # what only the preparation needed is given back
-    work.call()
-    most = watch.stop().memory_mib
-    return None if before is None or most is None else 1024 * (watch.before - before) + 2**20 * most
+    layout: of what lies beside the arrays; settle: what the process does before anything is prepared.
+    """
+
+    def __init__(self, layout, settle=lambda: None):
+        self.layout, self.settle = layout, settle
+        self.cases, self.ready, self.before, self.held = None, {}, None, None
+
+    def answer(self, name, request):
+        if request == "reference":
+            known()[name].scene.reference()
+            return {}
+        work = self.work(name)
+        if request == "facts":
+            return {"facts": work.facts()}
+        if request == "memory":
+            return {"bytes": self.held}
+        return self.timed(work.call, int(request))
+
+    def work(self, name):
+        if self.cases is None:
+            self.cases = known()
+            self.settle()
+        case = self.cases[name]
+        if name not in self.ready:
+            if any(self.cases[other].group != case.group for other in self.ready):
+                self.forget()
+            self.ready[name] = self.alone(case) if case.apart else case.work()
+            self.ready[name].call()
+        torch.set_num_threads(case.threads)
+        return self.ready[name]
+
+    def forget(self):
+        self.ready.clear()
+        if self.layout is not None:
+            self.layout.held.clear()
+        gc.collect()
+        heap.give_back()
+
+    def alone(self, case):
+        """Prepare the only case of this process, and see how much memory it takes."""
+        torch.set_num_threads(1)  # many processes do so at the same time; threads would wait for each other's cores
+        if self.before is None:
+            case.shrunk().work().call()  # libraries load more of themselves when they are first used
+            heap.give_back()
+            self.before = heap.resident()
+        work = case.work()
+        work.call()
+        heap.give_back()  # what only the preparation needed
+        most = heap.peak(lambda: [work.call() for _ in range(2)])
+        self.held = None if most is None or self.before is None else most - self.before
+        return work
+
+    def timed(self, call, calls):
+        if self.layout is not None:
+            self.layout.redraw()
+        time.sleep(SETTLED)
+        if calls > 1:  # a single call is a long one, beside which the caches' state is nothing
+            call()
+        faults, started = resource.getrusage(resource.RUSAGE_SELF).ru_minflt, time.perf_counter()
+        for _ in range(calls):
+            call()
+        seconds = (time.perf_counter() - started) / calls
+        return {"seconds": seconds, "faults": (resource.getrusage(resource.RUSAGE_SELF).ru_minflt - faults) / calls}
 
 
 if __name__ == "__main__":
