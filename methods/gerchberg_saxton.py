@@ -40,6 +40,7 @@ class GerchbergSaxton:
     initial_phase: InitialPhase = "random"
     offset: Offset = "centre"
 
+    version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 

@@ -45,6 +45,7 @@ class HybridInputOutput:
     initial_phase: InitialPhase = "random"
     offset: Offset = "centre"
 
+    version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 

@@ -48,6 +48,7 @@ class MultiPlane:
     initial_phase: InitialPhase = "constant"
     offset: Offset = "centre"
 
+    version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     planes: ClassVar[bool] = True

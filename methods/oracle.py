@@ -38,6 +38,7 @@ class Oracle:
     step: Annotated[float, Interval(gt=0, le=10)] = 0.12
     start_iterations: Annotated[int, Interval(ge=1, le=100_000)] = 5
 
+    version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = True
 

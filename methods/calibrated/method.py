@@ -74,7 +74,7 @@ class ThroughModel(ABC):
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = 2
 
     NOMINAL: ClassVar[Wirtinger] = Wirtinger()
 

@@ -68,7 +68,7 @@ class HIL:
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
-    version: ClassVar[int] = 2
+    version: ClassVar[int] = 3
 
     def approximator(self, spec: DisplaySpec) -> NetworkApproximator:
         """D, untrained."""

@@ -54,7 +54,7 @@ class HILNH3D:
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = 2
 
     def approximator(self, spec: DisplaySpec) -> NetworkApproximator:
         """The network, untrained."""
