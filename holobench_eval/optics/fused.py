@@ -14,16 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .butterflies import (
-    LANES,
-    SAMPLE,
-    crossed,
-    filtered_butterfly,
-    filtered_sample,
-    joined,
-    split,
-    turned_butterfly,
-)
+from .butterflies import SAMPLE, crossed, filtered_butterfly, filtered_sample, joined, split, turned_butterfly
+from .sizes import LANES
 
 OPTIONS = {"nogil": True, "cache": True, "boundscheck": False, "error_model": "numpy"}
 SHAPE, STEPS = "UniTuple(i8, 3)", "Tuple((i8, i8[::1], f4[::1]))"

@@ -38,9 +38,9 @@ class _Side:
 class FusedPath:
     """What ``OpticalPath`` does, by the kernel.
 
-    Interleaved sub-samples are a finer grid: the same transform, of ``samples`` times the size, adds their spectra. Only
-    the band of frequencies that the padded grid has is used; weights of sub-sample (0, 0) become part of the transfer
-    function, and those of the others differ by a phase that its transform gives and one for each sub-sample, ``turn``.
+    Interleaved sub-samples are a finer grid: one transform of ``samples`` times the size adds their spectra. Of these,
+    only the band of frequencies is used that the padded grid has. The weights of sub-sample (0, 0) become part of the
+    transfer function. Those of the others differ by a phase that the finer grid gives, and by a constant, ``turn``.
     """
 
     def __init__(self, fused: ModuleType, path: OpticalPath) -> None:
@@ -57,12 +57,13 @@ class FusedPath:
             self._change[path.dust.rows] = path.dust.change
             self._dusty = (path.dust.rows // LANES).unique().numpy()
         starts = [tile_starts(end) for end in ends]
-        common = np.intersect1d(tile_starts(through), np.intersect1d(*starts))
+        common = np.intersect1d(tile_starts(through), np.intersect1d(starts[0], starts[1]))
         self._through = tiled(through, common)
 
         def grid(planes: int, factor: int, shape: tuple[int, int], starts: Numbers) -> Grid:
             rows, columns = (steps(factor * size) for size in through.shape)
-            assert rows is not None and columns is not None
+            assert rows is not None
+            assert columns is not None
             band, low = through.shape[1], (through.shape[1] + 1) // 2
             placed = np.where(starts < low, starts, starts + (factor - 1) * band)
             return Grid(fused, (planes, *shape), rows, columns, placed)
@@ -79,15 +80,18 @@ class FusedPath:
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
         field = field if self._turn is None else field * self._turn
-        return self._pass(field, self._panel, self._image, conjugated=False)[0, 0]
+        _, height, width = self._image.grid.shape
+        return self._pass(field, self._panel, self._image, field.new_empty(height, width), conjugated=False)
 
     def adjoint(self, image: Tensor) -> Tensor:
         """See ``LightPath``."""
-        field = self._pass(image, self._image, self._panel, conjugated=True)
+        planes, height, width = self._panel.grid.shape
+        empty = image.new_empty(planes, planes, height, width)
+        field = self._pass(image, self._image, self._panel, empty, conjugated=True)
         return field if self._turn is None else field.mul_(self._turn.conj())
 
-    def _pass(self, field: Tensor, source: _Side, target: _Side, conjugated: bool) -> Tensor:
-        """Light that passes the dust as if there were none, and what the dust changes of it."""
+    def _pass(self, field: Tensor, source: _Side, target: _Side, seen: Tensor, conjugated: bool) -> Tensor:
+        """Light that passes the dust as if there were none, and what the dust changes of it, in ``seen``."""
         spectra, tiles = source.grid.tiles(), target.grid.tiles()
         source.grid.spectra(field.contiguous().resolve_conj(), spectra, source.grid.blocks())
         if self._change is not None:
@@ -105,7 +109,5 @@ class FusedPath:
         source.grid.convolve(
             spectra, source.shared, target.grid, tiles, target.shared, self._through, conjugated, add=dusty
         )
-        planes, height, width = target.grid.shape
-        seen = field.new_empty(planes, planes, height, width)
         target.grid.fields(tiles, seen, target.grid.blocks())
         return seen

@@ -18,8 +18,8 @@ from ...optics.phase import blaze
 from ...optics.phasor import phasor, squared_modulus
 from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
-from .geometry import Geometry
 from .fused_path import quickest
+from .geometry import Geometry
 from .path import Dust, LightPath, OpticalPath, image
 from .profile import Profile
 from .stages.panel import straight_through_level
