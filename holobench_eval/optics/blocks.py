@@ -34,6 +34,7 @@ def in_parts(work: Callable[[int, int], object], lines: int, parts: int) -> None
     """Call ``work`` with the ends of ``parts`` ranges that make up ``lines``, in as many threads as torch has."""
     if lines == 0:
         return
+    parts = min(parts, lines)
     ends = [lines * part // parts for part in range(parts + 1)]
     threads = min(torch.get_num_threads(), parts)
     ranges, numbers = list(pairwise(ends)), count()

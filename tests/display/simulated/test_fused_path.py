@@ -8,7 +8,10 @@ import torch
 from holobench_eval.display.simulated import fused_path
 from holobench_eval.display.simulated.fused_path import FusedPath, quickest
 from holobench_eval.display.simulated.path import Dust, OpticalPath
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.profile import load_profile
 from holobench_eval.display.simulated.stages.propagation import sample_weights
+from holobench_eval.optics.transfer import kernel
 
 CPU = torch.device("cpu")
 PLAIN, BLAZED = (0.0, 0.0), (0.1, -0.27)
@@ -113,3 +116,15 @@ def test_without_the_kernel_light_goes_by_torch(monkeypatch):
     assert isinstance(quickest(one, torch.device("meta")), OpticalPath)
     monkeypatch.setattr(fused_path, "kernel", lambda: None)
     assert isinstance(quickest(one, CPU), OpticalPath)
+
+
+@pytest.mark.parametrize("name", ["leto-dusty", "pluto-offaxis"])
+def test_a_bench_shows_the_same_with_the_kernel_and_without(name, monkeypatch):
+    seen, phase = [], 6 * torch.rand(64, 64, generator=torch.Generator().manual_seed(0))
+    for ways in (kernel, lambda: None):
+        monkeypatch.setattr(fused_path, "kernel", ways)
+        bench, shown = SimulatedBench(load_profile(name).scaled((64, 64))), phase.clone().requires_grad_()
+        assert isinstance(bench.channels[1].path, FusedPath) == (ways is kernel)
+        light = bench.intensity(shown, channel=1)
+        seen.append((light.detach(), *torch.autograd.grad(light.square().sum(), shown)))
+    assert all(relative(*pair) < 1e-5 for pair in zip(*seen, strict=True))
