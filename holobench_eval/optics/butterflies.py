@@ -17,12 +17,11 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from .sizes import RADICES
+from .sizes import LANES, RADICES
 
 Vector = Any  # of LANES values, in the compiler's terms
 Complex = tuple[Vector, Vector]
 
-LANES = 16
 SAMPLE = 2 * LANES  # floats of a sample of sixteen lines: its real parts, then its imaginary ones
 
 
@@ -235,6 +234,12 @@ def _butterfly(
     builder.position_at_end(done)
 
 
+def _filtered(writer: _Transform, value: Complex, transfer: _Array, at: Any, sign: Any) -> Complex:
+    real, imaginary = transfer.sample(at)
+    product = writer.times(value, (real, writer.builder.fmul(imaginary, _spread(writer.builder, sign))))
+    return product[1], product[0]
+
+
 @intrinsic
 def turned_butterfly(
     _: Any, radix: Any, source: Any, begin: Any, stride: Any, end: Any,
@@ -263,12 +268,10 @@ def filtered_butterfly(
 
     def write(builder: Any, radix: Any, *places: Any) -> None:
         *places, transfer, at, sign = places
-        start, hop, signs = builder.add(at, places[5]), places[6], _spread(builder, sign)
+        start, hop = builder.add(at, places[5]), places[6]
 
         def filtered(writer: _Transform, k: int, value: Complex) -> Complex:
-            real, imaginary = transfer.sample(_place(builder, start, hop, k))
-            product = writer.times(value, (real, builder.fmul(imaginary, signs)))
-            return product[1], product[0]
+            return _filtered(writer, value, transfer, _place(builder, start, hop, k), sign)
 
         _butterfly(builder, radix, *places, filtered)
 
@@ -276,29 +279,43 @@ def filtered_butterfly(
 
 
 @intrinsic
-def split(_: Any, field: Any, begin: Any, stride: Any, rows: Any, target: Any, start: Any) -> Any:
-    """Sixteen values of ``rows`` rows of a complex field, from the float ``begin`` on, to 16 samples from ``start`` on.
+def filtered_sample(_: Any, source: Any, begin: Any, target: Any, start: Any, transfer: Any, at: Any, sign: Any) -> Any:
+    """What ``filtered_butterfly`` does to one sample of a spectrum."""
+
+    def write(builder: Any, source: _Array, begin: Any, target: _Array, start: Any, *given: Any) -> None:
+        target.store_sample(_filtered(_Transform(builder), source.sample(begin), *given), start)
+
+    return _instructions("sisisig", write)
+
+
+@intrinsic
+def split(_: Any, field: Any, begin: Any, stride: Any, rows: Any, target: Any, start: Any, hop: Any) -> Any:
+    """Sixteen values of ``rows`` rows of a complex field, from the float ``begin`` on, to samples ``start + k hop``.
 
     Lanes without a row repeat the first.
     """
 
-    def write(builder: Any, field: _Array, begin: Any, stride: Any, rows: Any, target: _Array, start: Any) -> None:
+    def write(
+        builder: Any, field: _Array, begin: Any, stride: Any, rows: Any, target: _Array, start: Any, hop: Any
+    ) -> None:
         lines = []
         for row in range(LANES):
             inside = builder.icmp_signed("<", _int(row), rows)
             line = field.load(builder.select(inside, _place(builder, begin, stride, row), begin), lanes=SAMPLE)
             lines.append([builder.shuffle_vector(line, line, _order(range(part, SAMPLE, 2))) for part in (0, 1)])
-        _store_transposed(builder, lines, target, start, _int(1))
+        _store_transposed(builder, lines, target, start, hop)
 
-    return _instructions("fiiisi", write)
+    return _instructions("fiiisii", write)
 
 
 @intrinsic
-def joined(_: Any, source: Any, begin: Any, field: Any, start: Any, stride: Any, rows: Any) -> Any:
-    """Sixteen samples to ``rows`` rows of a complex field; real and imaginary parts are exchanged."""
+def joined(_: Any, source: Any, begin: Any, hop: Any, field: Any, start: Any, stride: Any, rows: Any) -> Any:
+    """Samples ``begin + k hop`` to ``rows`` rows of a complex field; real and imaginary parts are exchanged."""
 
-    def write(builder: Any, source: _Array, begin: Any, field: _Array, start: Any, stride: Any, rows: Any) -> None:
-        samples = [source.sample(_place(builder, begin, _int(1), k)) for k in range(LANES)]
+    def write(
+        builder: Any, source: _Array, begin: Any, hop: Any, field: _Array, start: Any, stride: Any, rows: Any
+    ) -> None:
+        samples = [source.sample(_place(builder, begin, hop, k)) for k in range(LANES)]
         imaginary, real = (_transposed(builder, part) for part in zip(*samples, strict=True))
         order = _order(k // 2 + LANES * (k % 2) for k in range(SAMPLE))
         for row in range(LANES):
@@ -306,15 +323,15 @@ def joined(_: Any, source: Any, begin: Any, field: Any, start: Any, stride: Any,
                 line = builder.shuffle_vector(real[row], imaginary[row], order)
                 field.store(line, _place(builder, start, stride, row))
 
-    return _instructions("sifiii", write)
+    return _instructions("siifiii", write)
 
 
 @intrinsic
-def crossed(_: Any, source: Any, begin: Any, target: Any, start: Any) -> Any:
-    """Sixteen samples of sixteen lines to as many of the sixteen lines across."""
+def crossed(_: Any, source: Any, begin: Any, stride: Any, target: Any, start: Any, hop: Any) -> Any:
+    """Samples ``begin + k stride`` of sixteen lines to samples ``start + k hop`` of the sixteen lines across."""
 
-    def write(builder: Any, source: _Array, begin: Any, target: _Array, start: Any) -> None:
-        samples = [source.sample(_place(builder, begin, _int(1), k)) for k in range(LANES)]
-        _store_transposed(builder, samples, target, start, _int(1))
+    def write(builder: Any, source: _Array, begin: Any, stride: Any, target: _Array, start: Any, hop: Any) -> None:
+        samples = [source.sample(_place(builder, begin, stride, k)) for k in range(LANES)]
+        _store_transposed(builder, samples, target, start, hop)
 
-    return _instructions("sisi", write)
+    return _instructions("siisii", write)

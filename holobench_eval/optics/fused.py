@@ -14,9 +14,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .butterflies import LANES, SAMPLE, crossed, filtered_butterfly, joined, split, turned_butterfly
+from .butterflies import SAMPLE, crossed, filtered_butterfly, filtered_sample, joined, split, turned_butterfly
+from .sizes import LANES
 
 OPTIONS = {"nogil": True, "cache": True, "boundscheck": False, "error_model": "numpy"}
+SHAPE, STEPS = "UniTuple(i8, 3)", "Tuple((i8, i8[::1], f4[::1]))"
 compiled = njit(**OPTIONS)
 
 
@@ -60,63 +62,119 @@ def _finish(source, target, limit, size, radices, factors):
         turned_butterfly(radix, source, q, hop, size, target, q, hop, limit, factors, ones)
 
 
-@njit("void(f4[::1], i8, i8, i8, i8, f4[::1], i8[::1], i8, i8[::1], f4[::1])", **OPTIONS)
-def rows_forward(fields, height, width, first, last, tiles, kept, size, radices, factors):
-    """Transform blocks ``first`` to ``last`` of 16 rows of ``fields``, complex values, into ``tiles``."""
-    blocks, count = -(-height // LANES), len(kept)
+@compiled
+def _gaps(starts, size):
+    """Whether a line has samples that are in none of the blocks."""
+    end = 0
+    for start in starts:
+        if start > end:
+            return True
+        end = start + LANES
+    return end < size
+
+
+@njit(f"void(f4[::1], {SHAPE}, i8[::1], i8, i8, f4[::1], i8[::1], {STEPS})", **OPTIONS)
+def rows_forward(fields, shape, blocks, first, last, tiles, starts, steps):
+    """Transform the ``first`` to ``last`` of some blocks of 16 rows of ``fields``, complex values, into ``tiles``.
+
+    shape: (planes, height, width) of fields ``(images, planes, planes, height, width)``, the planes of which interleave
+    in an image of as many samples a pixel and axis; blocks of an image are numbered by row of planes, then by row;
+    starts: the first of the sixteen samples of a row's spectrum in each tile.
+    """
+    planes, height, width = shape
+    size, radices, factors = steps
+    each, count, rest = -(-height // LANES), len(starts), width // LANES * LANES
     x, y = _lines(size), _lines(size)
-    for block in range(first, last):
-        image, row = block // blocks, block % blocks * LANES
-        begin, rows = 2 * (image * height + row) * width, min(LANES, height - row)
-        for column in range(0, width - LANES + 1, LANES):
-            split(fields, begin + 2 * column, 2 * width, rows, x, column)
-        for column in range(width // LANES * LANES, width):
-            for lane in range(rows):
-                for part in range(2):
-                    x[column * SAMPLE + part * LANES + lane] = fields[begin + 2 * (lane * width + column) + part]
-        x[width * SAMPLE : (width + 1) * SAMPLE] = 0
-        spectrum, _ = _begin(x, width, y, x, size, radices, factors)
+    for block in blocks[first:last]:
+        line, row = block // each, block % each * LANES
+        rows = min(LANES, height - row)
+        for plane in range(planes):
+            begin = 2 * ((line * planes + plane) * height + row) * width
+            for column in range(0, rest, LANES):
+                split(fields, begin + 2 * column, 2 * width, rows, x, column * planes + plane, planes)
+            for column in range(rest, width):
+                sample = (column * planes + plane) * SAMPLE
+                for lane in range(rows):
+                    for part in range(2):
+                        x[sample + part * LANES + lane] = fields[begin + 2 * (lane * width + column) + part]
+        x[planes * width * SAMPLE : (planes * width + 1) * SAMPLE] = 0
+        spectrum, _ = _begin(x, planes * width, y, x, size, radices, factors)
         _finish(spectrum, spectrum, size, size, radices, factors)
+        place = line // planes * count * planes * room(height) + row * planes + line % planes
         for k in range(count):
-            crossed(spectrum, kept[k] * LANES, tiles, (image * count + k) * room(height) + row)
+            crossed(spectrum, starts[k], 1, tiles, place + k * planes * room(height), planes)
 
 
-@njit("void(f4[::1], i8, i8, i8, f4[::1], f4, i8, i8[::1], f4[::1])", **OPTIONS)
-def columns(tiles, height, first, last, transfer, sign, size, radices, factors):
-    """Filter tiles ``first`` to ``last``: 16 columns each, transformed along them and back."""
-    x, y, rows = _lines(size), _lines(size), room(height)
-    count = len(transfer) // (size * SAMPLE)
-    for tile in range(first, last):
-        lines = tiles[tile * rows * SAMPLE : (tile + 1) * rows * SAMPLE]
+@njit(
+    f"void(f4[::1], i8[::1], {SHAPE}, {STEPS}, f4[::1], i8[::1], {SHAPE}, {STEPS}, i8, i8, f4[::1], i8, f4, b1)",
+    **OPTIONS,
+)
+def columns(
+    source, taken, shape, steps, target, put, target_shape, target_steps, first, last, transfer, band, sign, add
+):
+    """Filter tiles: 16 columns each, transformed along them and back, on another grid where the target has one.
+
+    taken, put: of which the ``first`` to ``last`` are done: the tile of the source and that of the target, to which
+    the result is added with ``add``; band: frequencies of the filter, those around zero that both grids have.
+    """
+    size, radices, factors = steps
+    target_size, target_radices, target_factors = target_steps
+    height, rows = shape[0] * shape[1], shape[0] * room(shape[1])
+    target_height, target_rows = target_shape[0] * target_shape[1], target_shape[0] * room(target_shape[1])
+    x, y = _lines(max(size, target_size)), _lines(max(size, target_size))
+    count, low, high = len(transfer) // (band * SAMPLE), (band + 1) // 2, band // 2
+    for k in range(first, last):
+        lines = source[taken[k] * rows * SAMPLE : (taken[k] + 1) * rows * SAMPLE]
         lines[height * SAMPLE : (height + 1) * SAMPLE] = 0
         spectrum, other = _begin(lines, height, x, y, size, radices, factors)
-        radix = radices[-1]
-        hop, at = size // radix, tile % count * size
-        for q in range(hop):
-            filtered_butterfly(radix, spectrum, q, hop, size, spectrum, q, hop, size, transfer, at, sign)
-        field, _ = _begin(spectrum, size, other, spectrum, size, radices, factors)
-        _finish(field, lines, height, size, radices, factors)
+        at = k % count * band
+        if size == band and target_size == band:
+            radix = radices[-1]
+            hop = size // radix
+            for q in range(hop):
+                filtered_butterfly(radix, spectrum, q, hop, size, spectrum, q, hop, size, transfer, at, sign)
+        else:
+            _finish(spectrum, spectrum, size, size, radices, factors)
+            other[low * SAMPLE : (target_size - high) * SAMPLE] = 0
+            for q in range(low):
+                filtered_sample(spectrum, q, other, q, transfer, at + q, sign)
+            for q in range(-high, 0):
+                filtered_sample(spectrum, size + q, other, target_size + q, transfer, at + band + q, sign)
+            spectrum, other = other, spectrum
+        field, _ = _begin(spectrum, target_size, other, spectrum, target_size, target_radices, target_factors)
+        lines = target[put[k] * target_rows * SAMPLE : (put[k] + 1) * target_rows * SAMPLE]
+        if add:
+            _finish(field, field, target_size, target_size, target_radices, target_factors)
+            for place in range(target_height * SAMPLE):
+                lines[place] += field[place]
+        else:
+            _finish(field, lines, target_height, target_size, target_radices, target_factors)
 
 
-@njit("void(f4[::1], i8, i8, i8, i8, f4[::1], i8[::1], i8, i8[::1], f4[::1])", **OPTIONS)
-def rows_back(tiles, height, width, first, last, fields, kept, size, radices, factors):
+@njit(f"void(f4[::1], {SHAPE}, i8[::1], i8, i8, f4[::1], i8[::1], {STEPS})", **OPTIONS)
+def rows_back(fields, shape, blocks, first, last, tiles, starts, steps):
     """The way back of ``rows_forward``: of the tiles, whose real and imaginary parts are exchanged."""
-    blocks, count = -(-height // LANES), len(kept)
-    x, y = _lines(size), _lines(size)
-    for block in range(first, last):
-        image, row = block // blocks, block % blocks * LANES
-        begin, rows = 2 * (image * height + row) * width, min(LANES, height - row)
-        if count * LANES < size:
+    planes, height, width = shape
+    size, radices, factors = steps
+    each, count, rest = -(-height // LANES), len(starts), width // LANES * LANES
+    x, y, gaps = _lines(size), _lines(size), _gaps(starts, size)
+    for block in blocks[first:last]:
+        line, row = block // each, block % each * LANES
+        rows = min(LANES, height - row)
+        if gaps:
             x[:] = 0
+        place = line // planes * count * planes * room(height) + row * planes + line % planes
         for k in range(count):
-            crossed(tiles, (image * count + k) * room(height) + row, x, kept[k] * LANES)
+            crossed(tiles, place + k * planes * room(height), planes, x, starts[k], 1)
         field, _ = _begin(x, size, y, x, size, radices, factors)
         _finish(field, field, size, size, radices, factors)
-        for column in range(0, width - LANES + 1, LANES):
-            joined(field, column, fields, begin + 2 * column, 2 * width, rows)
-        for column in range(width // LANES * LANES, width):
-            for lane in range(rows):
-                for part in range(2):
-                    fields[begin + 2 * (lane * width + column) + part] = field[
-                        column * SAMPLE + (1 - part) * LANES + lane
-                    ]
+        for plane in range(planes):
+            begin = 2 * ((line * planes + plane) * height + row) * width
+            for column in range(0, rest, LANES):
+                joined(field, column * planes + plane, planes, fields, begin + 2 * column, 2 * width, rows)
+            for column in range(rest, width):
+                sample = (column * planes + plane) * SAMPLE
+                for lane in range(rows):
+                    for part in range(2):
+                        place = begin + 2 * (lane * width + column) + part
+                        fields[place] = field[sample + (1 - part) * LANES + lane]

@@ -10,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import next_fast_len
 
-Steps = tuple[npt.NDArray[np.int64], npt.NDArray[np.float32]]
+Steps = tuple[int, npt.NDArray[np.int64], npt.NDArray[np.float32]]
 
+LANES = 16
+"""Lines that the kernel transforms at once."""
 RADICES = (16, 15, 12, 10, 9, 8, 5, 4, 3, 2)
 FEWEST_STEPS, MOST_STEPS = 2, 4
 OVERHEAD = 1.5
@@ -50,7 +52,7 @@ def fast_size(least: int) -> int:
 
 @lru_cache(maxsize=64)
 def steps(size: int) -> Steps | None:
-    """Radices of a transform, and the complex factors of its steps one after the other; None for other sizes.
+    """Size and radices of a transform, and the complex factors of its steps one after the other; None for other sizes.
 
     The factors of a step of radix r that follows steps of a product s are exp(-2 pi i p k / (size / s)), for p below
     size / (s r) and k from 1 to r - 1.
@@ -63,4 +65,4 @@ def steps(size: int) -> Steps | None:
         angles = -2 * np.pi / left * np.outer(np.arange(left // radix), np.arange(1, radix))
         factors.append(np.stack([np.cos(angles), np.sin(angles)], -1).ravel())
         left //= radix
-    return np.array(radices), np.concatenate(factors).astype(np.float32)
+    return size, np.array(radices), np.concatenate(factors).astype(np.float32)

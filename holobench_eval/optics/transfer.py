@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache, cached_property
 from types import ModuleType
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor
 
 from ..core.allocator import LARGEST_KEPT
 from .blocks import in_blocks, in_parts
-from .sizes import Steps, steps
+from .sizes import LANES, Steps, steps
+
+Numbers = npt.NDArray[np.int64]
 
 PARTS = 4
 """Of the kernel's work: a thread that is disturbed leaves some of it to another."""
@@ -63,42 +68,114 @@ class Fused:
     def __init__(self, fused: ModuleType, values: Tensor, rows: Steps, columns: Steps) -> None:
         self.shape, self.dtype = (values.shape[-2], values.shape[-1]), values.dtype
         self._fused, self._rows, self._columns = fused, rows, columns
-        height, width = self.shape
-        self._blocks = -(-width // fused.LANES)
-        padded = torch.nn.functional.pad(values / values.numel(), (0, self._blocks * fused.LANES - width))
-        tiles = torch.view_as_real(padded).view(height, self._blocks, fused.LANES, 2).permute(1, 0, 3, 2)
-        kept = (tiles.abs().amax((1, 2, 3)) > 0).nonzero().flatten()
-        self._kept, self._tiles = kept.numpy(), tiles[kept].contiguous()
+        self._starts = tile_starts(values)
+        self._tiles = tiled(values, self._starts)
 
     @property
     def values(self) -> Tensor:
         """See ``TransferFunction``; put together anew."""
-        height, width = self.shape
-        tiles = self._tiles.new_zeros((self._blocks, *self._tiles.shape[1:]))
-        tiles[self._kept] = self._tiles * (height * width)
-        rows = tiles.permute(1, 0, 3, 2).contiguous()
-        return torch.view_as_complex(rows).view(height, -1)[:, :width]
+        values = torch.zeros(self.shape, dtype=self.dtype)
+        lines = torch.view_as_complex(self._tiles.permute(1, 0, 3, 2).contiguous())
+        values[:, _columns_of(self._starts, self.shape[1])] = lines * values.numel()
+        return values
 
     def convolve(self, field: Tensor, conjugated: bool = False) -> Tensor:
         """See ``TransferFunction``."""
-        fused, (height, width) = self._fused, field.shape[-2:]
+        height, width = field.shape[-2:]
+        grid = Grid(self._fused, (1, height, width), self._rows, self._columns, self._starts)
         field = field.contiguous().resolve_conj()
-        result = torch.empty_like(field)
-        images, kept = field[..., 0, 0].numel(), len(self._kept)
-        tiles = torch.empty(images * kept * fused.room(height) * fused.SAMPLE).numpy()
-        source, target = (torch.view_as_real(each).numpy().reshape(-1) for each in (field, result))
-        transfer, sign = self._tiles.numpy().reshape(-1), np.float32(-1 if conjugated else 1)
-        rows = height, width
-        along = self._kept, self.shape[1], *self._columns
-        across = transfer, sign, self.shape[0], *self._rows
-        blocks = images * -(-height // fused.LANES)
-        threads = torch.get_num_threads() if images * self.shape[0] * self.shape[1] >= SMALLEST_SHARED else 1
-        parts = PARTS * threads if threads > 1 else 1
-
-        in_parts(lambda *ends: fused.rows_forward(source, *rows, *ends, tiles, *along), blocks, parts)
-        in_parts(lambda *ends: fused.columns(tiles, height, *ends, *across), images * kept, parts)
-        in_parts(lambda *ends: fused.rows_back(tiles, *rows, *ends, target, *along), blocks, parts)
+        images = field[..., 0, 0].numel()
+        result, tiles = torch.empty_like(field), grid.tiles(images)
+        blocks, each = grid.blocks(images), np.arange(images * len(self._starts))
+        grid.spectra(field, tiles, blocks)
+        grid.convolve(tiles, each, grid, tiles, each, self._tiles, conjugated)
+        grid.fields(tiles, result, blocks)
         return result
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Fields ``(..., planes, planes, H, W)``, contiguous, that the kernel transforms, and the tiles of their spectra.
+
+    The planes of a field interleave in an image of as many samples a pixel and axis. shape: (planes, H, W); rows,
+    columns: steps of the transforms along axes 0 and 1; starts: the first column of each tile.
+    """
+
+    fused: ModuleType
+    shape: tuple[int, int, int]
+    rows: Steps
+    columns: Steps
+    starts: Numbers
+
+    def blocks(self, images: int = 1) -> Numbers:
+        """Numbers of the blocks of sixteen rows of all planes."""
+        return np.arange(images * self.shape[0] * -(-self.shape[1] // LANES))
+
+    def tiles(self, images: int = 1) -> Tensor:
+        """Room for spectra."""
+        return torch.empty(images * self._size)
+
+    def spectra(self, field: Tensor, tiles: Tensor, blocks: Numbers) -> None:
+        """Transform blocks of rows of a field into tiles."""
+        source, target, along = _floats(field), tiles.numpy(), (self.starts, self.columns)
+        rows = self.fused.rows_forward
+        self._share(lambda *ends: rows(source, self.shape, blocks, *ends, target, *along), blocks, tiles)
+
+    def convolve(
+        self, tiles: Tensor, taken: Numbers, target: Grid, to: Tensor, put: Numbers, transfer: Tensor,
+        conjugated: bool, add: bool = False,
+    ) -> None:  # fmt: skip
+        """Convolve columns by a transfer function, see ``tiled``: tiles ``taken`` into tiles ``put`` of another grid.
+
+        add: to what these tiles hold already.
+        """
+        of, factors = (tiles.numpy(), taken, self.shape, self.rows), transfer.numpy().reshape(-1)
+        into = to.numpy(), put, target.shape, target.rows
+        rest = factors, transfer.shape[1], np.float32(-1 if conjugated else 1), add
+        self._share(lambda *ends: self.fused.columns(*of, *into, *ends, *rest), taken, tiles)
+
+    def fields(self, tiles: Tensor, field: Tensor, blocks: Numbers) -> None:
+        """Transform what ``convolve`` left in tiles back, into blocks of rows of a field."""
+        source, target, along = tiles.numpy(), _floats(field), (self.starts, self.columns)
+        rows = self.fused.rows_back
+        self._share(lambda *ends: rows(target, self.shape, blocks, *ends, source, *along), blocks, tiles)
+
+    @property
+    def _size(self) -> int:
+        """Floats in the tiles of an image."""
+        return len(self.starts) * self.shape[0] * int(self.fused.room(self.shape[1])) * 2 * LANES
+
+    def _share(self, work: Callable[[int, int], object], each: Numbers, tiles: Tensor) -> None:
+        images = tiles.numel() // max(1, self._size)
+        threads = torch.get_num_threads() if images * self.rows[0] * self.columns[0] >= SMALLEST_SHARED else 1
+        in_parts(work, len(each), PARTS * threads if threads > 1 else 1)
+
+
+def tile_starts(values: Tensor) -> Numbers:
+    """First columns of the tiles of a transfer function that hold more than zeros.
+
+    No tile reaches from low to high frequencies, but where there are few; tiles may overlap, and are equal there.
+    """
+    band, low = values.shape[1], (values.shape[1] + 1) // 2
+    ends = [(0, low), (low, band)] if band >= 2 * LANES else [(0, LANES * -(-band // LANES))]
+    starts = np.array([min(start, end - LANES) for begin, end in ends for start in range(begin, end, LANES)])
+    held = (values != 0).any(0)[_columns_of(starts, band)].any(1)
+    return starts[held.numpy()]
+
+
+def tiled(values: Tensor, starts: Numbers) -> Tensor:
+    """Tiles ``(tiles, rows, 2, 16)`` of a transfer function, real and imaginary parts apart, as the kernel takes them:
+    the transforms there and back together multiply by the number of values."""
+    columns = values[:, _columns_of(starts, values.shape[1])] / values.numel()
+    return torch.view_as_real(columns).permute(1, 0, 3, 2).contiguous()
+
+
+def _columns_of(starts: Numbers, band: int) -> Tensor:
+    return torch.from_numpy(starts)[:, None].add(torch.arange(LANES)).clamp(max=band - 1)
+
+
+def _floats(field: Tensor) -> npt.NDArray[np.float32]:
+    return torch.view_as_real(field).numpy().reshape(-1)
 
 
 class InTorch:

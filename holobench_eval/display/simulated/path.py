@@ -5,13 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from typing import Any
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from ...optics.blocks import in_blocks
+
+
+class LightPath(Protocol):
+    """From the sub-samples' light to the image: a linear map, and its adjoint."""
+
+    def forward(self, field: Tensor) -> Tensor:
+        """Field ``(samples, samples, H, W)`` of the sub-samples to the image ``(n H, n W)``."""
+
+    def adjoint(self, image: Tensor) -> Tensor:
+        """The adjoint of ``forward``."""
+
+
+def image(path: LightPath, field: Tensor) -> Tensor:
+    """``path.forward``, differentiable once."""
+    seen: Tensor = _Seen.apply(field, path)  # type: ignore[no-untyped-call]
+    return seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +47,14 @@ class Dust:
 
 @dataclass(frozen=True, eq=False)
 class OpticalPath:
-    """Panel, iris, dust plane and image plane of one colour, on the padded grid.
+    """Panel, iris, dust plane and image plane of one colour, on the padded grid, by torch: the reference for
+    ``FusedPath``, in its place where it cannot be, and the way of a GPU.
 
     shape: of the panel; rows, columns: weights ``(samples, padded)`` that add the spectra of the sub-samples, see
-    ``stages.propagation.sample_weights``; still: spectrum of the light that no phase changes; transfer: to the dust
-    plane, or all the way where there is none; dust: what it changes there; last: transfer function from there to the
-    image; finer: samples a pixel and axis of the image. Work is done a block of rows or
-    columns at a time, see ``optics.convolution``: transfer functions are best stored column by column.
+    ``stages.propagation.sample_weights``; transfer: to the dust plane, or all the way where there is none; dust: what
+    it changes there; last: transfer function from there to the image; finer: samples a pixel and axis of the image.
+    Work is done a block of rows or columns at a time, see ``optics.convolution``: transfer functions are best stored
+    column by column.
 
     The adjoint is written out: autograd would keep every factor's input and clear a new array for every crop.
     """
@@ -45,7 +62,6 @@ class OpticalPath:
     shape: tuple[int, int]
     rows: Tensor
     columns: Tensor
-    still: Tensor
     transfer: Tensor
     dust: Dust | None
     last: Tensor | None
@@ -57,25 +73,18 @@ class OpticalPath:
             self,
             rows=self.rows.to(device),
             columns=self.columns.to(device),
-            still=self.still.to(device),
             transfer=self.transfer.to(device),
             dust=None if self.dust is None else Dust(self.dust.rows.to(device), self.dust.change.to(device)),
             last=None if self.last is None else self.last.to(device),
         )
 
-    def image(self, field: Tensor) -> Tensor:
-        """Field ``(samples, samples, H, W)`` of the sub-samples to ``(finer H, finer W)``; differentiable once."""
-        seen: Tensor = _Seen.apply(field, self)  # type: ignore[no-untyped-call]
-        return seen
-
     def forward(self, field: Tensor) -> Tensor:
-        """``image`` for the light that follows the phase and the light that does not."""
+        """Field ``(samples, samples, H, W)`` of the sub-samples to ``(finer H, finer W)``."""
         lines = row_spectra(field, self.columns)
         height, width = (self.finer * side for side in self.shape)
 
         def arriving(part: slice) -> Tensor:
-            light = column_spectra(lines, self.rows, part).add_(self.still[:, part].T)
-            return light.mul_(self.transfer[:, part].T)
+            return column_spectra(lines, self.rows, part).mul_(self.transfer[:, part].T)
 
         dusty = arriving if self.dust is None else self._through(self.dust, arriving)
         seen = lines.new_empty((height, lines.shape[-1]))
@@ -94,7 +103,7 @@ class OpticalPath:
         return image
 
     def adjoint(self, image: Tensor) -> Tensor:
-        """The adjoint of the linear part of ``forward``, ``(finer H, finer W)`` to ``(samples, samples, H, W)``."""
+        """The adjoint of ``forward``, ``(finer H, finer W)`` to ``(samples, samples, H, W)``."""
         padded, height = self.transfer.shape, self.shape[0]
         rows, columns, transfer, dust, last = self._conjugates
         seen = image.new_empty((len(image), padded[1]))
@@ -161,7 +170,7 @@ class OpticalPath:
 
 class _Seen(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, field: Tensor, path: OpticalPath) -> Tensor:
+    def forward(ctx: Any, field: Tensor, path: LightPath) -> Tensor:
         ctx.path = path
         return path.forward(field)
 
@@ -176,14 +185,8 @@ def conjugate(factor: Tensor) -> Tensor:
     return factor.conj().resolve_conj()
 
 
-def panel_spectrum(field: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
-    """Spectrum of the panel on the padded grid, from the field ``(samples, samples, H, W)`` of its sub-samples."""
-    lines = row_spectra(field, columns)
-    return column_spectra(lines, rows, slice(None)).T
-
-
 def row_spectra(field: Tensor, columns: Tensor) -> Tensor:
-    """Spectra of rows ``(samples, H, padded)``, the sub-samples of a row joined, of a field as ``panel_spectrum``."""
+    """Spectra of rows ``(samples, H, padded)``, the sub-samples of a row joined, of ``(samples, samples, H, W)``."""
     lines = field.new_empty((field.shape[0], field.shape[2], columns.shape[1]))
 
     def join(rows: slice) -> None:

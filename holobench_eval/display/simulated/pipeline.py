@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial, reduce
 from operator import add, mul
 
@@ -20,10 +20,11 @@ from ...optics.phase import blaze
 from ...optics.phasor import phasor, squared_modulus
 from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
+from .fused_path import quickest
 from .geometry import Geometry
 from .kernels import modulate_rows
 from .noise import normal
-from .path import Dust, OpticalPath, panel_spectrum
+from .path import Dust, LightPath, OpticalPath, image
 from .profile import Profile
 from .stages.panel import straight_through_level
 from .stages.propagation import sample_weights
@@ -36,8 +37,8 @@ class ChannelMaps:
     """What is fixed for one line of the source: every random pattern drawn, every transfer function built.
 
     added: phase [rad] that the display adds to every hologram; lut_gain; amplitude and angle [rad] of the incident
-    light: ``(H, W)``; path: all that is linear in the light, and the light that no phase changes; laser_power: of the
-    line, relative to what the camera's exposure was set for.
+    light: ``(H, W)``; path: all that is linear in the light; still: at the image, light that no phase changes
+    ``(n H, n W)``; laser_power: of the line, relative to what the camera's exposure was set for.
     """
 
     geometry: Geometry
@@ -45,19 +46,9 @@ class ChannelMaps:
     lut_gain: Tensor
     amplitude: Tensor
     angle: Tensor
-    path: OpticalPath
+    path: LightPath
+    still: Tensor
     laser_power: float
-
-    def to(self, device: torch.device) -> ChannelMaps:
-        """The same on a device."""
-        return replace(
-            self,
-            added=self.added.to(device),
-            lut_gain=self.lut_gain.to(device),
-            amplitude=self.amplitude.to(device),
-            angle=self.angle.to(device),
-            path=self.path.to(device),
-        )
 
 
 class SimulatedBench:
@@ -105,7 +96,7 @@ class SimulatedBench:
         ]
         geometry = geometries[0]
         today = profile.drift.moved(profile, geometry)
-        lines = ((self._maps(today, *line).to(device) for line in self._lines(each)) for each in geometries)
+        lines = ((self._maps(today, *line) for line in self._lines(each)) for each in geometries)
         self.lines = tuple(tuple(maps) for maps in lines)
         self.channels = tuple(lines[0] for lines in self.lines)
         self.drift_gain = profile.drift.phase_gain(geometry)
@@ -135,22 +126,26 @@ class SimulatedBench:
         fy, fx = frequencies(padded, geometry.pitch)
         for factor in present(stage.transmission(fy, fx, geometry) for stage in stages):
             legs[-1] = legs[-1] * factor.to(legs[-1].dtype)
-        return ChannelMaps(
-            geometry=geometry,
-            added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp),
-            lut_gain=profile.lut.gain_map(geometry),
-            amplitude=incident.abs(),
-            angle=incident.angle(),
-            path=OpticalPath(
+        path = quickest(
+            OpticalPath(
                 shape=geometry.shape,
                 rows=self.weights[0],
                 columns=self.weights[1],
-                still=by_columns(panel_spectrum(self.unmodulated * incident, *self.weights)),
                 transfer=by_columns(legs[0]),
                 dust=None if plane is None else Dust.of(plane.to(legs[0].dtype)),
                 last=None if plane is None else by_columns(legs[1]),
                 finer=self.image_samples,
             ),
+            self.device,
+        )
+        return ChannelMaps(
+            geometry=geometry,
+            added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
+            lut_gain=profile.lut.gain_map(geometry).to(self.device),
+            amplitude=incident.abs().to(self.device),
+            angle=incident.angle().to(self.device),
+            path=path,
+            still=path.forward((self.unmodulated * incident).to(self.device)),
             laser_power=profile.drift.laser_power(geometry) * profile.illumination.power * share,
         )
 
@@ -162,7 +157,7 @@ class SimulatedBench:
     def _modulated_field(self, phase: Tensor, maps: ChannelMaps, flicker: float) -> Tensor:
         """Field ``(samples, samples, H, W)`` of the sub-samples' light that follows ``phase`` ``(H, W)`` [rad].
 
-        The carrier is off. The light that follows no phase is in ``ChannelMaps.path``.
+        The carrier is off. The light that follows no phase is in ``ChannelMaps.still``.
         """
         if usable(phase) and phase.dtype == maps.amplitude.dtype:
             return self._compiled_field(phase, maps, flicker * self.drift_gain)
@@ -206,7 +201,8 @@ class SimulatedBench:
             ``(n H, n W)`` for n = ``image_samples``; the mean incident intensity on the panel is 1.
         """
         lines = (
-            squared_modulus(maps.path.image(self._modulated_field(phase, maps, flicker))) * maps.laser_power
+            squared_modulus(image(maps.path, self._modulated_field(phase, maps, flicker)).add_(maps.still))
+            * maps.laser_power
             for maps in self.lines[channel]
         )
         return reduce(add, lines)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from holobench_eval.display.simulated.path import Dust, OpticalPath, finer_line
+from holobench_eval.display.simulated.path import Dust, OpticalPath, finer_line, image
 from holobench_eval.display.simulated.stages.propagation import sample_weights
 
 SHAPE, PADDED = (10, 13), (18, 21)
@@ -20,9 +20,7 @@ def path(samples, finer, dust, clean=()):
     plane[list(clean)] = 1
     rows, columns = (weights.to(torch.complex128) for weights in sample_weights(PADDED, samples, (0.1, 0.2), True))
     last = random(*PADDED) if dust else None
-    return OpticalPath(
-        SHAPE, rows, columns, random(*PADDED), random(*PADDED), Dust.of(plane) if dust else None, last, finer
-    )
+    return OpticalPath(SHAPE, rows, columns, random(*PADDED), Dust.of(plane) if dust else None, last, finer)
 
 
 @pytest.mark.parametrize("dust", [False, True])
@@ -32,9 +30,8 @@ def test_the_adjoint_passes_the_dot_product_test(samples, finer, dust, clean):
     torch.manual_seed(0)
     one = path(samples, finer, dust, clean)
     field = random(samples, samples, *SHAPE)
-    image = random(finer * SHAPE[0], finer * SHAPE[1])
-    linear = one.forward(field) - one.forward(torch.zeros_like(field))
-    assert torch.allclose((image.conj() * linear).sum(), (one.adjoint(image).conj() * field).sum())
+    light = random(finer * SHAPE[0], finer * SHAPE[1])
+    assert torch.allclose((light.conj() * one.forward(field)).sum(), (one.adjoint(light).conj() * field).sum())
 
 
 @pytest.mark.parametrize("dusty", [[], [4], [0, 3, 9], list(range(10))])
@@ -45,7 +42,7 @@ def test_light_passes_the_dust_as_if_every_row_were_transformed(dusty):
     plane[dusty, 2:5] = random(len(dusty), 3)
     beyond = torch.ones(PADDED, dtype=torch.complex128)
     beyond[: SHAPE[0], : SHAPE[1]] = plane
-    light = torch.fft.fft2(field[0, 0], s=PADDED) * one.rows[0][:, None] * one.columns[0][None, :] + one.still
+    light = torch.fft.fft2(field[0, 0], s=PADDED) * one.rows[0][:, None] * one.columns[0][None, :]
     behind = torch.fft.fft2(torch.fft.ifft2(light * one.transfer) * beyond) * one.last
     assert torch.allclose(
         replace(one, dust=Dust.of(plane)).forward(field), torch.fft.ifft2(behind)[: SHAPE[0], : SHAPE[1]], atol=1e-12
@@ -56,11 +53,11 @@ def test_the_gradient_is_the_numerical_one():
     torch.manual_seed(1)
     one = path(2, 2, dust=True)
     field = random(2, 2, *SHAPE).requires_grad_()
-    seen = one.image(field)
+    seen = image(one, field)
     direction, weight = random(2, 2, *SHAPE), torch.rand(seen.shape, dtype=torch.float64)
     (grad,) = torch.autograd.grad((weight * seen.abs().square()).sum(), field)
     with torch.no_grad():
-        after, before = (one.image(field + step * direction).abs().square() for step in (1e-6, -1e-6))
+        after, before = (image(one, field + step * direction).abs().square() for step in (1e-6, -1e-6))
     slope = (weight * (after - before)).sum() / 2e-6
     assert float((grad.conj() * direction).sum().real) == pytest.approx(float(slope), rel=1e-6)
 
@@ -79,5 +76,5 @@ def test_the_light_of_the_panel_is_left_as_it_is():
     torch.manual_seed(2)
     one, field = path(3, 2, dust=True), random(3, 3, *SHAPE)
     before = field.clone()
-    assert torch.equal(one.image(field), one.image(field))
+    assert torch.equal(image(one, field), image(one, field))
     assert torch.equal(field, before)

@@ -1,0 +1,130 @@
+"""The optical path through the kernel against the one through torch's transforms."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from holobench_eval.display.simulated import fused_path
+from holobench_eval.display.simulated.fused_path import FusedPath, quickest
+from holobench_eval.display.simulated.path import Dust, OpticalPath
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.profile import load_profile
+from holobench_eval.display.simulated.stages.propagation import sample_weights
+from holobench_eval.optics.transfer import kernel
+
+CPU = torch.device("cpu")
+PLAIN, BLAZED = (0.0, 0.0), (0.1, -0.27)
+
+
+def random(*shape, seed=0):
+    return torch.randn(shape, dtype=torch.complex128, generator=torch.Generator().manual_seed(seed))
+
+
+def path(samples, finer, dusty=None, blaze=PLAIN, shape=(37, 50), padded=(60, 81), legs=None):
+    """In double precision; dusty: rows of the plane that have dust, None for no plane."""
+    rows, columns = (weights.to(torch.complex128) for weights in sample_weights(padded, samples, blaze, True))
+    first, last = legs or (random(*padded, seed=1), random(*padded, seed=2))
+    plane = torch.ones(shape, dtype=torch.complex128)
+    plane[dusty or []] = random(*shape, seed=3)[dusty or []]
+    dust = None if dusty is None else Dust.of(plane)
+    return OpticalPath(shape, rows, columns, first, dust, None if dusty is None else last, finer)
+
+
+def single(one):
+    """A path in single precision."""
+    dust, last = one.dust, one.last
+    return replace(
+        one,
+        rows=one.rows.to(torch.complex64),
+        columns=one.columns.to(torch.complex64),
+        transfer=one.transfer.to(torch.complex64),
+        dust=None if dust is None else Dust(dust.rows, dust.change.to(torch.complex64)),
+        last=None if last is None else last.to(torch.complex64),
+    )
+
+
+def relative(found, expected):
+    return float((found - expected).norm() / expected.norm())
+
+
+def same(one):
+    """Forward and adjoint of the kernel are those of torch in double precision."""
+    fused, samples = quickest(single(one), CPU), len(one.rows)
+    assert isinstance(fused, FusedPath)
+    light = random(samples, samples, *one.shape, seed=4)
+    image = random(*(one.finer * side for side in one.shape), seed=5)
+    assert relative(fused.forward(light.to(torch.complex64)), one.forward(light)) < 1e-6
+    assert relative(fused.adjoint(image.to(torch.complex64)), one.adjoint(image)) < 1e-6
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 5])
+@pytest.mark.parametrize("finer", [1, 2])
+@pytest.mark.parametrize("dusty", [None, [], [3], [0, 20, 36], list(range(37))])
+@pytest.mark.parametrize("blaze", [PLAIN, BLAZED])
+def test_the_kernel_and_torch_show_the_same_light(samples, finer, dusty, blaze):
+    same(path(samples, finer, dusty, blaze))
+
+
+@pytest.mark.parametrize(
+    ("shape", "padded"), [((16, 16), (32, 32)), ((33, 17), (40, 45)), ((40, 64), (45, 64)), ((7, 100), (10, 135))]
+)
+@pytest.mark.parametrize("dusty", [None, [6]])
+def test_sizes_of_panel_and_transform_do_not_matter(shape, padded, dusty):
+    same(path(3, 2, dusty, BLAZED, shape, padded))
+    same(path(1, 1, dusty, PLAIN, shape, padded))
+
+
+@pytest.mark.parametrize("dusty", [None, [5, 6]])
+@pytest.mark.parametrize(
+    "clear", [(slice(20, 60), slice(0)), (slice(0), slice(25, 70)), (slice(20, 50), slice(30, 75))]
+)
+def test_columns_that_one_transfer_function_stops_are_left_out(dusty, clear):
+    legs = random(60, 81, seed=1), random(60, 81, seed=2)
+    for leg, columns in zip(legs, clear, strict=True):
+        leg[:, columns] = 0
+    one = path(3, 2, dusty, legs=legs)
+    same(one)
+    if dusty is None and clear[0] != slice(0):
+        assert len(quickest(single(one), CPU)._panel.grid.starts) < len(
+            quickest(single(path(3, 2)), CPU)._panel.grid.starts
+        )
+
+
+def test_a_light_path_may_be_used_by_several_threads():
+    one, found = single(path(3, 2, [4, 18])), []
+    fused, light = quickest(one, CPU), random(3, 3, 37, 50).to(torch.complex64)
+    for threads in (1, 2, 5):
+        torch.set_num_threads(threads)
+        found.append(fused.forward(light))
+    torch.set_num_threads(1)
+    assert all(torch.equal(found[0], other) for other in found)
+
+
+@pytest.mark.parametrize(
+    "unfit",
+    [path(3, 2), single(path(1, 1, padded=(60, 77))), single(path(1, 1, shape=(20, 20), padded=(30, 30)))],
+    ids=["double precision", "a size with primes 7 and 11", "few columns"],
+)
+def test_torch_does_what_the_kernel_is_not_made_for(unfit):
+    assert isinstance(quickest(unfit, CPU), OpticalPath)
+
+
+def test_without_the_kernel_light_goes_by_torch(monkeypatch):
+    one = single(path(1, 1))
+    assert isinstance(quickest(one, CPU), FusedPath)
+    assert isinstance(quickest(one, torch.device("meta")), OpticalPath)
+    monkeypatch.setattr(fused_path, "kernel", lambda: None)
+    assert isinstance(quickest(one, CPU), OpticalPath)
+
+
+@pytest.mark.parametrize("name", ["leto-dusty", "pluto-offaxis"])
+def test_a_bench_shows_the_same_with_the_kernel_and_without(name, monkeypatch):
+    seen, phase = [], 6 * torch.rand(64, 64, generator=torch.Generator().manual_seed(0))
+    for ways in (kernel, lambda: None):
+        monkeypatch.setattr(fused_path, "kernel", ways)
+        bench, shown = SimulatedBench(load_profile(name).scaled((64, 64))), phase.clone().requires_grad_()
+        assert isinstance(bench.channels[1].path, FusedPath) == (ways is kernel)
+        light = bench.intensity(shown, channel=1)
+        seen.append((light.detach(), *torch.autograd.grad(light.square().sum(), shown)))
+    assert all(relative(*pair) < 1e-5 for pair in zip(*seen, strict=True))
