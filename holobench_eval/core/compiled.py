@@ -11,7 +11,7 @@ from torch import Tensor
 try:
     from numba import njit
 except ImportError:
-    njit = None  # type: ignore[assignment]
+    njit = None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

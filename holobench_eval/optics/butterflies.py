@@ -212,14 +212,14 @@ def _instructions(arguments: str, write: Callable[..., None]) -> Any:
 
 
 def _butterfly(
-    builder: Any, radix: Any, source: _Array, begin: Any, stride: Any, end: Any,
-    target: _Array, start: Any, hop: Any, limit: Any, finish: Callable[[_Transform, int, Complex], Complex],
-) -> None:  # fmt: skip
+    builder: Any, radix: Any, places: Sequence[Any], finish: Callable[[_Transform, int, Complex], Complex]
+) -> None:
     """One butterfly of each radix, of which the processor takes one.
 
     It reads samples ``begin + k stride`` of the source and writes samples ``start + k hop`` of the target: what
     ``finish`` makes of the k-th result. From ``end`` and ``limit`` on, these two places stand for all others.
     """
+    source, begin, stride, end, target, start, hop, limit = places
     writer = _Transform(builder)
     done = builder.append_basic_block("done")
     chosen = builder.switch(radix, done)
@@ -247,13 +247,13 @@ def turned_butterfly(
 ) -> Any:  # fmt: skip
     """See ``_butterfly``; all results but the first are multiplied by complex factors, the floats from ``at`` on."""
 
-    def write(builder: Any, radix: Any, *places: Any) -> None:
-        *places, factors, at = places
+    def write(builder: Any, radix: Any, *given: Any) -> None:
+        *places, factors, at = given
 
         def turned(writer: _Transform, k: int, value: Complex) -> Complex:
             return writer.times(value, (factors.spread(at, 2 * k - 2), factors.spread(at, 2 * k - 1))) if k else value
 
-        _butterfly(builder, radix, *places, turned)
+        _butterfly(builder, radix, places, turned)
 
     return _instructions("isiiisiiifi", write)
 
@@ -266,14 +266,14 @@ def filtered_butterfly(
     """See ``_butterfly``; results are multiplied by the filter's samples from ``at`` on, the imaginary parts of which
     are multiplied by ``sign``; then real and imaginary parts are exchanged, for the inverse transform."""
 
-    def write(builder: Any, radix: Any, *places: Any) -> None:
-        *places, transfer, at, sign = places
+    def write(builder: Any, radix: Any, *given: Any) -> None:
+        *places, transfer, at, sign = given
         start, hop = builder.add(at, places[5]), places[6]
 
         def filtered(writer: _Transform, k: int, value: Complex) -> Complex:
             return _filtered(writer, value, transfer, _place(builder, start, hop, k), sign)
 
-        _butterfly(builder, radix, *places, filtered)
+        _butterfly(builder, radix, places, filtered)
 
     return _instructions("isiiisiiisig", write)
 
