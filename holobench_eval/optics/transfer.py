@@ -82,6 +82,8 @@ class Fused:
     def convolve(self, field: Tensor, conjugated: bool = False) -> Tensor:
         """See ``TransferFunction``."""
         height, width = field.shape[-2:]
+        if height > self.shape[0] or width > self.shape[1]:  # compiled code would write beyond its arrays
+            raise ValueError(f"field is {(height, width)}, the transfer function {self.shape}")
         grid = Grid(self._fused, (1, height, width), self._rows, self._columns, self._starts)
         field = field.contiguous().resolve_conj()
         images = field[..., 0, 0].numel()

@@ -68,6 +68,12 @@ def test_a_field_may_lie_in_memory_as_it_likes(strided):
     assert relative(transfer_function(values).convolve(field), padded_convolution(field, values)) < 1e-6
 
 
+@pytest.mark.parametrize("shape", [(61, 20), (20, 61)])
+def test_a_field_that_is_larger_than_the_transfer_function_is_refused(shape):
+    with pytest.raises(ValueError, match="field is"):
+        transfer_function(white(60, 60)).convolve(white(*shape))
+
+
 def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
     monkeypatch.setattr(transfer, "SMALLEST_SHARED", 0)
     function, field, found = transfer_function(white(150, 160, seed=1)), white(3, 70, 81), []

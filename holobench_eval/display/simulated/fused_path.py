@@ -79,7 +79,7 @@ class FusedPath:
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
-        field = field if self._turn is None else field * self._turn
+        field = (field if self._turn is None else field * self._turn).to(torch.complex64)
         _, height, width = self._image.grid.shape
         return self._pass(field, self._panel, self._image, field.new_empty(height, width), conjugated=False)
 

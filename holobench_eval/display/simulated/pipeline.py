@@ -159,6 +159,8 @@ class SimulatedBench:
 
         The carrier is off. The light that follows no phase is in ``ChannelMaps.still``.
         """
+        if tuple(phase.shape) != tuple(self.profile.panel.shape):  # compiled code would read beyond it
+            raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
         if usable(phase) and phase.dtype == maps.amplitude.dtype:
             return self._compiled_field(phase, maps, flicker * self.drift_gain)
         profile, gain = self.profile, maps.lut_gain * (flicker * self.drift_gain)

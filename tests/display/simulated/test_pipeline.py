@@ -158,3 +158,11 @@ def test_days_change_the_bench_and_zero_days_do_not(phase):
 def test_every_profile_registers_its_camera_within_its_bound(name):
     workbench = open_bench(load_profile(name), (192, 192))
     assert max(workbench.registration.residual) <= workbench.bench.profile.residual_bound
+
+
+@pytest.mark.parametrize("shape", [(63, 64), (64, 63), (65, 64), (64, 65), (2, 64, 64)])
+@pytest.mark.parametrize("grad", [True, False])
+def test_a_phase_of_another_size_than_the_panel_is_refused(shape, grad):
+    bench = SimulatedBench(load_profile("leto-mild").scaled((64, 64)))
+    with torch.set_grad_enabled(grad), pytest.raises(ValueError, match="the panel is"):
+        bench.intensity(torch.zeros(shape, requires_grad=grad), channel=0)
