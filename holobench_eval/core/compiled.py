@@ -9,13 +9,13 @@ import torch
 from torch import Tensor
 
 try:
-    from numba import njit
+    from numba import config, njit
 except ImportError:
     njit = None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-AVAILABLE = njit is not None
+AVAILABLE = njit is not None and not config.DISABLE_JIT
 _compile: Any = njit
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}  # a product and a sum are rounded once
 

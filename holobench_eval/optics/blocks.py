@@ -32,7 +32,7 @@ def in_blocks(work: Callable[[slice], object], like: Tensor, lines: int, element
 
 def in_parts(work: Callable[[int, int], object], lines: int, parts: int) -> None:
     """Call ``work`` with the ends of ``parts`` ranges that make up ``lines``, in as many threads as torch has."""
-    if lines == 0:
+    if lines == 0 or parts == 0:
         return
     parts = min(parts, lines)
     ends = [lines * part // parts for part in range(parts + 1)]

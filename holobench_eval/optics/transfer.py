@@ -49,32 +49,34 @@ def transfer_function(values: Tensor) -> TransferFunction:
     fused = kernel() if values.is_cpu and values.dtype == torch.complex64 else None
     if fused is None or rows is None or columns is None:
         return InTorch(values)
-    return Fused(fused, values, rows, columns)
+    return Fused(values, rows, columns)
 
 
 @cache
 def kernel() -> ModuleType | None:
     """The compiled kernel; None where its compiler is not installed or does not work."""
     try:
+        from numba import config
+
         from . import fused
-    except (ImportError, OSError, RuntimeError):  # whatever a compiler raises that does not know the processor
+    except Exception:  # whatever a compiler raises that does not know the processor, or has no folder to write to
         return None
-    return fused
+    return None if config.DISABLE_JIT else fused
 
 
 class Fused:
     """Convolution by the kernel; see ``fused``. Columns of zeros are left out."""
 
-    def __init__(self, fused: ModuleType, values: Tensor, rows: Steps, columns: Steps) -> None:
+    def __init__(self, values: Tensor, rows: Steps, columns: Steps) -> None:
         self.shape, self.dtype = (values.shape[-2], values.shape[-1]), values.dtype
-        self._fused, self._rows, self._columns = fused, rows, columns
+        self._rows, self._columns = rows, columns
         self._starts = tile_starts(values)
         self._tiles = tiled(values, self._starts)
 
     @property
     def values(self) -> Tensor:
         """See ``TransferFunction``; put together anew."""
-        values = torch.zeros(self.shape, dtype=self.dtype)
+        values = torch.zeros(self.shape, dtype=self.dtype, device="cpu")
         lines = torch.view_as_complex(self._tiles.permute(1, 0, 3, 2).contiguous())
         values[:, _columns_of(self._starts, self.shape[1])] = lines * values.numel()
         return values
@@ -84,8 +86,8 @@ class Fused:
         height, width = field.shape[-2:]
         if height > self.shape[0] or width > self.shape[1]:  # compiled code would write beyond its arrays
             raise ValueError(f"field is {(height, width)}, the transfer function {self.shape}")
-        grid = Grid(self._fused, (1, height, width), self._rows, self._columns, self._starts)
-        field = field.contiguous().resolve_conj()
+        grid = Grid((1, height, width), self._rows, self._columns, self._starts)
+        field = field.contiguous().resolve_conj().resolve_neg()
         images = field[..., 0, 0].numel()
         result, tiles = torch.empty_like(field), grid.tiles(images)
         blocks, each = grid.blocks(images), np.arange(images * len(self._starts))
@@ -103,7 +105,6 @@ class Grid:
     columns: steps of the transforms along axes 0 and 1; starts: the first column of each tile.
     """
 
-    fused: ModuleType
     shape: tuple[int, int, int]
     rows: Steps
     columns: Steps
@@ -115,12 +116,12 @@ class Grid:
 
     def tiles(self, images: int = 1) -> Tensor:
         """Room for spectra."""
-        return torch.empty(images * self._size)
+        return torch.empty(images * self._size, dtype=torch.float32, device="cpu")
 
     def spectra(self, field: Tensor, tiles: Tensor, blocks: Numbers) -> None:
         """Transform blocks of rows of a field into tiles."""
         source, target, along = _floats(field), tiles.numpy(), (self.starts, self.columns)
-        rows = self.fused.rows_forward
+        rows = _fused().rows_forward
         self._share(lambda *ends: rows(source, self.shape, blocks, *ends, target, *along), blocks, tiles)
 
     def convolve(
@@ -134,23 +135,30 @@ class Grid:
         of, factors = (tiles.numpy(), taken, self.shape, self.rows), transfer.numpy().reshape(-1)
         into = to.numpy(), put, target.shape, target.rows
         rest = factors, transfer.shape[1], np.float32(-1 if conjugated else 1), add
-        self._share(lambda *ends: self.fused.columns(*of, *into, *ends, *rest), taken, tiles)
+        self._share(lambda *ends: _fused().columns(*of, *into, *ends, *rest), taken, tiles)
 
     def fields(self, tiles: Tensor, field: Tensor, blocks: Numbers) -> None:
         """Transform what ``convolve`` left in tiles back, into blocks of rows of a field."""
         source, target, along = tiles.numpy(), _floats(field), (self.starts, self.columns)
-        rows = self.fused.rows_back
+        rows = _fused().rows_back
         self._share(lambda *ends: rows(target, self.shape, blocks, *ends, source, *along), blocks, tiles)
 
     @property
     def _size(self) -> int:
         """Floats in the tiles of an image."""
-        return len(self.starts) * self.shape[0] * int(self.fused.room(self.shape[1])) * 2 * LANES
+        return len(self.starts) * self.shape[0] * int(_fused().room(self.shape[1])) * 2 * LANES
 
     def _share(self, work: Callable[[int, int], object], each: Numbers, tiles: Tensor) -> None:
         images = tiles.numel() // max(1, self._size)
         threads = torch.get_num_threads() if images * self.rows[0] * self.columns[0] >= SMALLEST_SHARED else 1
         in_parts(work, len(each), PARTS * threads if threads > 1 else 1)
+
+
+def _fused() -> ModuleType:
+    """The kernel, known to be there; not kept in what uses it, so that models can be copied."""
+    from . import fused
+
+    return fused
 
 
 def tile_starts(values: Tensor) -> Numbers:
@@ -173,7 +181,7 @@ def tiled(values: Tensor, starts: Numbers) -> Tensor:
 
 
 def _columns_of(starts: Numbers, band: int) -> Tensor:
-    return torch.from_numpy(starts)[:, None].add(torch.arange(LANES)).clamp(max=band - 1)
+    return torch.from_numpy(starts)[:, None].add(torch.arange(LANES, device="cpu")).clamp(max=band - 1)
 
 
 def _floats(field: Tensor) -> npt.NDArray[np.float32]:

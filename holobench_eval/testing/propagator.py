@@ -100,7 +100,7 @@ def adjoint(model: Any, field: Tensor, at: Tensor) -> Tensor:
         raise NotApplicableError(f"no adjoint, and no gradient through {type(image).__module__.split('.')[0]}")
     light.requires_grad_()
     try:
-        image = _forward(model, light)
+        image = _forward(model, light.clone())
     except RuntimeError as error:
         if "requires grad" not in str(error):
             raise

@@ -1,5 +1,7 @@
 """The compiled kernel against torch's transforms, and what happens without it."""
 
+import copy
+import pickle
 import subprocess
 import sys
 
@@ -74,6 +76,25 @@ def test_a_field_that_is_larger_than_the_transfer_function_is_refused(shape):
         transfer_function(white(60, 60)).convolve(white(*shape))
 
 
+def test_a_model_can_be_copied_and_sent_to_another_process():
+    model, field = AngularSpectrum((40, 40), 6.4e-6, 517e-9, 0.01), white(40, 40)
+    for other in (copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
+        assert torch.equal(other.forward(field), model.forward(field))
+
+
+def test_another_default_type_of_torch_changes_nothing():
+    expected = transfer_function(white(60, 60, seed=1)).convolve(white(30, 30))
+    torch.set_default_dtype(torch.float64)
+    try:
+        assert torch.equal(transfer_function(white(60, 60, seed=1)).convolve(white(30, 30)), expected)
+    finally:
+        torch.set_default_dtype(torch.float32)
+
+
+def test_an_empty_batch_stays_empty():
+    assert transfer_function(white(60, 60)).convolve(white(0, 30, 30)).shape == (0, 30, 30)
+
+
 def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
     monkeypatch.setattr(transfer, "SMALLEST_SHARED", 0)
     function, field, found = transfer_function(white(150, 160, seed=1)), white(3, 70, 81), []
@@ -126,10 +147,11 @@ def test_the_model_is_the_same_with_the_kernel_and_without(monkeypatch):
     assert relative(with_kernel.adjoint(field), without.adjoint(field)) < 1e-6
 
 
-def test_a_machine_without_the_compiler_propagates_by_torch():
-    code = """
-import sys
-sys.modules["numba"] = None
+@pytest.mark.parametrize("without", ['sys.modules["numba"] = None', 'os.environ["NUMBA_DISABLE_JIT"] = "1"'])
+def test_a_machine_without_the_compiler_propagates_by_torch(without):
+    code = f"""
+import os, sys
+{without}
 import torch
 from holobench_eval.optics import AngularSpectrum
 model = AngularSpectrum((64, 64), 6.4e-6, 517e-9, 0.01)

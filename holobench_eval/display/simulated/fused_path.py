@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 import torch
@@ -16,12 +15,12 @@ from .path import LightPath, OpticalPath
 
 def quickest(path: OpticalPath, device: torch.device) -> LightPath:
     """The path on a device: by the kernel where it can be."""
-    fused, samples = kernel(), len(path.rows)
+    samples = len(path.rows)
     sizes = [factor * size for size in path.transfer.shape for factor in (1, samples, path.finer)]
     ready = device.type == "cpu" and path.transfer.dtype == torch.complex64
-    if fused is None or not ready or None in map(steps, sizes) or path.transfer.shape[1] < 2 * LANES:
+    if kernel() is None or not ready or None in map(steps, sizes) or path.transfer.shape[1] < 2 * LANES:
         return path.to(device)
-    return FusedPath(fused, path)
+    return FusedPath(path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +42,7 @@ class FusedPath:
     transfer function. Those of the others differ by a phase that the finer grid gives, and by a constant, ``turn``.
     """
 
-    def __init__(self, fused: ModuleType, path: OpticalPath) -> None:
+    def __init__(self, path: OpticalPath) -> None:
         height, width = path.shape
         samples, n = len(path.rows), path.finer
         turn = (path.rows[:, 0] / path.rows[0, 0])[:, None] * (path.columns[:, 0] / path.columns[0, 0])
@@ -66,7 +65,7 @@ class FusedPath:
             assert columns is not None
             band, low = through.shape[1], (through.shape[1] + 1) // 2
             placed = np.where(starts < low, starts, starts + (factor - 1) * band)
-            return Grid(fused, (planes, *shape), rows, columns, placed)
+            return Grid((planes, *shape), rows, columns, placed)
 
         def side(planes: int, factor: int, shape: tuple[int, int], starts: Numbers, end: Tensor) -> _Side:
             plane = grid(1, 1, path.shape, starts)
@@ -93,7 +92,7 @@ class FusedPath:
     def _pass(self, field: Tensor, source: _Side, target: _Side, seen: Tensor, conjugated: bool) -> Tensor:
         """Light that passes the dust as if there were none, and what the dust changes of it, in ``seen``."""
         spectra, tiles = source.grid.tiles(), target.grid.tiles()
-        source.grid.spectra(field.contiguous().resolve_conj(), spectra, source.grid.blocks())
+        source.grid.spectra(field.contiguous().resolve_conj().resolve_neg(), spectra, source.grid.blocks())
         if self._change is not None:
             every, other = np.arange(len(source.plane.starts)), np.arange(len(target.plane.starts))
             before, behind = source.plane.tiles(), target.plane.tiles().zero_()

@@ -176,7 +176,7 @@ class SimulatedBench:
         drive = phase.detach().contiguous().numpy(), maps.added.numpy(), maps.lut_gain.numpy()
         share = self.crosstalk.numpy(), self.modulated[:, :, 0, 0].numpy()
         light = maps.amplitude.numpy(), maps.angle.numpy()
-        field = torch.empty((self.samples, self.samples, *phase.shape), dtype=torch.complex64)
+        field = torch.empty((self.samples, self.samples, *phase.shape), dtype=torch.complex64, device="cpu")
         parts = torch.view_as_real(field).flatten(-2).numpy()
 
         def modulate(rows: slice) -> None:
@@ -227,7 +227,10 @@ class SimulatedBench:
 
     def photograph(self, phase: Tensor, exposure: Sequence[float], draw: torch.Generator) -> Capture:
         """One colour-sequential capture of ``phase`` ``(C, H, W)`` [rad]."""
-        sensor, frames = self.profile.sensor, torch.empty((len(phase), *self.response.shape))
+        sensor, frames = (
+            self.profile.sensor,
+            torch.empty((len(phase), *self.response.shape), dtype=torch.float32, device="cpu"),
+        )
         phase = phase.to(self.device)
         for channel, frame in enumerate(frames):
             light = self.integrated(phase[channel], channel, self.profile.flicker.gain(draw))

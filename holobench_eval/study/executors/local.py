@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, forkserver, get_all_start_methods, get_context, parent_process
 from multiprocessing.connection import Connection
@@ -18,10 +20,10 @@ R = TypeVar("R")
 
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 ATTEMPTS = 2  # of a job whose worker dies: a second loss is the job's fault
-# By the process that workers are forked from, which computes nothing; what cannot be imported is left out. torch's
-# optimisers import its compiler, which takes more than a second.
-PRELOADED = ["holobench_eval.study.run", "holobench_eval.optics.fused", "torch._dynamo"]
-FORKS = "forkserver" in get_all_start_methods()  # not on Windows, where every worker imports on its own
+# By the process that workers are forked from.
+PRELOADED = ["holobench_eval.study.run", "holobench_eval.study.executors.imported"]
+# Not on Windows, nor where libraries of the system do not bear a fork: every worker imports on its own there.
+FORKS = "forkserver" in get_all_start_methods() and sys.platform != "darwin"
 _CONTEXT = get_context("forkserver") if FORKS else get_context("spawn")
 
 
@@ -72,7 +74,8 @@ class _Worker(Generic[J]):
         self.channel, theirs = _CONTEXT.Pipe()
         self.process = _CONTEXT.Process(target=_serve, args=(theirs, *self.start), daemon=True)
         prepare()
-        self.process.start()
+        with _one_thread():
+            self.process.start()
         theirs.close()
 
     def take(self, job: J) -> None:
@@ -117,8 +120,16 @@ def _serve(channel: Connection, function: Callable[[Any], Any], environment: dic
         try:
             result = function(job)
         except Exception as error:
-            result = error
+            result = _sendable(error)
         channel.send(result)
+
+
+def _sendable(error: Exception) -> Exception:
+    """An exception that arrives: not all that can be pickled can be read again."""
+    try:
+        return pickle.loads(pickle.dumps(error)) and error
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
 
 
 def one_gpu(number: int, gpus: int) -> str:
@@ -138,9 +149,21 @@ def prepare() -> None:
     """Start the process that workers are forked from, where it does not run; its imports take more than a second."""
     if not FORKS:
         return
-    before = dict(os.environ)
-    os.environ.update(ONE_THREAD)
     _CONTEXT.set_forkserver_preload(PRELOADED)
-    forkserver.ensure_running()
-    os.environ.clear()
-    os.environ.update(before)
+    with _one_thread():
+        forkserver.ensure_running()
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Libraries that a process imports as it starts have one thread each."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -88,7 +88,7 @@ def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
     scale = pixels * per_pixel / grid.new_tensor([columns - 1.0, rows - 1.0])
     fine = grid if per_pixel == 1 else (grid + 1) * scale - 1
     if usable(image):
-        seen = torch.empty(grid.shape[:2])
+        seen = torch.empty(grid.shape[:2], dtype=torch.float32, device="cpu")
         sample_rows(image.detach().contiguous().numpy(), fine.contiguous().numpy(), seen.numpy())
         return seen
     if image.requires_grad and not image.is_cpu:

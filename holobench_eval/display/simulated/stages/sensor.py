@@ -108,7 +108,7 @@ class Sensor(Stage):
         numbers = (self.read_noise**2, bend, self.counts_per_electron, self.dark, self.white)
         if not usable(light):
             return torch.from_numpy(counts(planes[1] * (planes[0] * electrons + ambient), planes[2], *numbers))
-        counted = torch.empty(light.shape)
+        counted = torch.empty(light.shape, dtype=torch.float32, device="cpu")
         count_rows(*planes, electrons, ambient, numbers, counted.numpy())
         return counted
 

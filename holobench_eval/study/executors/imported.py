@@ -1,0 +1,9 @@
+"""What workers need beside the package, imported before they are forked; nothing is computed here."""
+
+from contextlib import suppress
+
+from ...optics.transfer import kernel
+
+kernel()
+with suppress(ImportError):
+    import torch._dynamo  # by torch's optimisers at their first use, which takes more than a second
