@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from ..core.allocator import LARGEST_KEPT
+from ..core.compiled import AVAILABLE
 from .blocks import in_blocks, in_parts
 from .sizes import LANES, Steps, steps
 
@@ -55,13 +56,13 @@ def transfer_function(values: Tensor) -> TransferFunction:
 @cache
 def kernel() -> ModuleType | None:
     """The compiled kernel; None where its compiler is not installed or does not work."""
+    if not AVAILABLE:
+        return None
     try:
-        from numba import config
-
         from . import fused
     except Exception:  # whatever a compiler raises that does not know the processor, or has no folder to write to
         return None
-    return None if config.DISABLE_JIT else fused
+    return fused
 
 
 class Fused:
