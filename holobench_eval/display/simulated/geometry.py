@@ -15,6 +15,8 @@ class Geometry:
     """One colour channel of a bench: shape (H, W) [px], pitch, wavelength and nominal distance [m], and its seed.
 
     samples: sub-samples per pixel and axis at the panel. seed: names that every fixed random pattern hangs from.
+    blaze: (vertical, horizontal) cycles per pixel that the optical axis follows; detuning: of the wavelength from the
+    one that axis and panel are set for [m].
     """
 
     shape: tuple[int, int]
@@ -24,6 +26,8 @@ class Geometry:
     samples: int
     channel: int
     seed: tuple[object, ...]
+    blaze: tuple[float, float] = (0.0, 0.0)
+    detuning: float = 0.0
 
     def generator(self, *names: object) -> torch.Generator:
         """Named random numbers of this bench, the same for every channel unless ``names`` hold the channel."""

@@ -91,7 +91,7 @@ class SimulatedBench:
         self.modulated = (order.modulated * active).view(grid).to(device)
         self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid)
         geometries = [
-            Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names)
+            Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names, panel.blaze)
             for index, wavelength in enumerate(panel.wavelengths)
         ]
         geometry = geometries[0]

@@ -30,6 +30,8 @@ from .stages import (
     Propagation,
     Relay,
     Sensor,
+    Spectrum,
+    StrayLight,
     ZeroOrder,
 )
 
@@ -75,12 +77,14 @@ class Profile:
     crosstalk: Crosstalk = Crosstalk()
     aperture: PixelAperture | None = None
     flicker: Flicker = Flicker()
+    spectrum: Spectrum = Spectrum()
     illumination: Illumination = Illumination()
     coherent_noise: CoherentNoise = CoherentNoise()
     propagation: Propagation = field(default_factory=Propagation)
     eye: Eye = Eye()
     zero_order: ZeroOrder = ZeroOrder()
     dust_plane: DustPlane = field(default=DustPlane(), metadata={"key": False})
+    stray_light: StrayLight = StrayLight()
     relay: Relay = Relay()
     sensor: Sensor = Sensor()
     drift: Drift = Drift()
@@ -180,4 +184,8 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
         levels = 2**profile.panel.bits
         message = f"the table has {len(profile.lut.table)} entries; a panel of {profile.panel.bits} bits has {levels}"
         raise document.error(("lut", "table"), message)
+    spectra, colours = len(profile.spectrum.measured), len(profile.panel.wavelengths)
+    if spectra not in (0, colours):
+        message = f"there are {spectra} measured spectra; the panel has {colours} wavelengths"
+        raise document.error(("spectrum", "measured"), message)
     return replace(profile, digest=hashlib.sha256(document.text.encode()).hexdigest())

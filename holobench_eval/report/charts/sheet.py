@@ -27,7 +27,7 @@ from ...study.opening import open_bench
 
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1
-MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.035, "top": 0.925, "wspace": 0.46, "hspace": 0.27}
+MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.05, "top": 0.92, "wspace": 0.46, "hspace": 0.27}
 STEPS = 60  # of the hologram of the chart: it shows what the bench does, not what the method can
 
 
@@ -56,11 +56,11 @@ def save_sheet(workbench: CalibratedBench, note: str, path: Path, source: str = 
     """
     bench = workbench.bench
     with plt.rc_context({"font.size": 9, "axes.titlesize": 10}):
-        figure, axes = plt.subplots(4, 4, figsize=(17, 15.5))
+        figure, axes = plt.subplots(3, 6, figsize=(25, 12))
         figure.subplots_adjust(**MARGINS)  # a layout engine draws everything once more
         _panel_stages(axes.flat[:6], bench)
-        _field_stages(axes.flat[6:12], bench)
-        _chart(axes.flat[12:], workbench)
+        _field_stages(axes.flat[6:14], bench)
+        _chart(axes.flat[14:], workbench)
     figure.suptitle(f"{bench.profile.name}, version {bench.profile.version}: {bench.profile.description}\n{note}")
     path.parent.mkdir(parents=True, exist_ok=True)
     known = {"Software": None, **({"Description": source} if source else {})}
@@ -128,8 +128,10 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
 
 
 def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
-    """Illumination, dirt, pupil with aberration, zero order, sensor response."""
+    """Spectrum, illumination, dirt, pupil with aberration, stray light, sensor response."""
     profile, maps = bench.profile, bench.channels[GREEN]
+    _spectrum(axes[0], bench)
+    axes = axes[1:]
     light = profile.illumination.panel(maps.geometry)
     _picture(axes[0], light.abs(), "illumination amplitude, green", "relative amplitude")
     _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
@@ -149,8 +151,30 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
         extent=(-0.5, 0.5, 0.5, -0.5),
         axes=("horizontal [cycles / px]", "vertical [cycles / px]"),
     )
-    response = bench.response
-    _picture(axes[5], response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
+    _veil(axes[5], bench)
+    _picture(axes[6], bench.response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
+
+
+def _spectrum(axis: Axes, bench: SimulatedBench) -> None:
+    """The wavelengths of each colour, as offsets from the nominal one; the colours a little apart."""
+    offsets = [torch.tensor([1e9 * line.geometry.detuning for line in lines]) for lines in bench.lines]
+    apart = 0.01 * float(torch.cat(offsets).abs().max().clamp_min(1))
+    for number, (places, lines) in enumerate(zip(offsets, bench.lines, strict=True)):
+        powers = [line.laser_power for line in lines]
+        axis.vlines((places + (number - 1) * apart).tolist(), 0, powers, color=COLOURS[number], linewidth=2)
+    axis.set(title="spectrum of the source", xlabel="offset from the nominal wavelength [nm]", ylabel="power of a line")
+
+
+def _veil(axis: Axes, bench: SimulatedBench) -> None:
+    """What stray light makes of a bright half of the image, along one row."""
+    stage, (height, width) = bench.profile.stray_light, bench.spec.shape
+    half = torch.zeros(height, width)
+    half[:, width // 2 :] = 1
+    row = stage.image(half, bench.profile, bench.channels[GREEN].geometry)[height // 2]
+    axis.plot(torch.arange(width), half[height // 2], "k:", label="without")
+    axis.plot(torch.arange(width), row, label="with")
+    axis.set(title=f"stray light, {100 * stage.share:g} %", xlabel="column [px]", ylabel="relative intensity")
+    axis.legend(fontsize=8)
 
 
 def _chart(axes: list[Axes], workbench: CalibratedBench) -> None:

@@ -11,6 +11,8 @@ from .panel import Panel
 from .propagation import Propagation
 from .relay import Relay
 from .sensor import Sensor
+from .spectrum import Spectrum
+from .stray_light import StrayLight
 
 __all__ = [
     "AddedLens",
@@ -27,5 +29,7 @@ __all__ = [
     "Propagation",
     "Relay",
     "Sensor",
+    "Spectrum",
+    "StrayLight",
     "ZeroOrder",
 ]

@@ -47,9 +47,10 @@ class LookUpTable(Stage):
             yield Effect("gain_map", f"stroke uneven over the panel, {percent(self.variation)} rms, smooth")
 
     def gain_map(self, geometry: Geometry) -> Tensor:
-        """The gain ``(H, W)`` of the panel for a channel."""
+        """The gain ``(H, W)`` of the panel for a wavelength: the same path is less phase of a longer one."""
         ripple = self.variation * geometry.smooth_map(2.0, "look-up gain")
-        return (self.gain[geometry.channel] * (1 + ripple)).float()
+        stroke = self.gain[geometry.channel] * (1 - geometry.detuning / geometry.wavelength)
+        return (stroke * (1 + ripple)).float()
 
     def phase(self, level: Tensor, bits: int, gain: Tensor, channel: int) -> Tensor:
         """Phase [rad] of gray levels ``(..., H, W)``; differentiable in the level."""

@@ -1,0 +1,64 @@
+"""Light that is scattered on its way arrives as a veil over the image (paper 5.1, Fig. 4C)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from ..geometry import Geometry
+from ..stage import Effect, Stage, percent
+
+if TYPE_CHECKING:
+    from ..profile import Profile
+
+
+@dataclass(frozen=True)
+class StrayLight(Stage):
+    """A share of the light arrives spread by a Gaussian, and adds in intensity; its total stays.
+
+    share: of the light; reach: standard deviation of the Gaussian in panel heights. A fine checkerboard keeps a
+    contrast of ``(1 - share / 2) / (share / 2)``. What is scattered beyond the image is lost.
+    """
+
+    title: ClassVar[str] = "stray light"
+    model: ClassVar[str] = "a share of the light scattered over a broad Gaussian, adding in intensity (paper Fig. 4C)"
+
+    share: Annotated[float, Interval(ge=0, le=1)] = 0.0
+    reach: Annotated[float, Interval(ge=0.01, le=10)] = 0.1
+
+    def effects(self, profile: Profile) -> Iterator[Effect]:
+        """Its share and reach."""
+        if self.share:
+            text = f"{percent(self.share)} of the light scattered over {self.reach:g} panel heights"
+            yield Effect("stray_light", text)
+
+    def image(self, light: Tensor, profile: Profile, geometry: Geometry) -> Tensor:
+        """The light with its veil."""
+        if not self.share:
+            return light
+        spread = self.reach * light.shape[-2]
+        return (1 - self.share) * light + self.share * gaussian(light, spread)
+
+
+def gaussian(light: Tensor, spread: float) -> Tensor:
+    """An image ``(H, W)`` convolved with a Gaussian of standard deviation ``spread`` [samples]; dark around it.
+
+    The Gaussian is two narrower ones in a row, and one every that many samples of them is enough: the error is
+    2e-4 of the Gaussian's height, since the trapezoidal rule converges exponentially for it.
+    """
+    rows, columns = (_narrower(side, spread / math.sqrt(2), light) for side in light.shape)
+    return rows.T @ (rows @ light @ columns.T) @ columns
+
+
+def _narrower(side: int, spread: float, like: Tensor) -> Tensor:
+    """Gaussians ``(centres, side)``, one every ``spread`` samples, as far beyond the ends as they reach."""
+    places = torch.arange(side, dtype=torch.float64)
+    centres = torch.arange(-4 * spread, side + 4 * spread, spread, dtype=torch.float64)
+    gaussians = torch.exp(-((places - centres[:, None]) ** 2) / (2 * spread**2))
+    return (gaussians / math.sqrt(2 * math.pi * spread)).to(like)

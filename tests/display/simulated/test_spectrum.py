@@ -1,0 +1,116 @@
+"""Wavelengths of the source add in intensity, and the blaze turns each of them away by its grating equation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.display import Profile, load_profile
+from holobench_eval.display.simulated.geometry import Geometry
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.display.simulated.stages import Illumination, LookUpTable, Spectrum
+from holobench_eval.optics.angular_spectrum import AngularSpectrum
+
+BLAZE, DISTANCE = (0.0, 0.25), 0.06
+
+
+def measured(*lines: tuple[float, float]) -> Spectrum:
+    return Spectrum(measured=(lines,) * 3)
+
+
+def blazed(profile: Profile, spectrum: Spectrum, **stages: object) -> SimulatedBench:
+    panel = replace(profile.panel, blaze=BLAZE, distance=DISTANCE)
+    return SimulatedBench(replace(profile, panel=panel, spectrum=spectrum, **stages))
+
+
+def centre(light: Tensor) -> float:
+    """Column of the centroid of an image."""
+    return float((light.sum(0) * torch.arange(light.shape[1])).sum() / light.sum())
+
+
+def test_a_line_has_its_width_and_all_its_power(geometry: Geometry) -> None:
+    lines = Spectrum(width=(3e-9, 2e-9, 1e-9), lines=5).spectrum(geometry)
+    assert sum(share for share, _ in lines) == pytest.approx(1)
+    variance = sum(share * (line.wavelength - geometry.wavelength) ** 2 for share, line in lines)
+    assert variance**0.5 * 2.3548 == pytest.approx(2e-9, rel=1e-4)  # green
+    assert lines[0][1].wavelength == pytest.approx(geometry.wavelength, abs=1e-15)
+
+
+def test_a_measured_spectrum_is_taken_as_it_is(geometry: Geometry) -> None:
+    lines = measured((1e-9, 3.0), (0.0, 1.0)).spectrum(geometry)
+    assert [(share, round(1e9 * line.detuning, 6)) for share, line in lines] == [(0.25, 0.0), (0.75, 1.0)]
+
+
+def test_a_blazed_beam_of_another_wavelength_lands_where_full_propagation_puts_it(ideal: Profile) -> None:
+    offset, beam = 5e-9, Illumination(beam_sigma=0.15)
+    nominal, long = (
+        blazed(ideal, measured((d, 1.0)), illumination=beam).intensity(torch.zeros(ideal.panel.shape), 1)
+        for d in (0.0, offset)
+    )
+    # independently: the same beam with its carrier, on a panel that is large enough, without any re-centring
+    rows, columns, wavelength = 96, 768, ideal.panel.wavelengths[1]
+    y, x = torch.arange(rows)[:, None] - 47.5, torch.arange(columns) - 383.5
+    carried = torch.exp(-(y**2 + x**2) / (2 * (0.15 * 96) ** 2)) * torch.exp(2j * torch.pi * BLAZE[1] * x)
+    seen = [
+        AngularSpectrum((rows, columns), ideal.panel.pitch, wavelength + d, DISTANCE).forward(carried).abs().square()
+        for d in (0.0, offset)
+    ]
+    moved = centre(seen[1]) - centre(seen[0])
+    assert moved == pytest.approx(DISTANCE * offset * BLAZE[1] / ideal.panel.pitch**2, rel=0.01)
+    assert centre(long) - centre(nominal) == pytest.approx(moved, rel=0.02)
+
+
+def test_without_a_blaze_a_narrow_line_changes_almost_nothing(ideal: Profile, phase: Tensor) -> None:
+    narrow = replace(ideal, spectrum=Spectrum(width=(1e-9,) * 3))
+    single, broad = (SimulatedBench(profile).intensity(phase[1], 1) for profile in (ideal, narrow))
+    assert 0 < float((broad - single).norm() / single.norm()) < 0.02
+
+
+def test_a_wavelength_that_the_blaze_turns_by_three_pixels_gives_almost_the_same_speckle_three_pixels_aside(
+    ideal: Profile,
+) -> None:
+    phase = 6 * torch.rand(ideal.panel.shape, generator=torch.Generator().manual_seed(1))
+    pixels = 3 * ideal.panel.pitch**2 / (DISTANCE * BLAZE[1])
+    nominal, long = (blazed(ideal, measured((d, 1.0))).intensity(phase, 1) for d in (0.0, pixels))
+
+    def alike(columns: int) -> float:
+        return float(torch.corrcoef(torch.stack([long, nominal.roll(columns, 1)])[..., 8:-8].flatten(1))[0, 1])
+
+    assert max(range(-6, 7), key=alike) == 3
+    assert alike(3) > alike(0) + 0.1
+
+
+def test_the_stroke_of_the_panel_falls_with_the_wavelength(geometry: Geometry) -> None:
+    ((_, long),) = measured((0.1 * geometry.wavelength, 1.0)).spectrum(geometry)
+    assert torch.allclose(LookUpTable().gain_map(long), torch.tensor(1 / 1.1))
+
+
+def test_light_of_all_lines_keeps_the_power(ideal: Profile, phase: Tensor) -> None:
+    single, broad = (
+        SimulatedBench(replace(ideal, spectrum=spectrum)).intensity(phase[1], 1)
+        for spectrum in (Spectrum(), Spectrum((5e-9,) * 3, lines=5))
+    )
+    assert float(broad.sum()) == pytest.approx(float(single.sum()), rel=1e-2)
+
+
+def test_the_effect_is_listed_with_its_width_and_what_the_blaze_makes_of_it(ideal: Profile) -> None:
+    assert "spectrum" not in {effect.name for effect in ideal.effects()}
+    panel = replace(ideal.panel, blaze=(0.0, 0.25), distance=0.1, pitch=6.4e-6)
+    listed = replace(ideal, panel=panel, spectrum=measured((-1e-9, 1.0), (1e-9, 1.0))).effects()
+    text = next(effect.text for effect in listed if effect.name == "spectrum")
+    assert "2/2/2 nm" in text
+    assert f"{2e-9 * 0.1 * 0.25 / 6.4e-6**2:.2g} px" in text
+
+
+def test_a_spectrum_for_too_few_colours_is_refused_with_its_place(tmp_path: Path) -> None:
+    ideal = files("holobench_eval.display.simulated") / "profiles" / "ideal.yaml"
+    file = tmp_path / "mine.yaml"
+    file.write_text(ideal.read_text() + "\nspectrum: {measured: [[[0.0, 1.0]]]}\n")
+    with pytest.raises(UserError, match=r"mine.yaml:\d+:\d+: there are 1 measured spectra; the panel has 3"):
+        load_profile(str(file))
