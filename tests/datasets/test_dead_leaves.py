@@ -87,3 +87,17 @@ def test_colours_vary_within_an_image():
 @pytest.mark.parametrize("shape", [(1, 1), (3, 50), (50, 3)])
 def test_tiny_shapes_work(shape):
     assert DeadLeaves().load("leaves-000", shape).shape == (3, *shape)
+
+
+def test_natural_colours_have_the_brightness_of_photographs():
+    """Over pixels and images: the mean and the deviation of ImageNet, but for what is clipped."""
+    dataset = DeadLeaves(count=12, colours="natural")
+    pixels = torch.stack([srgb_encode(dataset.load(item, (96, 96))) for item in dataset.items()]).transpose(0, 1)
+    assert torch.allclose(pixels.mean((1, 2, 3)), torch.tensor([0.485, 0.456, 0.406]), atol=0.04)
+    assert torch.allclose(pixels.std((1, 2, 3)), torch.tensor(0.22), atol=0.03)
+
+
+def test_colours_are_part_of_an_images_identity():
+    digests = [DeadLeaves(colours=colours).digest("leaves-000") for colours in ("uniform", "natural")]
+    assert digests[0] != digests[1]
+    assert digests[0] == "8df7378f2cb38108140d7a458c4ee9d2c17c8515fc4bd9068803514731a9d72c"  # as before there were two
