@@ -38,15 +38,11 @@ class Objective:
         """Loss ``(B,)`` and gradient ``(B, H, W)`` at a phase ``(B, H, W)`` [rad].
 
         For E = P(exp(i phi)) and I = |E|^2, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
-        and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)). dL/dI alone is left to autograd.
+        and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)).
         """
         light = PhasePropagation(self.model, self.region, phase)  # E
-        intensity = light.intensity().requires_grad_()  # I
-        loss = self.loss(intensity, self.target)  # L
-        (slope,) = torch.autograd.grad(2 * loss.sum(), intensity)  # 2 dL/dI
-        light.field.mul_(slope)
-        del slope, intensity  # the adjoint takes the most memory
-        return loss.detach(), light.phase_gradient()
+        loss = light.weigh(self.loss, self.target)  # L; E becomes 2 (dL/dI) E
+        return loss, light.phase_gradient()
 
 
 @dataclass(frozen=True)
