@@ -35,6 +35,20 @@ def gradient_rows(field: Floats, phase: Floats, gradient: Floats) -> None:
             gradient[r, c] = cosine * field[r, 2 * c + 1] - sine * field[r, 2 * c]
 
 
+@compiled
+def adam_rows(
+    phase: Floats, gradient: Floats, mean: Floats, square: Floats, betas: Any, step: float, epsilon: float
+) -> None:
+    """A step of Adam on rows ``(rows, W)``; step and epsilon: with the corrections of both moments' bias."""
+    slow, slower = F(1 - betas[0]), F(1 - betas[1])
+    for r in range(phase.shape[0]):
+        for c in range(phase.shape[1]):
+            g = gradient[r, c]
+            mean[r, c] += slow * (g - mean[r, c])
+            square[r, c] += slower * (g * g - square[r, c])
+            phase[r, c] -= F(step) * mean[r, c] / (np.sqrt(square[r, c]) + F(epsilon))
+
+
 @compiled_sums
 def product_rows(image: Floats, corner: Any, target: Floats, first: int, last: int, sums: Any) -> None:
     """Sums of I T, I I and T T along rows ``first`` to ``last`` of a region, into ``(rows, 3)``.

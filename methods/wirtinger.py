@@ -116,14 +116,8 @@ class Wirtinger:
         return with_offset(phase, self.offset)
 
     def _adam(self, start: Tensor, objective: Objective) -> Tensor:
-        pixels = start.shape[-2] * start.shape[-1]
-
-        def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
-            loss, gradient = objective.evaluate(phase)
-            return loss, gradient * pixels
-
         decay = self.schedule == "cosine"
-        return adam(start, evaluate, self.iterations, self.step, decay=decay, done=self._done, fused=True)
+        return adam(start, objective.evaluate, self.iterations, self.step, decay=decay, done=self._done)
 
     def _done(self, loss: Tensor) -> bool:
         """Whether losses ``(B,)`` are small enough to stop; here never."""
