@@ -38,5 +38,6 @@ def compilable(*arrays: Tensor) -> bool:
 
 def floats(array: Tensor) -> Floats:
     """The memory of a contiguous array, real and imaginary parts in turn."""
-    found: Floats = (torch.view_as_real(array).flatten(-2) if array.is_complex() else array).numpy()
+    real = torch.view_as_real(array).flatten(-2) if array.is_complex() else array
+    found: Floats = real.detach().numpy()
     return found

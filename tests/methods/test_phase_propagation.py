@@ -100,3 +100,11 @@ def test_a_target_of_another_size_than_the_region_is_refused():
     phase, target = pair(REGIONS[1])
     with pytest.raises(RuntimeError, match="size"):
         step(phase, target[:, 1:], REGIONS[1])
+
+
+def test_a_phase_that_could_have_a_gradient_has_none_here():
+    phase, target = pair(REGIONS[1])
+    with torch.no_grad():
+        loss, gradient = step(phase.clone().requires_grad_(), target, REGIONS[1])
+    for one, other in zip((loss, gradient), step(phase, target, REGIONS[1]), strict=True):
+        assert torch.equal(one, other)
