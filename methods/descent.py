@@ -48,24 +48,29 @@ class Adam:
 
     BETAS, EPSILON = (0.9, 0.999), 1e-8
 
-    def __init__(self, phase: Tensor) -> None:
+    def __init__(self, phase: Tensor, rate: float) -> None:
         self._phase, self._epsilon = phase, self.EPSILON / (phase.shape[-2] * phase.shape[-1])
-        self._steps = 0
+        self._rate, self._steps, self._in_torch = rate, 0, None
         if compilable(phase):
             self._moments = torch.zeros_like(phase), torch.zeros_like(phase)
-            self._in_torch = None
         else:
-            self._in_torch = torch.optim.Adam([phase], betas=self.BETAS, eps=self._epsilon, fused=True)
+            self._in_torch = torch.optim.Adam([phase], rate, self.BETAS, self._epsilon, fused=True)
 
-    def step(self, gradient: Tensor, rate: float) -> None:
-        """One step by a gradient; rate [rad]."""
+    def set_rate(self, rate: float) -> None:
+        """The rate [rad] from the next step on."""
+        self._rate = rate
         if self._in_torch is not None:
-            self._phase.grad, self._in_torch.param_groups[0]["lr"] = gradient, rate
+            self._in_torch.param_groups[0]["lr"] = rate
+
+    def step(self, gradient: Tensor) -> None:
+        """One step by a gradient ``(..., H, W)``."""
+        if self._in_torch is not None:
+            self._phase.grad = gradient
             self._in_torch.step()
             return
         self._steps += 1
         first, second = (1 - beta**self._steps for beta in self.BETAS)  # the moments begin at zero
-        step, epsilon = rate * math.sqrt(second) / first, self._epsilon * math.sqrt(second)
+        step, epsilon = self._rate * math.sqrt(second) / first, self._epsilon * math.sqrt(second)
         rows = [floats(array.flatten(0, -2)) for array in (self._phase, gradient.contiguous(), *self._moments)]
 
         def work(some: slice) -> None:
@@ -96,13 +101,15 @@ def adam(
     tensor(1.)
     """
     phase, best = start.detach().clone(), Best(start)
-    optimiser = Adam(phase)
+    optimiser = Adam(phase, step)
     for iteration in range(iterations):
+        if decay:
+            optimiser.set_rate(cosine_decay(step, iteration / iterations))
         loss, gradient = evaluate(phase)
         best.update(loss, phase)
         if done(loss):
             break
-        optimiser.step(gradient, cosine_decay(step, iteration / iterations) if decay else step)
+        optimiser.step(gradient)
     return best.phase
 
 

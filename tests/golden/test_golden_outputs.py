@@ -78,8 +78,8 @@ def _other_step(patch: pytest.MonkeyPatch) -> None:
             super().__init__(params, lr=1.01 * lr, **more)
 
     patch.setattr(torch.optim, "Adam", Faster)
-    step = descent.Adam.step
-    patch.setattr(descent.Adam, "step", lambda self, gradient, rate: step(self, gradient, 1.01 * rate))
+    begin = descent.Adam.__init__
+    patch.setattr(descent.Adam, "__init__", lambda self, phase, rate: begin(self, phase, 1.01 * rate))
 
 
 @pytest.mark.parametrize(
