@@ -32,7 +32,8 @@ class Bench(Protocol):
 
 def per_channel(target: Tensor, solve_channel: Callable[[Tensor, int], Tensor]) -> Tensor:
     """Solve the colours of ``(B, C, h, w)`` one after the other (each has its wavelength), to ``(B, C, H, W)``."""
-    return torch.stack([solve_channel(target[:, channel], channel) for channel in range(target.shape[1])], dim=1)
+    colours = enumerate(target.unbind(1))
+    return torch.stack([solve_channel(colour.contiguous(), channel) for channel, colour in colours], dim=1)
 
 
 def nominal_model(bench: Bench, channel: int, like: Tensor) -> AngularSpectrum:

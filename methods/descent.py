@@ -9,9 +9,12 @@ from dataclasses import InitVar, dataclass, field
 import torch
 from torch import Tensor
 
-# Phase (B, H, W) [rad] to the loss (B,) and its gradient (B, H, W) times the pixels of the panel: a factor that keeps
-# it far above Adam's epsilon, whatever the panel's size.
+from ..optics.blocks import in_blocks
+from . import kernels
+from .rows import compilable, floats
+
 Evaluate = Callable[[Tensor], tuple[Tensor, Tensor]]
+"""Phase ``(B, H, W)`` [rad] to the loss ``(B,)`` and its gradient ``(B, H, W)``."""
 
 
 @dataclass
@@ -30,10 +33,51 @@ class Best:
         """Keep ``phase`` ``(B, H, W)`` where ``loss`` ``(B,)`` is the least so far."""
         better = loss < self.loss
         if better.all():
-            self.phase.copy_(phase.detach())
+            lines, kept, seen = phase.shape[-2], self.phase, phase.detach()
+            in_blocks(lambda rows: kept[..., rows, :].copy_(seen[..., rows, :]), kept, lines, kept.numel())
         else:
             self.phase[better] = phase.detach()[better]
         self.loss = torch.where(better, loss.detach(), self.loss)
+
+
+class Adam:
+    """Adam's steps on a phase ``(..., H, W)`` [rad], in place: Kingma & Ba, ICLR 2015, with its constants.
+
+    Its epsilon is divided by the panel's pixels, as the slopes of a mean over pixels are.
+    """
+
+    BETAS, EPSILON = (0.9, 0.999), 1e-8
+
+    def __init__(self, phase: Tensor, rate: float) -> None:
+        self._phase, self._epsilon = phase, self.EPSILON / (phase.shape[-2] * phase.shape[-1])
+        self._rate, self._steps, self._in_torch = rate, 0, None
+        if compilable(phase):
+            self._moments = torch.zeros_like(phase), torch.zeros_like(phase)
+        else:
+            self._in_torch = torch.optim.Adam([phase], rate, self.BETAS, self._epsilon, fused=True)
+
+    def set_rate(self, rate: float) -> None:
+        """The rate [rad] from the next step on."""
+        self._rate = rate
+        if self._in_torch is not None:
+            self._in_torch.param_groups[0]["lr"] = rate
+
+    def step(self, gradient: Tensor) -> None:
+        """One step by a gradient ``(..., H, W)``."""
+        if self._in_torch is not None:
+            self._phase.grad = gradient
+            self._in_torch.step()
+            return
+        self._steps += 1
+        first, second = (1 - beta**self._steps for beta in self.BETAS)  # the moments begin at zero
+        step, epsilon = self._rate * math.sqrt(second) / first, self._epsilon * math.sqrt(second)
+        rows = [floats(array.flatten(0, -2)) for array in (self._phase, gradient.contiguous(), *self._moments)]
+
+        def work(some: slice) -> None:
+            phase, slope, mean, square = (array[some] for array in rows)
+            kernels.adam_rows(phase, slope, mean, square, self.BETAS, step, epsilon)
+
+        in_blocks(work, gradient, len(rows[0]), gradient.numel())
 
 
 def adam(
@@ -44,12 +88,11 @@ def adam(
     *,
     decay: bool = False,
     done: Callable[[Tensor], bool] = lambda loss: False,
-    fused: bool = False,
 ) -> Tensor:
     """The phase of the least loss that Adam sees on its way from ``start`` ``(B, H, W)`` [rad].
 
     step: its rate [rad], constant or (``decay``) falling to zero along half a cosine. done: whether losses ``(B,)`` are
-    small enough to stop. fused: one pass over the memory for all operations of a step, rounded otherwise.
+    small enough to stop.
 
     Examples
     --------
@@ -58,16 +101,15 @@ def adam(
     tensor(1.)
     """
     phase, best = start.detach().clone(), Best(start)
-    optimiser = torch.optim.Adam([phase], lr=step, fused=fused)
+    optimiser = Adam(phase, step)
     for iteration in range(iterations):
+        if decay:
+            optimiser.set_rate(cosine_decay(step, iteration / iterations))
         loss, gradient = evaluate(phase)
         best.update(loss, phase)
         if done(loss):
             break
-        phase.grad = gradient
-        if decay:
-            optimiser.param_groups[0]["lr"] = cosine_decay(step, iteration / iterations)
-        optimiser.step()
+        optimiser.step(gradient)
     return best.phase
 
 
@@ -77,7 +119,7 @@ def by_autograd(loss: Callable[[Tensor], Tensor]) -> Evaluate:
     def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
         phase = phase.detach().requires_grad_()
         losses = loss(phase)
-        (gradient,) = torch.autograd.grad(phase.shape[-2] * phase.shape[-1] * losses.sum(), phase)
+        (gradient,) = torch.autograd.grad(losses.sum(), phase)
         return losses.detach(), gradient
 
     return evaluate
