@@ -9,6 +9,8 @@ from dataclasses import InitVar, dataclass, field
 import torch
 from torch import Tensor
 
+from ..core.graphs import is_recorded, repeated
+
 # Phase (B, H, W) [rad] to the loss (B,) and its gradient (B, H, W) times the pixels of the panel: a factor that keeps
 # it far above Adam's epsilon, whatever the panel's size.
 Evaluate = Callable[[Tensor], tuple[Tensor, Tensor]]
@@ -28,12 +30,15 @@ class Best:
 
     def update(self, loss: Tensor, phase: Tensor) -> None:
         """Keep ``phase`` ``(B, H, W)`` where ``loss`` ``(B,)`` is the least so far."""
+        loss, phase = loss.detach(), phase.detach()
         better = loss < self.loss
-        if better.all():
-            self.phase.copy_(phase.detach())
+        if is_recorded(phase.device):
+            torch.where(better[:, None, None], phase, self.phase, out=self.phase)
+        elif better.all():  # half the time of the line above
+            self.phase.copy_(phase)
         else:
-            self.phase[better] = phase.detach()[better]
-        self.loss = torch.where(better, loss.detach(), self.loss)
+            self.phase[better] = phase[better]
+        self.loss.copy_(torch.where(better, loss, self.loss))
 
 
 def adam(
@@ -49,7 +54,8 @@ def adam(
     """The phase of the least loss that Adam sees on its way from ``start`` ``(B, H, W)`` [rad].
 
     step: its rate [rad], constant or (``decay``) falling to zero along half a cosine. done: whether losses ``(B,)`` are
-    small enough to stop. fused: one pass over the memory for all operations of a step, rounded otherwise.
+    small enough to stop. fused: one pass over the memory for all operations of a step, rounded otherwise; always on a
+    GPU, where iterations are recorded, see ``graphs.repeated``.
 
     Examples
     --------
@@ -58,16 +64,23 @@ def adam(
     tensor(1.)
     """
     phase, best = start.detach().clone(), Best(start)
-    optimiser = torch.optim.Adam([phase], lr=step, fused=fused)
-    for iteration in range(iterations):
-        loss, gradient = evaluate(phase)
+    recorded = is_recorded(start.device)
+    rate = start.new_full((), step, dtype=torch.float32) if recorded else step  # a recorded number would stay as it is
+    optimiser = torch.optim.Adam([phase], lr=rate, fused=fused or recorded, capturable=recorded)
+
+    def iterate() -> Tensor:
+        loss, phase.grad = evaluate(phase)
         best.update(loss, phase)
-        if done(loss):
-            break
-        phase.grad = gradient
-        if decay:
-            optimiser.param_groups[0]["lr"] = cosine_decay(step, iteration / iterations)
         optimiser.step()
+        return loss
+
+    repeat = repeated(iterate, start.device)
+    for iteration in range(iterations):
+        if decay:
+            now = cosine_decay(step, iteration / iterations)
+            optimiser.param_groups[0]["lr"] = rate.fill_(now) if isinstance(rate, Tensor) else now
+        if done(repeat()):
+            break
     return best.phase
 
 
