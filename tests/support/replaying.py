@@ -1,4 +1,4 @@
-"""A device that replays recorded operations as a CUDA graph does, on a computer that has none: its memory is the CPU's."""
+"""A device that replays recorded operations as a CUDA graph does; its memory is the CPU's."""
 
 from __future__ import annotations
 
