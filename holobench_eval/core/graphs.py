@@ -1,6 +1,6 @@
 """Steps that a GPU repeats: recorded once as a CUDA graph and replayed.
 
-A step of a retrieval is some sixty operations, and Python starts each of them in about ten microseconds: on a fast GPU
+A step of a retrieval is some fifty operations, and Python starts each of them in about ten microseconds: on a fast GPU
 that takes longer than the work. A graph starts them all at once.
 """
 

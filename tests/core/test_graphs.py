@@ -9,7 +9,7 @@ from torch import Tensor
 
 from holobench_eval.core.device import CPU
 from holobench_eval.core.graphs import WARM_UP, is_recorded, repeated
-from tests.support.replaying import fake_device
+from tests.support.replaying import Traffic, fake_device
 
 
 class Count:
@@ -66,24 +66,34 @@ def test_on_the_cpu_it_is_the_step_itself() -> None:
 
 
 def test_a_step_is_recorded_once_and_each_call_is_one_step() -> None:
-    with fake_device() as counts:
+    with fake_device() as cuda:
         returned, count = after(7, Count.in_place)
     assert returned == RIGHT
-    assert counts == {"runs": WARM_UP + 1, "records": 1, "replays": 7 - WARM_UP - 1}
+    assert (cuda.watches, cuda.records, cuda.replays) == (1, 1, 7 - WARM_UP - 1)
     assert count.calls == WARM_UP + 2  # Python has run for the last time when the step was recorded
 
 
 @pytest.mark.parametrize("step", [Count.branching, Count.masked, Count.from_numbers])
 def test_a_step_that_waits_for_the_device_runs_as_it_is(step: Callable[[Count], Tensor]) -> None:
-    with fake_device() as counts:
+    with fake_device() as cuda:
         returned, _ = after(7, step)
     assert returned == RIGHT
-    assert counts["records"] == 0
+    assert (cuda.watches, cuda.records) == (1, 0)
+    assert cuda.get_sync_debug_mode() == 0
 
 
 def test_a_step_that_cannot_be_recorded_runs_as_it_is() -> None:
-    with fake_device(records=False):
+    with fake_device(records=False) as cuda:
         assert after(7, Count.in_place)[0] == RIGHT
+    assert cuda.replays == 0
+    assert cuda.current is cuda.usual
+
+
+@pytest.mark.parametrize("step", [Count.in_place, Count.branching])
+def test_streams_wait_for_each_other_around_every_run_on_another_one(step: Callable[[Count], Tensor]) -> None:
+    with fake_device() as cuda:
+        after(7, step)
+    assert cuda.waits == [("own", "usual"), ("usual", "own")] * (WARM_UP + 1)
 
 
 @pytest.mark.parametrize("step", [Count.elsewhere, Count.in_numpy])
@@ -99,3 +109,12 @@ def test_an_error_of_the_step_is_raised() -> None:
 
     with fake_device(), pytest.raises(ValueError, match="no light"):
         repeated(step, CPU)()
+
+
+def test_traffic_is_what_operations_read_and_write() -> None:
+    x = torch.zeros(10)  # 40 bytes
+    with Traffic() as traffic:
+        y = torch.empty(10)
+        torch.mul(x, 2, out=y).add_(x[:5].sum())
+        y.copy_(x)
+    assert traffic.bytes == (40 + 40) + (20 + 4) + (40 + 4 + 40) + (40 + 40)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import torch
 
-from holobench_eval.core import graphs, plugins
+from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU, moved
 from holobench_eval.display import CalibratedBench, load_profile
 from holobench_eval.display.learned import LearnedBench
@@ -27,7 +27,7 @@ from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
 from holobench_eval.optics import AngularSpectrum
 from tests.support.elsewhere import ELSEWHERE, Elsewhere
-from tests.support.replaying import Fake
+from tests.support.replaying import fake_device
 
 PANEL = (208, 208)  # the least whose region MS-SSIM is defined on
 SMALL = {"levels": 3, "width": 4}
@@ -152,17 +152,13 @@ def test_a_method_solves_where_its_target_is(ideal: CalibratedBench, name: str) 
 
 
 @pytest.mark.parametrize("name", ["wirtinger", "sgd", "multi_plane"])
-def test_iterations_to_be_recorded_run_where_their_target_is(
-    ideal: CalibratedBench, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    counts = {"runs": 0}
-    monkeypatch.setattr(graphs, "RECORDERS", {ELSEWHERE.type: lambda device: Fake(counts, records=False)})
+def test_iterations_to_be_recorded_run_where_their_target_is(ideal: CalibratedBench, name: str) -> None:
     method = plugins.build("methods", name, {"iterations": 5, "offset": "none"}, Path())
-    with Elsewhere():
+    with fake_device(ELSEWHERE.type, records=False) as cuda, Elsewhere():
         target = picture(ideal)
         phase = method.solve(target[None], ideal.for_method(method, name, target, "t", 0))
     assert phase.device == ELSEWHERE
-    assert counts["runs"] == 3 * (graphs.WARM_UP + 1)
+    assert cuda.watches == 3
 
 
 TRAINED: dict[str, dict[str, Any]] = {

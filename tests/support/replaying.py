@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from typing import Any
 
 import pytest
 import torch
@@ -19,7 +19,6 @@ from holobench_eval.imaging.shifts import correlate
 from holobench_eval.metrics import base
 from holobench_eval.optics import angular_spectrum, transfer
 
-T = TypeVar("T")
 aten = torch.ops.aten
 WAITING = {
     *(aten._local_scalar_dense.default, aten.equal.default, aten.nonzero.default, aten.masked_select.default),
@@ -27,6 +26,9 @@ WAITING = {
     aten.lift_fresh.default,  # a tensor of Python's numbers, which are copied to the device
 }
 """Operations after which the host knows a number of the device, or the size of a result that depends on one."""
+
+OVERWRITING = {aten.copy_.default, aten.zero_.default, aten.fill_.Scalar, aten.fill_.Tensor}
+"""Operations that do not read what they write to."""
 
 
 def tensors(values: object) -> list[Tensor]:
@@ -56,6 +58,25 @@ class Watch(TorchDispatchMode):
 
     def run(self, func: Any, args: Any, kwargs: Any) -> Any:
         return func(*args, **kwargs)
+
+
+class Traffic(TorchDispatchMode):
+    """Counts bytes that operations read and write, each argument and each result once, as if no cache kept any."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.bytes = 0
+
+    def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        kwargs = kwargs or {}
+        result = func(*args, **kwargs)
+        shared = {memory(tensor) for tensor in tensors((args, kwargs))}
+        read = tensors((args[1:] if func in OVERWRITING else args, {**kwargs, "out": None}))
+        changed = written(func, args, kwargs)
+        new = [tensor for tensor in tensors(result) if memory(tensor) not in shared]
+        if changed or (new and "empty" not in func.__name__):  # else a view, or room
+            self.bytes += sum(tensor.numel() * tensor.element_size() for tensor in read + changed + new)
+        return result
 
 
 @dataclass
@@ -105,48 +126,104 @@ class Tape(Watch):
                     old.copy_(value)
 
 
-@dataclass
-class Fake:
-    """The recorder of this device; it counts what it does."""
+class FakeStream:
+    """A stream that notes for which others it waits."""
 
-    counts: dict[str, int]
-    records: bool = True
-    tape: Tape = field(default_factory=Tape)
+    def __init__(self, name: str, waits: list[tuple[str, str]]) -> None:
+        self.name, self.waits = name, waits
 
-    def run(self, step: Callable[[], T], watched: bool = False) -> T:
-        self.counts["runs"] += 1
-        with Watch() if watched else nullcontext():
-            return step()
+    def wait_stream(self, other: FakeStream) -> None:
+        self.waits.append((self.name, other.name))
 
-    def record(self, step: Callable[[], T]) -> T:
-        if not self.records:
-            raise RuntimeError("this device does not record")
-        self.counts["records"] += 1
-        with self.tape:
-            result = step()
-        self.tape.undo()
-        return result
+
+class FakeCuda:
+    """What ``graphs`` uses of ``torch.cuda``, with the memory of the CPU; it counts.
+
+    records: whether a recording succeeds. Where one fails, its stream stays the current one, as in torch.
+    """
+
+    def __init__(self, records: bool = True) -> None:
+        self.succeeds, self.records, self.replays, self.watches = records, 0, 0, 0
+        self.waits: list[tuple[str, str]] = []
+        self.current = self.usual = FakeStream("usual", self.waits)
+        self._watch: Watch | None = None
+
+    def device(self, device: torch.device) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def new_stream(self) -> FakeStream:
+        return FakeStream("own", self.waits)
+
+    def new_graph(self) -> FakeGraph:
+        return FakeGraph(self)
+
+    def current_stream(self, device: torch.device) -> FakeStream:
+        return self.current
+
+    @contextmanager
+    def stream(self, stream: FakeStream) -> Iterator[None]:
+        before, self.current = self.current, stream
+        try:
+            yield
+        finally:
+            self.current = before
+
+    @contextmanager
+    def graph(self, graph: FakeGraph, stream: FakeStream) -> Iterator[None]:
+        self.current = stream
+        assert self._watch is None
+        try:
+            with graph.tape:
+                yield
+        finally:
+            graph.tape.undo()
+        if not self.succeeds:
+            raise RuntimeError("the recording has failed")
+        self.records += 1
+
+    def get_sync_debug_mode(self) -> int:
+        return 2 if self._watch else 0
+
+    def set_sync_debug_mode(self, mode: int | str) -> None:
+        if self._watch is not None:
+            self._watch.__exit__(None, None, None)
+        self._watch = Watch() if mode == "error" else None
+        if self._watch is not None:
+            self.watches += 1
+            self._watch.__enter__()
+
+
+class FakeGraph:
+    """A graph of the operations of a tape."""
+
+    def __init__(self, cuda: FakeCuda) -> None:
+        self.tape, self._cuda = Tape(), cuda
 
     def replay(self) -> None:
-        self.counts["replays"] += 1
+        assert self._cuda.current is self._cuda.usual
+        self._cuda.replays += 1
         self.tape.replay()
 
 
 @contextmanager
-def fake_device(records: bool = True) -> Iterator[dict[str, int]]:
-    """Let the CPU be such a device, or (``records``) one that fails to record; counts of runs, records and replays.
+def fake_device(kind: str = "cpu", records: bool = True) -> Iterator[FakeCuda]:
+    """Let a type of device be a GPU that records steps, or (``records``) one that fails to.
 
     What a GPU cannot run, compiled code and OpenCV, is hidden: it would work on the memory unseen.
     """
-    counts = dict.fromkeys(("runs", "records", "replays"), 0)
+    cuda = FakeCuda(records)
     caches = angular_spectrum._band_limited_transfer, angular_spectrum._cut_off_transfer, api._propagator
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(graphs, "RECORDERS", {"cpu": lambda device: Fake(counts, records)})
+        patch.setattr(graphs, "RECORDERS", {kind: graphs.CudaGraph})
+        for name in ("device", "current_stream", "stream", "graph", "get_sync_debug_mode", "set_sync_debug_mode"):
+            patch.setattr(torch.cuda, name, getattr(cuda, name))
+        patch.setattr(torch.cuda, "Stream", cuda.new_stream)
+        patch.setattr(torch.cuda, "CUDAGraph", cuda.new_graph)
         patch.setattr(compiled, "AVAILABLE", False)
         patch.setattr(transfer, "kernel", lambda: None)
         patch.setattr(base, "_opencv_filtered", lambda image, taps: correlate(correlate(image, taps, -1), taps, -2))
         for cache in caches:
             cache.cache_clear()
-        yield counts
+        yield cuda
     for cache in caches:  # what torch is to do here, the kernel does elsewhere
         cache.cache_clear()
