@@ -55,7 +55,8 @@ def adam(
 
     step: its rate [rad], constant or (``decay``) falling to zero along half a cosine. done: whether losses ``(B,)`` are
     small enough to stop. fused: one pass over the memory for all operations of a step, rounded otherwise; always on a
-    GPU, where iterations are recorded, see ``graphs.repeated``.
+    GPU. There iterations are recorded and replayed (``graphs.repeated``), so what ``evaluate`` gives must depend on the
+    phase alone, and not on a count that Python keeps.
 
     Examples
     --------

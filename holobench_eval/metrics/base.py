@@ -167,7 +167,14 @@ def similarity(a: Tensor, b: Tensor, constant: float) -> Tensor:
 
 def mix(image: Tensor, matrix: tuple[tuple[float, float, float], ...]) -> Tensor:
     """Linear combinations of the colour channels: (B, 3, H, W) to (B, len(matrix), H, W)."""
-    return torch.einsum("ij,bjhw->bihw", image.new_tensor(matrix), image)
+    return torch.einsum("ij,bjhw->bihw", _constant(matrix, image.dtype, image.device), image)
+
+
+@lru_cache(maxsize=32)
+@torch.inference_mode(False)  # in which it may be asked for first, and autograd could not use it
+def _constant(matrix: tuple[tuple[float, ...], ...], dtype: torch.dtype, device: torch.device) -> Tensor:
+    """A matrix on a device, brought there once: a GPU waits for each that Python brings."""
+    return torch.tensor(matrix, dtype=dtype, device=device)
 
 
 def as_rgb(image: Tensor) -> Tensor:

@@ -1,16 +1,22 @@
 """Descent on a device that records an iteration and replays it, which the CPU plays here, gives what a loop gives."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
 from torch import Tensor
 
+from holobench_eval.core import plugins
 from holobench_eval.core.graphs import WARM_UP
+from holobench_eval.display import load_profile
 from holobench_eval.methods.descent import adam, by_autograd
+from holobench_eval.methods.hil.approximator import NetworkApproximator
+from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.start import SmoothStart
 from holobench_eval.methods.learned.retrieval import PhaseRetrieval, retrieve
+from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.multi_plane import MultiPlane
 from holobench_eval.methods.oracle import Oracle
@@ -78,6 +84,25 @@ def test_a_retrieval_through_a_model_replays_and_ends_alike(threshold: float, be
         looped = retrieve(image, target, start, settings)
     assert (0 < cuda.replays < REPLAYS) if threshold else (cuda.replays == REPLAYS)
     assert torch.equal(replayed, looped)
+
+
+@pytest.mark.parametrize("name", ["hil", "parametric_model", "learned_kernel", "cnn_prop_cnn", "hybrid_model"])
+def test_a_retrieval_through_a_learned_display_is_replayed_with_every_term_of_its_loss(name: str) -> None:
+    spec = load_profile("leto-aged").spec((208, 208))
+    draw = torch.Generator().manual_seed(1)
+    target, phase = (torch.rand(3, *shape, generator=draw) for shape in (spec.region.shape, spec.shape))
+    if name == "hil":
+        model: Any = NetworkApproximator(spec, Network(levels=3, width=4), None, with_critic=True, seed=0)
+    else:
+        model = plugins.build("methods", name, {}, Path()).approximator(spec)
+    model.expose([Sample(phase, 0.5 * target, target, torch.ones(3))])
+    image, found = model.image(torch.ones(3)), []
+    for records in (True, False):
+        with fake_device(records=records) as cuda:
+            verdict = model.verdict if name == "hil" else None
+            found.append(retrieve(image, target, phase, PhaseRetrieval(iterations=5), verdict))
+        assert cuda.replays == (5 - WARM_UP - 1 if records else 0)
+    assert torch.equal(found[0], found[1])
 
 
 def test_a_loss_that_reads_a_number_is_followed_all_the_same() -> None:
