@@ -10,10 +10,12 @@ import torch
 from torch import Tensor
 
 from ..core.graphs import is_recorded, repeated
+from ..optics.blocks import in_blocks
+from . import kernels
+from .rows import compilable, floats
 
-# Phase (B, H, W) [rad] to the loss (B,) and its gradient (B, H, W) times the pixels of the panel: a factor that keeps
-# it far above Adam's epsilon, whatever the panel's size.
 Evaluate = Callable[[Tensor], tuple[Tensor, Tensor]]
+"""Phase ``(B, H, W)`` [rad] to the loss ``(B,)`` and its gradient ``(B, H, W)``."""
 
 
 @dataclass
@@ -35,10 +37,49 @@ class Best:
         if is_recorded(phase.device):
             torch.where(better[:, None, None], phase, self.phase, out=self.phase)
         elif better.all():  # half the time of the line above
-            self.phase.copy_(phase)
+            lines, kept = phase.shape[-2], self.phase
+            in_blocks(lambda rows: kept[..., rows, :].copy_(phase[..., rows, :]), kept, lines, kept.numel())
         else:
             self.phase[better] = phase[better]
         self.loss.copy_(torch.where(better, loss, self.loss))
+
+
+class Adam:
+    """Adam's steps on a phase ``(..., H, W)`` [rad], in place: Kingma & Ba, ICLR 2015, with its constants.
+
+    Its epsilon is divided by the panel's pixels, as the slopes of a mean over pixels are.
+    """
+
+    BETAS, EPSILON = (0.9, 0.999), 1e-8
+
+    def __init__(self, phase: Tensor) -> None:
+        self._phase, self._epsilon = phase, self.EPSILON / (phase.shape[-2] * phase.shape[-1])
+        self._steps = 0
+        if compilable(phase):
+            self._moments = torch.zeros_like(phase), torch.zeros_like(phase)
+            self._in_torch = None
+        else:
+            recorded = is_recorded(phase.device)
+            self._in_torch = torch.optim.Adam(
+                [phase], betas=self.BETAS, eps=self._epsilon, fused=True, capturable=recorded
+            )
+
+    def step(self, gradient: Tensor, rate: float | Tensor) -> None:
+        """One step by a gradient; rate [rad], a tensor where steps are recorded."""
+        if self._in_torch is not None:
+            self._phase.grad, self._in_torch.param_groups[0]["lr"] = gradient, rate
+            self._in_torch.step()
+            return
+        self._steps += 1
+        first, second = (1 - beta**self._steps for beta in self.BETAS)  # the moments begin at zero
+        step, epsilon = float(rate) * math.sqrt(second) / first, self._epsilon * math.sqrt(second)
+        rows = [floats(array.flatten(0, -2)) for array in (self._phase, gradient.contiguous(), *self._moments)]
+
+        def work(some: slice) -> None:
+            phase, slope, mean, square = (array[some] for array in rows)
+            kernels.adam_rows(phase, slope, mean, square, self.BETAS, step, epsilon)
+
+        in_blocks(work, gradient, len(rows[0]), gradient.numel())
 
 
 def adam(
@@ -49,14 +90,12 @@ def adam(
     *,
     decay: bool = False,
     done: Callable[[Tensor], bool] = lambda loss: False,
-    fused: bool = False,
 ) -> Tensor:
     """The phase of the least loss that Adam sees on its way from ``start`` ``(B, H, W)`` [rad].
 
     step: its rate [rad], constant or (``decay``) falling to zero along half a cosine. done: whether losses ``(B,)`` are
-    small enough to stop. fused: one pass over the memory for all operations of a step, rounded otherwise; always on a
-    GPU. There iterations are recorded and replayed (``graphs.repeated``), so what ``evaluate`` gives must depend on the
-    phase alone, and not on a count that Python keeps.
+    small enough to stop. On a GPU iterations are recorded and replayed (``graphs.repeated``), so what ``evaluate``
+    gives must depend on the phase alone, and not on a count that Python keeps.
 
     Examples
     --------
@@ -65,21 +104,20 @@ def adam(
     tensor(1.)
     """
     phase, best = start.detach().clone(), Best(start)
-    recorded = is_recorded(start.device)
+    optimiser, recorded = Adam(phase), is_recorded(start.device)
     rate = start.new_full((), step, dtype=torch.float32) if recorded else step  # a recorded number would stay as it is
-    optimiser = torch.optim.Adam([phase], lr=rate, fused=fused or recorded, capturable=recorded)
 
     def iterate() -> Tensor:
-        loss, phase.grad = evaluate(phase)
+        loss, gradient = evaluate(phase)
         best.update(loss, phase)
-        optimiser.step()
+        optimiser.step(gradient, rate)
         return loss
 
     repeat = repeated(iterate, start.device)
     for iteration in range(iterations):
         if decay:
             now = cosine_decay(step, iteration / iterations)
-            optimiser.param_groups[0]["lr"] = rate.fill_(now) if isinstance(rate, Tensor) else now
+            rate = rate.fill_(now) if isinstance(rate, Tensor) else now
         if done(repeat()):
             break
     return best.phase
@@ -91,7 +129,7 @@ def by_autograd(loss: Callable[[Tensor], Tensor]) -> Evaluate:
     def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
         phase = phase.detach().requires_grad_()
         losses = loss(phase)
-        (gradient,) = torch.autograd.grad(phase.shape[-2] * phase.shape[-1] * losses.sum(), phase)
+        (gradient,) = torch.autograd.grad(losses.sum(), phase)
         return losses.detach(), gradient
 
     return evaluate

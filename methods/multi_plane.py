@@ -81,13 +81,12 @@ class MultiPlane:
         """Targets ``(P, B, h, w)`` of a colour to phases ``(B, H, W)``."""
         planes = [self._objective(*plane, bench, channel) for plane in zip(targets, offsets, strict=True)]
         start = initial_phase(self.initial_phase, targets[0], bench, channel)
-        pixels = start.shape[-2] * start.shape[-1]
 
         def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
             losses, gradients = zip(*(plane.evaluate(phase) for plane in planes), strict=True)
-            return torch.stack(losses).mean(0), torch.stack(gradients).mean(0) * pixels
+            return torch.stack(losses).mean(0), torch.stack(gradients).mean(0)
 
-        return with_offset(adam(start, evaluate, self.iterations, self.step, fused=True), self.offset)
+        return with_offset(adam(start, evaluate, self.iterations, self.step), self.offset)
 
     def _objective(self, target: Tensor, offset: float, bench: Bench, channel: int) -> Objective:
         """The loss at one plane, through the nominal model at its distance."""

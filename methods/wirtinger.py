@@ -38,15 +38,11 @@ class Objective:
         """Loss ``(B,)`` and gradient ``(B, H, W)`` at a phase ``(B, H, W)`` [rad].
 
         For E = P(exp(i phi)) and I = |E|^2, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
-        and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)). dL/dI alone is left to autograd.
+        and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)).
         """
         light = PhasePropagation(self.model, self.region, phase)  # E
-        intensity = light.intensity().requires_grad_()  # I
-        loss = self.loss(intensity, self.target)  # L
-        (slope,) = torch.autograd.grad(2 * loss.sum(), intensity)  # 2 dL/dI
-        light.field.mul_(slope)
-        del slope, intensity  # the adjoint takes the most memory
-        return loss.detach(), light.phase_gradient()
+        loss = light.weigh(self.loss, self.target)  # L; E becomes 2 (dL/dI) E
+        return loss, light.phase_gradient()
 
 
 @dataclass(frozen=True)
@@ -120,14 +116,8 @@ class Wirtinger:
         return with_offset(phase, self.offset)
 
     def _adam(self, start: Tensor, objective: Objective) -> Tensor:
-        pixels = start.shape[-2] * start.shape[-1]
-
-        def evaluate(phase: Tensor) -> tuple[Tensor, Tensor]:
-            loss, gradient = objective.evaluate(phase)
-            return loss, gradient * pixels
-
         decay = self.schedule == "cosine"
-        return adam(start, evaluate, self.iterations, self.step, decay=decay, done=self._done, fused=True)
+        return adam(start, objective.evaluate, self.iterations, self.step, decay=decay, done=self._done)
 
     def _done(self, loss: Tensor) -> bool:
         """Whether losses ``(B,)`` are small enough to stop; here never."""

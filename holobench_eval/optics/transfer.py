@@ -36,11 +36,12 @@ class TransferFunction(Protocol):
     def values(self) -> Tensor:
         """``(rows, columns)``, complex; not to be written to."""
 
-    def convolve(self, field: Tensor, conjugated: bool = False) -> Tensor:
+    def convolve(self, field: Tensor, conjugated: bool = False, spent: bool = False) -> Tensor:
         """The first (H, W) samples of the circular convolution of a field ``(..., H, W)``, padded with zeros.
 
-        conjugated: by the conjugate of the transfer function, which is the adjoint. The field has the type and the
-        device of the transfer function; no gradient is recorded.
+        conjugated: by the conjugate of the transfer function, which is the adjoint; spent: the result may take the
+        place of the field in memory. The field has the type and the device of the transfer function; no gradient is
+        recorded.
         """
 
 
@@ -82,7 +83,7 @@ class Fused:
         values[:, _columns_of(self._starts, self.shape[1])] = lines * values.numel()
         return values
 
-    def convolve(self, field: Tensor, conjugated: bool = False) -> Tensor:
+    def convolve(self, field: Tensor, conjugated: bool = False, spent: bool = False) -> Tensor:
         """See ``TransferFunction``."""
         height, width = field.shape[-2:]
         if height > self.shape[0] or width > self.shape[1]:  # compiled code would write beyond its arrays
@@ -90,7 +91,7 @@ class Fused:
         grid = Grid((1, height, width), self._rows, self._columns, self._starts)
         field = field.contiguous().resolve_conj().resolve_neg()
         images = field[..., 0, 0].numel()
-        result, tiles = torch.empty_like(field), grid.tiles(images)
+        result, tiles = field if spent else torch.empty_like(field), grid.tiles(images)
         blocks, each = grid.blocks(images), np.arange(images * len(self._starts))
         grid.spectra(field, tiles, blocks)
         grid.convolve(tiles, each, grid, tiles, each, self._tiles, conjugated)
@@ -203,7 +204,7 @@ class InTorch:
         conjugate = self.values.conj()
         return conjugate if self._large else conjugate.resolve_conj()
 
-    def convolve(self, field: Tensor, conjugated: bool = False) -> Tensor:
+    def convolve(self, field: Tensor, conjugated: bool = False, spent: bool = False) -> Tensor:
         """See ``TransferFunction``."""
         height, width = field.shape[-2:]
         transfer = self._conjugate if conjugated else self.values

@@ -17,6 +17,7 @@ from holobench_eval.display.api import DisplaySpec
 from holobench_eval.display.simulated.stages.sensor import Sensor
 from holobench_eval.display.training import TrainingBench
 from holobench_eval.imaging import align as aligning
+from holobench_eval.methods import descent
 from holobench_eval.metrics import protocol
 from tests.golden import outputs
 from tests.golden.outputs import FILE, cases, complaint, recorded
@@ -77,6 +78,8 @@ def _other_step(patch: pytest.MonkeyPatch) -> None:
             super().__init__(params, lr=1.01 * lr, **more)
 
     patch.setattr(torch.optim, "Adam", Faster)
+    step = descent.Adam.step
+    patch.setattr(descent.Adam, "step", lambda self, gradient, rate: step(self, gradient, 1.01 * rate))
 
 
 @pytest.mark.parametrize(

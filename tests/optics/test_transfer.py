@@ -70,6 +70,13 @@ def test_a_field_may_lie_in_memory_as_it_likes(strided):
     assert relative(transfer_function(values).convolve(field), padded_convolution(field, values)) < 1e-6
 
 
+@pytest.mark.parametrize("size", [60, 67])  # by the kernel and by torch
+def test_the_result_may_take_the_place_of_a_field_that_is_spent(size):
+    function, field = transfer_function(white(size, size, seed=1)), white(2, 30, 40)
+    expected = function.convolve(field)
+    assert torch.equal(function.convolve(field, spent=True), expected)
+
+
 @pytest.mark.parametrize("shape", [(61, 20), (20, 61)])
 def test_a_field_that_is_larger_than_the_transfer_function_is_refused(shape):
     with pytest.raises(ValueError, match="field is"):

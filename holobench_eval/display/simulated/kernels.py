@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import compiled
+from ...optics.elementary import sincos
 
 Plane = NDArray[np.float32]
 
@@ -43,23 +44,6 @@ def counts(charge: Any, normal: Any, read: Any, bend: Any, gain: Any, dark: Any,
 
 
 _philox, _counts = compiled(philox), compiled(counts)
-
-
-@compiled
-def sincos(angle: Any) -> tuple[Any, Any]:
-    """Sine and cosine of an angle [rad] of a few turns, float32, within 1e-7; without branches, so that it is
-    vectorised. The polynomials are Chebyshev fits on an eighth of a turn."""
-    quarters = np.rint(angle * F(4 / TURN))
-    x = angle - quarters * F(1.5707855224609375)  # a quarter of a turn in three parts: products with two are exact
-    x = x - quarters * F(1.080334186553955e-05)
-    x = x - quarters * F(9.920935184e-10)
-    q = x * x
-    sine = x + x * q * (F(-0.1666666466) + q * (F(0.008332747485) + q * F(-0.0001958770018)))
-    cosine = F(1) - F(0.5) * q + q * q * (F(0.04166666466) + q * (F(-0.001388830217) + q * F(2.454773904e-05)))
-    n = N(quarters)
-    if n & N(1):
-        sine, cosine = cosine, sine
-    return (-sine if n & N(2) else sine), (-cosine if (n + N(1)) & N(2) else cosine)
 
 
 @compiled

@@ -69,14 +69,8 @@ def test_a_capture_without_numba_is_the_same_but_for_rounding(phase, hide):
     assert float((fast != slow).float().mean()) < 1e-2
 
 
-def test_elementary_functions_have_the_accuracy_that_they_state():
-    angles = np.linspace(-60, 60, 200_001, dtype=np.float32)
-    numbers = np.geomspace(2**-25, 1, 100_001).astype(np.float32)
-    found = np.array([kernels.sincos(angle) for angle in angles[::40]])
-    assert (
-        np.abs(found - np.stack([np.sin(angles[::40].astype(float)), np.cos(angles[::40].astype(float))], 1)).max()
-        < 1.5e-7
-    )
-    logs = np.log(numbers[::20].astype(float))
-    found = np.array([kernels.log(number) for number in numbers[::20]])
+def test_the_logarithm_has_the_accuracy_that_it_states():
+    numbers = np.geomspace(2**-25, 1, 100_001).astype(np.float32)[::20]
+    logs = np.log(numbers.astype(float))
+    found = np.array([kernels.log(number) for number in numbers])
     assert (np.abs(found - logs) / np.maximum(1, np.abs(logs))).max() < 1e-7
