@@ -9,6 +9,7 @@ from dataclasses import InitVar, dataclass, field
 import torch
 from torch import Tensor
 
+from ..core.graphs import is_recorded, repeated
 from ..optics.blocks import in_blocks
 from . import kernels
 from .rows import compilable, floats
@@ -31,13 +32,16 @@ class Best:
 
     def update(self, loss: Tensor, phase: Tensor) -> None:
         """Keep ``phase`` ``(B, H, W)`` where ``loss`` ``(B,)`` is the least so far."""
+        loss, phase = loss.detach(), phase.detach()
         better = loss < self.loss
-        if better.all():
-            lines, kept, seen = phase.shape[-2], self.phase, phase.detach()
-            in_blocks(lambda rows: kept[..., rows, :].copy_(seen[..., rows, :]), kept, lines, kept.numel())
+        if is_recorded(phase.device):
+            torch.where(better[:, None, None], phase, self.phase, out=self.phase)
+        elif better.all():  # half the time of the line above
+            lines, kept = phase.shape[-2], self.phase
+            in_blocks(lambda rows: kept[..., rows, :].copy_(phase[..., rows, :]), kept, lines, kept.numel())
         else:
-            self.phase[better] = phase.detach()[better]
-        self.loss = torch.where(better, loss.detach(), self.loss)
+            self.phase[better] = phase[better]
+        self.loss.copy_(torch.where(better, loss, self.loss))
 
 
 class Adam:
@@ -54,13 +58,18 @@ class Adam:
         if compilable(phase):
             self._moments = torch.zeros_like(phase), torch.zeros_like(phase)
         else:
-            self._in_torch = torch.optim.Adam([phase], rate, self.BETAS, self._epsilon, fused=True)
+            recorded = is_recorded(phase.device)  # a recorded number would stay as it is
+            first = phase.new_full((), rate, dtype=torch.float32) if recorded else rate
+            self._in_torch = torch.optim.Adam(
+                [phase], first, self.BETAS, self._epsilon, fused=True, capturable=recorded
+            )
 
     def set_rate(self, rate: float) -> None:
         """The rate [rad] from the next step on."""
         self._rate = rate
         if self._in_torch is not None:
-            self._in_torch.param_groups[0]["lr"] = rate
+            group = self._in_torch.param_groups[0]
+            group["lr"] = group["lr"].fill_(rate) if isinstance(group["lr"], Tensor) else rate
 
     def step(self, gradient: Tensor) -> None:
         """One step by a gradient ``(..., H, W)``."""
@@ -92,7 +101,8 @@ def adam(
     """The phase of the least loss that Adam sees on its way from ``start`` ``(B, H, W)`` [rad].
 
     step: its rate [rad], constant or (``decay``) falling to zero along half a cosine. done: whether losses ``(B,)`` are
-    small enough to stop.
+    small enough to stop. On a GPU iterations are recorded and replayed (``graphs.repeated``), so what ``evaluate``
+    gives must depend on the phase alone, and not on a count that Python keeps.
 
     Examples
     --------
@@ -102,14 +112,19 @@ def adam(
     """
     phase, best = start.detach().clone(), Best(start)
     optimiser = Adam(phase, step)
+
+    def iterate() -> Tensor:
+        loss, gradient = evaluate(phase)
+        best.update(loss, phase)
+        optimiser.step(gradient)
+        return loss
+
+    repeat = repeated(iterate, start.device)
     for iteration in range(iterations):
         if decay:
             optimiser.set_rate(cosine_decay(step, iteration / iterations))
-        loss, gradient = evaluate(phase)
-        best.update(loss, phase)
-        if done(loss):
+        if done(repeat()):
             break
-        optimiser.step(gradient)
     return best.phase
 
 

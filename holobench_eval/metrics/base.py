@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from ..core.graphs import is_recorded
 from ..imaging.shifts import correlate, mirrored
 
 Domain = Literal["linear", "amplitude", "srgb", "stored"]
@@ -89,7 +90,8 @@ def paired(image: Tensor, target: Tensor, smallest: int = 1) -> tuple[Tensor, Te
     """Both images as (B, C, H, W), checked.
 
     image, target: (C, H, W) or (B, C, H, W), C = 1 or 3, float32 or float64, values in [0, 1].
-    Raises ValueError for other shapes, types or values, for NaN, and for a side below ``smallest`` pixels.
+    Raises ValueError for other shapes, types or values, for NaN, and for a side below ``smallest`` pixels. Nobody looks
+    at the values on a GPU, where metrics are terms of a loss: it would keep steps from being recorded.
     """
     if image.shape != target.shape:
         raise ValueError(f"image {tuple(image.shape)} and target {tuple(target.shape)} differ in shape")
@@ -99,7 +101,8 @@ def paired(image: Tensor, target: Tensor, smallest: int = 1) -> tuple[Tensor, Te
         raise ValueError(f"image sides must be at least {smallest} pixels, got {tuple(image.shape[-2:])}")
     if image.dtype != target.dtype or image.dtype not in (torch.float32, torch.float64):
         raise ValueError(f"expected two float32 or two float64 images, got {image.dtype} and {target.dtype}")
-    for name, values in (("image", image), ("target", target)):
+    looked_at = () if is_recorded(image.device) else (("image", image), ("target", target))
+    for name, values in looked_at:
         low, high = (float(value) for value in values.detach().aminmax())
         if not (low >= -_TOLERANCE and high <= 1 + _TOLERANCE):
             raise ValueError(f"{name} values must be in [0, 1], got [{low:.6g}, {high:.6g}]")
@@ -164,7 +167,14 @@ def similarity(a: Tensor, b: Tensor, constant: float) -> Tensor:
 
 def mix(image: Tensor, matrix: tuple[tuple[float, float, float], ...]) -> Tensor:
     """Linear combinations of the colour channels: (B, 3, H, W) to (B, len(matrix), H, W)."""
-    return torch.einsum("ij,bjhw->bihw", image.new_tensor(matrix), image)
+    return torch.einsum("ij,bjhw->bihw", _constant(matrix, image.dtype, image.device), image)
+
+
+@lru_cache(maxsize=32)
+@torch.inference_mode(False)  # in which it may be asked for first, and autograd could not use it
+def _constant(matrix: tuple[tuple[float, ...], ...], dtype: torch.dtype, device: torch.device) -> Tensor:
+    """A matrix on a device, brought there once: a GPU waits for each that Python brings."""
+    return torch.tensor(matrix, dtype=dtype, device=device)
 
 
 def as_rgb(image: Tensor) -> Tensor:

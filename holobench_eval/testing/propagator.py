@@ -123,9 +123,13 @@ def _given(field: Tensor) -> Tensor:
 
 
 def _field(result: Any, shape: tuple[int, int]) -> Tensor:
-    """A propagator's result, a tensor or an array of NumPy or JAX, as complex128."""
+    """A propagator's result for some light, a tensor or an array of NumPy or JAX, as complex128."""
     tensor = result.detach() if isinstance(result, Tensor) else torch.from_numpy(np.array(result))
     if tuple(tensor.shape) != shape or not tensor.is_complex():
         kind = str(tensor.dtype).removeprefix("torch.")
         raise WrongResultError(f"the result is {kind} of shape {tuple(tensor.shape)}, not a complex field {shape}")
+    if not bool(tensor.isfinite().all()):
+        raise WrongResultError("the result is not finite: it has NaN or infinite values")
+    if not bool(tensor.any()):
+        raise WrongResultError("the result is nothing but zeros")
     return tensor.to("cpu", torch.complex128)

@@ -49,4 +49,4 @@ class SmoothStart(Wirtinger):
         return torch.cat([solve(image[None], bench) for image in target])
 
     def _done(self, loss: Tensor) -> bool:
-        return bool((loss <= self.tolerance).all())
+        return self.tolerance > 0 and bool((loss <= self.tolerance).all())

@@ -123,6 +123,6 @@ def retrieve(
         return value[None]
 
     def done(_: Tensor) -> bool:
-        return float(error) < settings.threshold
+        return settings.threshold > 0 and float(error) < settings.threshold
 
     return adam(start[None], by_autograd(loss), settings.iterations, settings.step, decay=True, done=done)[0]

@@ -27,6 +27,7 @@ from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
 from holobench_eval.optics import AngularSpectrum
 from tests.support.elsewhere import ELSEWHERE, Elsewhere
+from tests.support.replaying import fake_device
 
 PANEL = (208, 208)  # the least whose region MS-SSIM is defined on
 SMALL = {"levels": 3, "width": 4}
@@ -148,6 +149,16 @@ def test_a_method_solves_where_its_target_is(ideal: CalibratedBench, name: str) 
         target = picture(ideal)
         phase = method.solve(target[None], ideal.for_method(method, name, target, "t", 0))
     assert phase.device == ELSEWHERE
+
+
+@pytest.mark.parametrize("name", ["wirtinger", "sgd", "multi_plane"])
+def test_iterations_to_be_recorded_run_where_their_target_is(ideal: CalibratedBench, name: str) -> None:
+    method = plugins.build("methods", name, {"iterations": 5, "offset": "none"}, Path())
+    with fake_device(ELSEWHERE.type, records=False) as cuda, Elsewhere():
+        target = picture(ideal)
+        phase = method.solve(target[None], ideal.for_method(method, name, target, "t", 0))
+    assert phase.device == ELSEWHERE
+    assert cuda.watches == 3
 
 
 TRAINED: dict[str, dict[str, Any]] = {

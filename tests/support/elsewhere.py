@@ -52,7 +52,7 @@ class Elsewhere(TorchDispatchMode):
         if func is aten._local_scalar_dense.default and args[0].device == ELSEWHERE:
             number = args[0].dtype
             return True if number == torch.bool else 1.0 if number.is_floating_point else 0
-        if func is aten._fused_adam_.default and ELSEWHERE.type in devices:
-            assert all(one.device == ELSEWHERE for one in tensors)  # its counts of steps as well
+        if func in (aten._fused_adam_.default, aten._fused_adam_.tensor_lr) and ELSEWHERE.type in devices:
+            assert all(one.device == ELSEWHERE for one in tensors)  # its counts of steps and its rate as well
             return None
         return func(*args, **kwargs)
