@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
+
 from torch import Tensor
 
 from ..display.api import Display
@@ -19,9 +22,19 @@ def fiducial_phases(display: Display, target: Tensor) -> dict[tuple[int, int], T
     is shown with several constant phases added, because unmodulated light interferes with the image and the mean over
     the steps cancels that; both then also average speckle.
     """
-    phases: dict[tuple[int, int], Tensor] = {}
-    for hologram in range(HOLOGRAMS):
-        handle = MeteredDisplay(display, "fiducial", target, (display.seed, "fiducial", hologram))
-        phase = Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]
-        phases |= {(hologram, step): phase + step * TAU / STEPS for step in range(STEPS)}
-    return phases
+    # They depend on the nominal optics alone, which displays of a study and most changes to one have in common.
+    shown = hashlib.sha256(target.cpu().numpy().tobytes()).hexdigest()
+    key = (replace(display.spec, name=""), display.seed, target.device, shown)
+    if key not in _solved:
+        _solved.clear()
+        _solved[key] = [_hologram(display, target, number) for number in range(HOLOGRAMS)]
+    phases = enumerate(_solved[key])
+    return {(number, step): phase + step * TAU / STEPS for number, phase in phases for step in range(STEPS)}
+
+
+_solved: dict[object, list[Tensor]] = {}  # those of the last optics
+
+
+def _hologram(display: Display, target: Tensor, number: int) -> Tensor:
+    handle = MeteredDisplay(display, "fiducial", target, (display.seed, "fiducial", number))
+    return Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]

@@ -7,6 +7,8 @@ table from all records.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +19,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+import yaml
 
 from .options import Config, Device, Learned, Output, Threads, is_small, output_folder, thread_count
 from .output import console as open_console
@@ -47,9 +50,10 @@ def run(
 ) -> None:
     """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
     with _resumable():
-        from ..study.executors import begin
+        if retrain or retry_failed or retime or not _is_finished(config, output):
+            from ..study.executors import begin
 
-        begin(executor)
+            begin(executor, workers, is_small(_panel(config)))
         from ..study.artifacts import Artifacts
         from ..study.config import load_study
         from ..study.plan import plan
@@ -77,6 +81,25 @@ def run(
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
         console.print(f"reasons: {folder}/report.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
         raise typer.Exit(1)
+
+
+def _panel(config: Path) -> tuple[int, int] | None:
+    """The panel in a config that nobody has checked yet, without the libraries that check it; None if there is none."""
+    try:
+        rows, columns = yaml.safe_load(config.read_bytes())["display"]["panel"]
+        return int(rows), int(columns)
+    except (OSError, ValueError, TypeError, LookupError, yaml.YAMLError):
+        return None
+
+
+def _is_finished(config: Path, output: Path | None) -> bool:
+    """Whether the last run of a config, as it stands, ended: there is probably nothing to compute."""
+    try:
+        described = json.loads((output or Path("reports", config.stem)).joinpath("provenance.json").read_bytes())
+        text = hashlib.sha256(config.read_bytes()).hexdigest()
+        return bool(described["ended"] and described["config_sha256"] == text)
+    except (OSError, ValueError, TypeError, LookupError):
+        return False
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+import cv2
 import torch
 from torch import Tensor
 
@@ -72,11 +73,12 @@ def repeatable(threads: int, device: torch.device = CPU) -> Iterator[None]:
         os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # read at the first product of matrices
         torch.backends.cudnn.allow_tf32 = torch.backends.cuda.matmul.allow_tf32 = False
     keep_freed_memory()
-    before = torch.get_num_threads(), torch.get_deterministic_debug_mode()
+    before = torch.get_num_threads(), cv2.getNumThreads(), torch.get_deterministic_debug_mode()
     torch.set_default_dtype(torch.float32)  # a method's file may have changed these two for everybody
     torch.set_grad_enabled(True)
     _seed_globally(seed("global random numbers"), device)
     torch.set_num_threads(threads)
+    cv2.setNumThreads(threads)  # else it takes all cores, those of other workers too
     torch.set_deterministic_debug_mode("error")  # use_deterministic_algorithms also imports torch's compiler, 1.5 s
     # Filling fresh memory guards against reading it too early; it would be timed with the methods.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
@@ -84,7 +86,8 @@ def repeatable(threads: int, device: torch.device = CPU) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before[0])
-        torch.set_deterministic_debug_mode(before[1])
+        cv2.setNumThreads(before[1])
+        torch.set_deterministic_debug_mode(before[2])
 
 
 def _seed_globally(value: int, device: torch.device) -> None:

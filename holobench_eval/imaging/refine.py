@@ -67,25 +67,59 @@ def refine(capture: Tensor, target: Tensor) -> Refined:
     >>> abs(refined.dx - 1) < 0.05, abs(refined.dy) < 0.05
     (True, True)
     """
-    if capture.shape != target.shape or capture.ndim != 3 or min(capture.shape[1:]) <= 4 * BORDER:
-        raise ValueError(f"capture {tuple(capture.shape)} and target {tuple(target.shape)} must both be (C, h, w)")
-    move = _search(capture, target)
-    if move is None:
-        return Refined(capture, 0.0, 0.0, 0.0)
-    where = _coordinates((capture.shape[1], capture.shape[2]), move)
-    frames = capture.detach().to("cpu", torch.float32).numpy()
-    image = torch.from_numpy(np.stack([_resampled(frame, where) for frame in frames])).to(capture.device)
-    return Refined(image, float(move[0]), float(move[1]), math.degrees(move[2]))
+    return Refinement(target)(capture)
 
 
-def _search(capture: Tensor, target: Tensor) -> Array | None:
-    """The move (dx, dy, theta) [px, px, rad] within the bounds, or None."""
-    seen, wanted = _amplitude(capture), _amplitude(target)
-    move = _climb(seen, wanted)
-    if move is None or not _within(move, 1.0):
+class Refinement:
+    """``refine`` against a target ``(C, h, w)`` that stays: what depends on the target alone is computed once."""
+
+    def __init__(self, target: Tensor) -> None:
+        if target.ndim != 3 or min(target.shape[1:]) <= 4 * BORDER:
+            raise ValueError(f"target {tuple(target.shape)} must be (C, h, w), both sides above {4 * BORDER} px")
+        self.shape = target.shape
+        self._amplitude = _amplitude(target)
+        self._model = _derivatives(self._amplitude)
+        self._normal = self._model.T @ self._model
+        self._is_flat = np.linalg.matrix_rank(self._normal) < len(self._normal)
+
+    def __call__(self, capture: Tensor) -> Refined:
+        """A capture of the target's shape, moved onto it, as ``refine`` gives it."""
+        if capture.shape != self.shape:
+            raise ValueError(f"capture {tuple(capture.shape)} and target {tuple(self.shape)} must both be (C, h, w)")
+        move = self._search(_amplitude(capture))
+        if move is None:
+            return Refined(capture, 0.0, 0.0, 0.0)
+        where = _coordinates((capture.shape[1], capture.shape[2]), move)
+        frames = capture.detach().to("cpu", torch.float32).numpy()
+        image = torch.from_numpy(np.stack([_resampled(frame, where) for frame in frames])).to(capture.device)
+        return Refined(image, float(move[0]), float(move[1]), math.degrees(move[2]))
+
+    def _search(self, seen: Frame) -> Array | None:
+        """The move (dx, dy, theta) [px, px, rad] within the bounds, or None."""
+        move, wanted = self._climb(seen), self._amplitude
+        if move is None or not _within(move, 1.0):
+            return None
+        before, after = (_resampled(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
+        return move if _inner_correlation(after, wanted) > _inner_correlation(before, wanted) else None
+
+    def _climb(self, seen: Frame) -> Array | None:
+        """Gauss-Newton from no move, with gain and offset free; None far beyond the bounds or without convergence."""
+        if self._is_flat:
+            return None
+        height, width = self._amplitude.shape
+        move: Array = np.zeros(3)
+        for _ in range(ITERATIONS):
+            now = _inner(_resampled(seen, _coordinates((height, width), move))).ravel()
+            solved = np.linalg.solve(self._normal, self._model.T @ now.astype(np.float64))
+            if solved[0] <= 0:
+                return None
+            step = solved[2:] / solved[0]
+            move = move + step
+            if not _within(move, 3.0):
+                return None
+            if np.abs(step * (1, 1, max(height, width) / 2)).max() < STEP:
+                return np.asarray(move)
         return None
-    before, after = (_resampled(seen, _coordinates(wanted.shape, each)) for each in (np.zeros(3), move))
-    return move if _inner_correlation(after, wanted) > _inner_correlation(before, wanted) else None
 
 
 def _amplitude(image: Tensor) -> Frame:
@@ -94,31 +128,15 @@ def _amplitude(image: Tensor) -> Frame:
     return np.sqrt(np.asarray(cv2.GaussianBlur(light, (0, 0), REFINE_BLUR)))
 
 
-def _climb(seen: Frame, wanted: Frame) -> Array | None:
-    """Gauss-Newton from no move, with gain and offset free; None far beyond the bounds or without convergence."""
+def _derivatives(wanted: Frame) -> Array:
+    """What gain, offset, the shifts and the turn change in a picture, its inner pixels by 5."""
     height, width = wanted.shape
     wide = wanted.astype(np.float64)
     slope_y, slope_x = np.gradient(wide)
     x, y = np.arange(width) - (width - 1) / 2, np.arange(height)[:, None] - (height - 1) / 2
     turning = slope_x * y - slope_y * x
     columns = (wide, np.ones_like(wide), np.negative(slope_x), np.negative(slope_y), turning)
-    model = np.stack([_inner(column).ravel() for column in columns], axis=1)
-    normal = model.T @ model
-    if np.linalg.matrix_rank(normal) < len(normal):
-        return None
-    move: Array = np.zeros(3)
-    for _ in range(ITERATIONS):
-        now = _inner(_resampled(seen, _coordinates((height, width), move))).ravel()
-        solved = np.linalg.solve(normal, model.T @ now.astype(np.float64))
-        if solved[0] <= 0:
-            return None
-        step = solved[2:] / solved[0]
-        move = move + step
-        if not _within(move, 3.0):
-            return None
-        if np.abs(step * (1, 1, max(height, width) / 2)).max() < STEP:
-            return np.asarray(move)
-    return None
+    return np.stack([_inner(column).ravel() for column in columns], axis=1)
 
 
 def _within(move: Array, slack: float) -> bool:

@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, wraps
 from threading import Lock
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import cv2
 import numpy as np
 import torch
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
 from ..core.graphs import is_recorded
@@ -201,13 +202,28 @@ def gaussian_taps(sigma: float, radius: int) -> tuple[float, ...]:
 def gaussian_valid(image: Tensor, sigma: float, radius: int) -> Tensor:
     """Gaussian filter of 2 radius + 1 taps where it fits wholly: (..., H, W) to (..., H - 2 radius, W - 2 radius)."""
     taps = gaussian_taps(sigma, radius)
-    if image.is_cpu and not (image.requires_grad and torch.is_grad_enabled()):
-        return _opencv_filtered(image, taps)
+    if image.is_cpu:
+        filtered: Tensor = _Filtered.apply(image, taps)  # type: ignore[no-untyped-call]
+        return filtered
     return correlate(correlate(image, taps, dim=-1), taps, dim=-2)
 
 
+class _Filtered(torch.autograd.Function):
+    """``gaussian_valid`` by OpenCV: 20 times as fast at 1080x1920 as sums of shifted images."""
+
+    @staticmethod
+    def forward(ctx: Any, image: Tensor, taps: Sequence[float]) -> Tensor:
+        ctx.taps = taps
+        return _opencv_filtered(image, taps)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
+        return _opencv_filtered(functional.pad(grad, (len(ctx.taps) - 1,) * 4), ctx.taps), None
+
+
 def _opencv_filtered(image: Tensor, taps: Sequence[float]) -> Tensor:
-    """``gaussian_valid`` without a gradient, by OpenCV: 20 times as fast at 1080x1920."""
+    """Valid filter of (..., H, W) with symmetric taps along both axes, without a gradient."""
     radius, kernel = len(taps) // 2, np.array(taps)
     height, width = image.shape[-2:]
     result = image.new_empty((*image.shape[:-2], height - 2 * radius, width - 2 * radius))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ..core.errors import UserError, suggest
-from ..imaging.refine import refine as align
+from ..imaging.refine import Refinement
 from ..optics.colour import srgb_encode
-from .base import Domain, Metric, gaussian_blur
+from .base import Domain, Metric, gaussian_blur, remembered
 from .catalogue import catalogue
 from .speckle import speckle_contrast
 
@@ -132,20 +133,20 @@ def score(
     names, chosen = _chosen(metrics, lpips_weights)
     first: Domain = "stored" if stored else "linear"
     image, factors = match(light, wanted)
-    pairs = {domain: (encode(image), encode(wanted)) for domain, encode in _ENCODINGS.items()}
+    fixed, encoded = _fixed(wanted), _Encoded(image)
     scores: dict[str, float] = {}
     for metric in chosen:
         if min(image.shape[1:]) >= metric.smallest:
-            domains: tuple[Domain, ...] = (first,) if stored else metric.domains
-            scores |= {f"{metric.name}_{domain}": float(metric.function(*pairs[domain])) for domain in domains}
+            for domain in (first,) if stored else metric.domains:
+                scores[f"{metric.name}_{domain}"] = float(metric.function(encoded[domain], fixed.encoded[domain]))
     repeated = [metric for metric in chosen if metric.name in _REPEATED]
     if refine and repeated:
-        moved = align(factors.view(-1, 1, 1) * light, wanted)
+        moved = fixed.refinement(factors.view(-1, 1, 1) * light)
         again, _ = match(moved.image.to(wanted), wanted)
         scores |= {f"{metric.name}_{first}_refined": float(metric.function(again, wanted)) for metric in repeated}
         scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
     for sigma in blur if repeated else ():
-        soft_capture, soft_target = _blurred(light, sigma), _blurred(wanted, sigma).clamp(0, 1)
+        soft_capture, soft_target = _blurred(light, sigma), fixed.blurred(sigma)
         soft, _ = match(soft_capture, soft_target)
         scores |= {f"{m.name}_{first}_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
     if "speckle_contrast" in names and not stored:
@@ -154,6 +155,40 @@ def score(
     if float(wanted.mean()) > 0:
         scores["brightness_ratio"] = float(light.mean() / wanted.mean())
     return scores | {f"scale_{channel}": float(factor) for channel, factor in enumerate(factors)}
+
+
+class _Encoded(dict[Domain, Tensor]):
+    """An image in every domain, computed when asked for."""
+
+    def __init__(self, image: Tensor) -> None:
+        super().__init__()
+        self.image = image
+
+    def __missing__(self, domain: Domain) -> Tensor:
+        self[domain] = _ENCODINGS[domain](self.image)
+        return self[domain]
+
+
+class _Fixed:
+    """What the scores need of a target ``(C, h, w)`` alone; each part is computed when first asked for."""
+
+    def __init__(self, target: Tensor) -> None:
+        self.target, self.encoded = target, _Encoded(target)
+        self._soft: dict[float, Tensor] = {}
+
+    @cached_property
+    def refinement(self) -> Refinement:
+        """The search for the move of a capture."""
+        return Refinement(self.target)
+
+    def blurred(self, sigma: float) -> Tensor:
+        """The target behind a Gaussian of width sigma [px]."""
+        if sigma not in self._soft:
+            self._soft[sigma] = _blurred(self.target, sigma).clamp(0, 1)
+        return self._soft[sigma]
+
+
+_fixed = remembered(_Fixed, most=2)  # of repeats, displays and floor images one after the other
 
 
 def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:

@@ -7,11 +7,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import timedelta
 from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TaskID, TextColumn
+from rich.progress import Task as RichTask
+from rich.text import Text
 
 from .artifacts import read_log
 from .plan import Task
@@ -20,6 +23,10 @@ from .store import Record
 from .training import WAITS
 
 SECONDS_BETWEEN_LINES = 5.0
+
+
+def _unknown() -> None:
+    """The time left before a run has begun."""
 
 
 def _name(task: Task) -> str:
@@ -82,6 +89,10 @@ class Bar:
     missing: int = 0
     follower: Follower = field(default_factory=lambda: Follower(0.5))
 
+    def expects(self, seconds_left: Callable[[], float | None]) -> None:
+        """Show the time left, ``-:--:--`` where it is not known."""
+        self.progress.update(self.bar, left=seconds_left)
+
     def planned(self, cells: int, missing: int) -> None:
         """Set the bar to the number of missing cells."""
         self.missing = missing
@@ -123,11 +134,15 @@ class Lines:
     done: int = 0
     failures: int = 0
     follower: Follower = field(default_factory=lambda: Follower(15.0))
-    begun: float | None = field(default=None, init=False)
+    seconds_left: Callable[[], float | None] = field(default_factory=lambda: _unknown, init=False)
     last: float = field(init=False)
 
     def __post_init__(self) -> None:
         self.last = self.clock()
+
+    def expects(self, seconds_left: Callable[[], float | None]) -> None:
+        """Write the time left in every line."""
+        self.seconds_left = seconds_left
 
     def planned(self, cells: int, missing: int) -> None:
         """Write the number of cells to compute."""
@@ -147,10 +162,9 @@ class Lines:
     def started(self, task: Task) -> None:
         """Name the task in work, if the last line is old enough."""
         now = self.clock()
-        self.begun = now if self.begun is None else self.begun
         if now - self.last >= SECONDS_BETWEEN_LINES:
             self.last = now
-            self.write(f"{self.done}/{self.total} cells, {self.failures} failed{self._left(now)}; now {_name(task)}")
+            self.write(f"{self.done}/{self.total} cells, {self.failures} failed{self._left()}; now {_name(task)}")
 
     def finished(self, records: list[Record]) -> None:
         """Count, and write a line for every failure."""
@@ -160,12 +174,21 @@ class Lines:
                 self.failures += 1
                 self.write(_failure(record))
 
-    def _left(self, now: float) -> str:
-        if not self.done or self.begun is None:
-            return ""
-        training = len(self.follower.folders)
+    def _left(self) -> str:
+        seconds, training = self.seconds_left(), len(self.follower.folders)
         beside = f" besides the {training} in training" * bool(training)
-        return f", about {(now - self.begun) / self.done * (self.total - self.done):.0f} s left{beside}"
+        return "" if seconds is None else f", about {seconds:.0f} s left{beside}"
+
+
+def _duration(seconds: float | None) -> str:
+    return "-:--:--" if seconds is None else str(timedelta(seconds=round(seconds)))
+
+
+class _TimeLeft(ProgressColumn):
+    """The time left, by what the rows have cost so far."""
+
+    def render(self, task: RichTask) -> Text:
+        return Text(_duration(task.fields["left"]()), style="progress.remaining")
 
 
 @contextmanager
@@ -178,8 +201,8 @@ def watching(console: Console) -> Iterator[Watch]:
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TimeRemainingColumn(),
+        _TimeLeft(),
         TextColumn("[red]{task.fields[failures]}"),
     )
     with Progress(*columns, console=console) as progress:
-        yield Bar(progress, progress.add_task("planning", total=None, failures=""))
+        yield Bar(progress, progress.add_task("planning", total=None, failures="", left=_unknown))

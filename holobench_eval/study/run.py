@@ -23,6 +23,7 @@ from .executors import Executor, Serial
 from .executors.clusters import Address
 from .executors.local import Local
 from .plan import Cell, Plan, Task
+from .remaining import Remaining
 from .scoring.cell import work
 from .scoring.job import Job, Setting
 from .store import Record, Store
@@ -40,6 +41,10 @@ class Watch(Protocol):
 
     def planned(self, cells: int, missing: int) -> None:
         """The run begins: cells of the study, and those that have to be computed."""
+        ...
+
+    def expects(self, seconds_left: Callable[[], float | None]) -> None:
+        """What gives the time [s] that the cells still take, at any moment; None where it is not known."""
         ...
 
     def training(self, names: list[tuple[str, Path]]) -> None:
@@ -183,9 +188,13 @@ def _compute(
     at_work: dict[int, float] = {}
     expected = {DRAWING: DRAWING_SECONDS}
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
-    jobs = _jobs(plan, missing, missing if single else timed, setting)
+    jobs = list(_jobs(plan, missing, missing if single else timed, setting))
+    known = _known(jobs) if isinstance(executor, Serial | Local) else {}  # else other machines compute
+    remaining = Remaining(((job.task.label, job.alone) for job in jobs), known, executor.workers)
+    watch.expects(remaining.seconds)
     steps = queue(trainings, jobs, unlearned, at_work, expected, drawings)
-    results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, _watched(steps, at_work, watch))
+    watched = _watched(steps, at_work, remaining, watch)
+    results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, watched)
     for job, result in results:
         taken = time.monotonic() - at_work.pop(id(job))
         if isinstance(job, TrainingJob):
@@ -193,6 +202,7 @@ def _compute(
             unlearned.discard(job.preparation.id)
             watch.trained(job.preparation.name, reason)
         elif isinstance(job, Job):
+            remaining.ends(id(job))
             records = result if isinstance(result, list) else _lost(job, _error(result), store)
             _refuse_unseen(records, store)
             if not single:  # of several workers none should begin its longest job at the end
@@ -230,12 +240,25 @@ def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: S
             yield Job(task, wanted, setting, alone=not wanted.isdisjoint(alone))
 
 
-def _watched(steps: Iterator[Step | None], at_work: dict[int, float], watch: Watch) -> Iterator[Step | None]:
+def _known(jobs: Iterable[Job]) -> dict[str, float]:
+    """Seconds of a row's first solution, where it has been measured before."""
+    first: dict[str, Job] = {}
+    for job in jobs:
+        if not job.task.is_floor:
+            first.setdefault(job.task.label, job)
+    measured = {label: cost.recorded(job.timing) for label, job in first.items()}
+    return {label: earlier.seconds for label, earlier in measured.items() if earlier is not None}
+
+
+def _watched(
+    steps: Iterator[Step | None], at_work: dict[int, float], remaining: Remaining, watch: Watch
+) -> Iterator[Step | None]:
     """The same steps; of one that an executor takes ``at_work`` gets ``id`` and time [s], and the watch the task."""
     for job in steps:
         if job is not None:
             at_work[id(job)] = time.monotonic()
         if isinstance(job, Job):
+            remaining.begins(id(job), job.task.label, job.alone)
             watch.started(job.task)
         yield job
 

@@ -7,15 +7,17 @@ parameters of its own, so that Eq. 13, |P(H) + R|^2, is kept as it stands: a com
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from ...display.api import DisplaySpec
+from ...imaging.shifts import correlate_each
 from ...optics import AngularSpectrum
 from ...optics.phase import TAU, wrap
-from ...optics.phasor import phasor
+from ...optics.phasor import mean_phasor, phasor
 from ...optics.zernike import NAMES, zernike
 
 # Of the look-up table: levels where its deviation is learned; linear between them.
@@ -33,6 +35,17 @@ FIRST_CROSSTALK = 0.3
 # fringes, of which SOURCE_GRID follows the coarser ones alone, and the light from between the pixels as far as it is
 # not simply unmodulated, are among them.
 FORM = frozenset({"look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES})
+
+
+class Maps(NamedTuple):
+    """What a display does to any phase: factor of the phase and light ``(C, H, W)`` over the panel, share of the
+    neighbours in each sub-sample ``(C, samples, 2 reach + 1)``, phasors of the pupil and amplitude ``(C, ...)``."""
+
+    gain: Tensor
+    taps: Tensor
+    light: Tensor
+    pupil: Tensor
+    amplitude: Tensor
 
 
 class DisplayModel(nn.Module):
@@ -58,38 +71,46 @@ class DisplayModel(nn.Module):
         self.aberration = nn.Parameter(torch.zeros(channels, len(MODES)))
         self.brightness = nn.Parameter(torch.zeros(channels))
         self.register_buffer("modes", pupil_modes(spec.region.shape, spec.pupil), persistent=False)
+        self._held: tuple[list[object], Maps] | None = None
 
     def forward(self, phase: Tensor) -> Tensor:
         """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; its intensity is in the captures' unit."""
-        blurred = self._blurred(self._driven(phase))
-        panel = phasor(blurred.new_ones(()), blurred).mean(1)
-        panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * self._illumination()
+        maps = self._maps()
+        panel = lit(self._driven(phase) * maps.gain, maps.taps)
+        panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * maps.light
         region = [self.spec.region.crop(self._propagator(c).forward(field)) for c, field in enumerate(panel)]
-        return self._aberrated(torch.stack(region)) * torch.exp(self.brightness / 2)[:, None, None]
+        return torch.fft.ifft2(torch.fft.fft2(torch.stack(region)) * maps.pupil) * maps.amplitude
+
+    def _maps(self) -> Maps:
+        """Computed once for parameters that are constants, as in a retrieval; anew after one has changed."""
+        if any(parameter.requires_grad for parameter in self.parameters()):
+            return self._fresh_maps()
+        now: list[object] = [(parameter.data_ptr(), parameter._version) for parameter in self.parameters()]
+        if self._held is None or self._held[0] != now:
+            self._held = now, self._fresh_maps()
+        return self._held[1]
+
+    def _fresh_maps(self) -> Maps:
+        turned = torch.einsum("cm,mhw->chw", self.aberration, self.modes)
+        return Maps(
+            torch.exp(enlarged(self.gain, self.spec.shape)),
+            self._taps(),
+            self._illumination(),
+            phasor(turned.new_ones(()), turned),
+            torch.exp(self.brightness / 2)[:, None, None],
+        )
 
     def _propagator(self, channel: int) -> AngularSpectrum:
         return self.spec.propagator(channel, device=self.table.device)
 
     def _driven(self, phase: Tensor) -> Tensor:
-        """Phase that each level stands for: the look-up table, then the gain over the panel."""
+        """Phase that each level stands for, by the look-up table."""
         level = wrap(phase) * ((KNOTS - 1) / TAU)
         below = level.detach().floor().clamp_max(KNOTS - 2)
         rows = below.long().flatten(1)
         low, high = (self.table.gather(1, rows + step).view_as(level) for step in (0, 1))
         between = level - below
-        driven = level * (TAU / (KNOTS - 1)) + low + (high - low) * between
-        return driven * torch.exp(enlarged(self.gain, self.spec.shape))
-
-    def _blurred(self, phase: Tensor) -> Tensor:
-        """Phase at the sub-samples, ``(C, samples^2, H, W)``: square pixels convolved with a Gaussian."""
-        taps = self._taps()  # (C, samples, 2 reach + 1)
-        channels = len(phase)
-        padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
-        rows = functional.conv2d(padded, taps.reshape(channels * SAMPLES, 1, -1, 1), groups=channels)
-        rows = rows.view(channels, SAMPLES, *rows.shape[-2:]).transpose(0, 1)  # colours side by side again
-        columns = functional.conv2d(rows, taps.reshape(channels * SAMPLES, 1, 1, -1), groups=channels)
-        columns = columns.view(SAMPLES, channels, SAMPLES, *columns.shape[-2:])
-        return columns.transpose(0, 1).flatten(1, 2)
+        return level * (TAU / (KNOTS - 1)) + low + (high - low) * between
 
     def _taps(self) -> Tensor:
         """Share of each neighbouring pixel in each sub-sample, ``(C, samples, 2 reach + 1)``, along one axis."""
@@ -104,9 +125,24 @@ class DisplayModel(nn.Module):
         shape = self.spec.shape
         return torch.exp(enlarged(self.amplitude, shape)) * phasor(self.angle.new_ones(()), enlarged(self.angle, shape))
 
-    def _aberrated(self, field: Tensor) -> Tensor:
-        turned = torch.einsum("cm,mhw->chw", self.aberration, self.modes)
-        return torch.fft.ifft2(torch.fft.fft2(field) * phasor(turned.new_ones(()), turned))
+
+def lit(phase: Tensor, taps: Tensor) -> Tensor:
+    """Light that each pixel sends out, ``(C, H, W)``: the mean over its sub-samples, at which the phase ``(C, H, W)``
+    [rad] is that of square pixels convolved with a Gaussian.
+
+    taps: share of each neighbouring pixel in each sub-sample, ``(C, samples, 2 reach + 1)``, along one axis.
+    """
+    channels = len(phase)
+    padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
+    if phase.is_cpu and not taps.requires_grad:  # half the time of what follows
+        pairs = zip(padded[0], taps.tolist(), strict=True)
+        blurred = (correlate_each(correlate_each(colour, own, -2), own, -1).flatten(0, 1) for colour, own in pairs)
+        return torch.stack([mean_phasor(colour, 0) for colour in blurred])
+    rows = functional.conv2d(padded, taps.reshape(channels * SAMPLES, 1, -1, 1), groups=channels)
+    rows = rows.view(channels, SAMPLES, *rows.shape[-2:]).transpose(0, 1)  # colours side by side again
+    columns = functional.conv2d(rows, taps.reshape(channels * SAMPLES, 1, 1, -1), groups=channels)
+    columns = columns.view(SAMPLES, channels, SAMPLES, *columns.shape[-2:])
+    return mean_phasor(columns.transpose(0, 1).flatten(1, 2), 1)
 
 
 def enlarged(grid: Tensor, shape: tuple[int, int]) -> Tensor:

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from holobench_eval.commands.run import Sheet, draw_sheets, sheets
+from holobench_eval.commands.run import Sheet, _is_finished, _panel, draw_sheets, sheets
 from holobench_eval.report.charts import sheet as charts
-from holobench_eval.study import opening
+from holobench_eval.study import opening, provenance
+from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
 from tests.support.fake_study import write_config
 
@@ -45,3 +46,23 @@ def test_a_sheet_that_cannot_be_drawn_is_a_line(
     monkeypatch.setattr(opening, "simulated", lambda display, seed: 1 / 0)
     draw_sheets([sheet(tmp_path)], threads=1)
     assert capsys.readouterr().err == "holoeval: no stage sheet of ideal: division by zero\n"
+
+
+def test_the_panel_of_a_config_is_known_before_it_is_checked(tmp_path: Path) -> None:
+    study = load_study(write_config(tmp_path))
+    assert _panel(study.file) == study.display.panel
+    for text in ("display: {profiles: [ideal]}", "display: [", "3", "display: {panel: large}"):
+        (tmp_path / "other.yaml").write_text(text)
+        assert _panel(tmp_path / "other.yaml") is None
+    assert _panel(tmp_path / "missing.yaml") is None
+
+
+def test_a_study_is_finished_when_its_last_run_ended_and_its_config_is_still_the_same(tmp_path: Path) -> None:
+    study, output = load_study(write_config(tmp_path)), tmp_path / "out"
+    assert not _is_finished(study.file, output)
+    described = provenance.begin(output, provenance.describe(study, planning.plan(study), output, 1, 1), resumed=False)
+    assert not _is_finished(study.file, output)
+    provenance.end(output, described)
+    assert _is_finished(study.file, output)
+    study.file.write_text(study.text + "# changed\n")
+    assert not _is_finished(study.file, output)

@@ -1,9 +1,10 @@
 from __future__ import annotations
 
+import cv2
 import pytest
 import torch
 
-from holobench_eval.core.device import CPU, find, gpu_name, gpus, moved
+from holobench_eval.core.device import CPU, find, gpu_name, gpus, moved, repeatable
 from holobench_eval.core.errors import UserError
 from holobench_eval.display.simulated.stages.relay import gathered
 from holobench_eval.imaging.shifts import mirrored
@@ -96,3 +97,10 @@ def test_dropout_draws_what_torchs_own_draws() -> None:
     torch.manual_seed(3)
     assert torch.equal(Dropout(0.5)(features), expected)
     assert torch.equal(Dropout(0.5).eval()(features), features)
+
+
+def test_a_worker_of_one_thread_filters_with_one_and_others_get_theirs_back() -> None:
+    cv2.setNumThreads(2)
+    with repeatable(1):
+        assert (torch.get_num_threads(), cv2.getNumThreads()) == (1, 1)
+    assert cv2.getNumThreads() == 2

@@ -1,4 +1,4 @@
-"""What the metrics share: features of a target that are kept."""
+"""What the metrics share: features of a target that are kept, and Gaussian filters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import torch
 from torch import Tensor
 
-from holobench_eval.metrics.base import remembered
+from holobench_eval.imaging.shifts import correlate
+from holobench_eval.metrics.base import gaussian_taps, gaussian_valid, remembered
 
 
 def test_a_result_is_kept_by_what_the_image_shows_and_the_oldest_goes_first() -> None:
@@ -71,3 +72,13 @@ def test_what_was_asked_for_in_inference_mode_can_be_differentiated_later() -> N
     weight = torch.ones(1, requires_grad=True)
     (weight * known(torch.full((1, 1, 4, 4), 3.0))).sum().backward()
     assert weight.grad == 16 * 9
+
+
+def test_a_gaussian_filter_is_the_sum_of_shifted_images_and_so_is_its_gradient() -> None:
+    draw, taps = torch.Generator().manual_seed(1), gaussian_taps(1.5, 3)
+    image = torch.rand(2, 3, 11, 13, dtype=torch.float64, generator=draw).requires_grad_()
+    weights = torch.rand(2, 3, 5, 7, dtype=torch.float64, generator=draw)
+    filtered, expected = gaussian_valid(image, 1.5, 3), correlate(correlate(image, taps, -1), taps, -2)
+    assert torch.allclose(filtered, expected, rtol=1e-12)
+    gradients = [torch.autograd.grad((weights * each).sum(), image)[0] for each in (filtered, expected)]
+    assert torch.allclose(*gradients, rtol=1e-12)

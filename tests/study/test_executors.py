@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.study import executors
 from holobench_eval.study import run as running
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Local, Serial, executor
@@ -134,6 +135,51 @@ def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> N
         while Path("/proc", worker.name).exists():
             assert time.monotonic() < deadline
             time.sleep(0.05)
+
+
+@pytest.mark.slow
+def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet() -> None:
+    code = """if True:
+        import time
+        from holobench_eval.study.executors.local import prepare
+        prepare()
+        print("begun", flush=True)
+        try:
+            time.sleep(60)
+        except KeyboardInterrupt:
+            print("seen")
+    """
+    run = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert run.stdout is not None
+    assert run.stdout.readline() == "begun\n"
+    time.sleep(0.3)  # Python has started there, and the libraries take longer
+    os.killpg(run.pid, signal.SIGINT)
+    assert run.communicate(timeout=60) == ("seen\n", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "workers", "small", "begins"),
+    [
+        ("local", None, False, True),
+        ("auto", None, True, True),
+        ("auto", 2, False, True),
+        ("auto", None, False, False),
+        ("auto", 1, True, False),
+        ("local", 1, True, False),
+        ("serial", None, True, False),
+        ("slurm", 4, True, False),
+    ],
+)
+def test_workers_are_prepared_only_where_they_are_needed(
+    name: str, workers: int | None, small: bool, begins: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[bool] = []
+    monkeypatch.setattr(executors, "prepare", lambda: begun.append(True))
+    monkeypatch.setattr(executors, "_cores", lambda: 2)
+    executors.begin(name, workers, small)
+    assert bool(begun) == begins
 
 
 def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:

@@ -9,7 +9,9 @@ from rich.console import Console
 from holobench_eval.commands.plan import Row, preview, table
 from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Serial
 from holobench_eval.study.progress import Lines, watching
+from holobench_eval.study.run import run
 from holobench_eval.study.store import Record, Store
 from tests.study.test_run import compute
 from tests.support.fake_study import write_config
@@ -81,3 +83,38 @@ def test_the_table_of_a_preview_shows_sums_and_brackets(tmp_path: Path) -> None:
     assert all(
         word in text.getvalue() for word in ("a[b]", "34", "24", "at least 1.5", "50", "not timed", "solving [s]")
     )
+
+
+def test_lines_and_bar_show_the_time_left_of_the_run(tmp_path: Path) -> None:
+    task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
+    now, left, lines = [0.0], [None, 90.0], list[str]()
+    watch = Lines(lines.append, clock=lambda: now[0])
+    watch.planned(2, 2)
+    watch.expects(lambda: left[0])
+    for _ in range(2):
+        now[0] += 10
+        watch.started(task)
+        left.pop(0) if len(left) > 1 else None
+    assert ["left" in line for line in lines[1:]] == [False, True]
+    assert ", about 90 s left; now" in lines[-1]
+    text = io.StringIO()
+    with watching(Console(file=text, force_terminal=True, width=120)) as bar:
+        bar.planned(2, 2)
+        bar.expects(lambda: 90.0)
+        bar.started(task)
+    assert "0:01:30" in text.getvalue()
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_run_says_what_is_left_of_it_and_ends_with_nothing(tmp_path: Path) -> None:
+    study = load_study(write_config(tmp_path))
+    seen: list[float | None] = []
+
+    class Asking(Lines):
+        def finished(self, records: list[Record]) -> None:
+            super().finished(records)
+            seen.append(self.seconds_left())
+
+    run(study, planning.plan(study), tmp_path / "out", Serial(), Asking(lambda line: None), 1, tmp_path / "artifacts")
+    assert all(seconds is not None and seconds >= 0 for seconds in seen)
+    assert seen[-1] == 0

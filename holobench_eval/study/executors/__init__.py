@@ -78,9 +78,10 @@ def executor(name: str, workers: int | None, small: bool = True, address: str | 
     return Local(count, gpus)
 
 
-def begin(name: str) -> None:
-    """Start what the executor of a name probably needs, while this process still reads the study."""
-    if name == "local" or (name == "auto" and _cores() > 1):
+def begin(name: str, workers: int | None, small: bool) -> None:
+    """Start what an executor needs whose study is still being read; arguments as of ``executor``. GPUs are not looked
+    for: their workers are then started later."""
+    if workers != 1 and (name == "local" or (name == "auto" and _cores() > 1 and (small or workers is not None))):
         prepare()
 
 

@@ -10,7 +10,14 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import connection, forkserver, get_all_start_methods, get_context, parent_process
+from multiprocessing import (
+    connection,
+    forkserver,
+    get_all_start_methods,
+    get_context,
+    parent_process,
+    resource_tracker,
+)
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -150,8 +157,19 @@ def prepare() -> None:
     if not FORKS:
         return
     _CONTEXT.set_forkserver_preload(PRELOADED)
-    with _one_thread():
+    resource_tracker.ensure_running()  # now, since it lets Ctrl-C through as it starts
+    with _one_thread(), _no_ctrl_c():
         forkserver.ensure_running()
+
+
+@contextmanager
+def _no_ctrl_c() -> Iterator[None]:
+    """Processes that are started meanwhile never see Ctrl-C, not even as they import; here it waits."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

@@ -338,3 +338,36 @@ def test_a_fit_finds_the_gamma_the_gain_and_the_unmodulated_light_of_a_display()
                 for s in samples
             ]
         assert sorted(errors)[7] < 0.04
+
+
+def test_a_held_model_gives_what_a_learning_one_gives_and_the_same_gradient() -> None:
+    spec = spec_of()
+    learning, held = DisplayModel(spec), DisplayModel(spec).requires_grad_(False)
+    draw = torch.Generator().manual_seed(3)
+    for ours, theirs in zip(learning.parameters(), held.parameters(), strict=True):
+        with torch.no_grad():
+            ours += 0.1 * torch.randn(ours.shape, generator=draw)
+            theirs.copy_(ours)
+    results = []
+    for model in (learning, held, held):
+        phase = random_phase(spec).requires_grad_()
+        intensity = intensity_of(model, phase)
+        (gradient,) = torch.autograd.grad(intensity.square().sum(), phase)
+        results.append((intensity.detach(), gradient))
+    (expected, slope), *others = results
+    for intensity, gradient in others:
+        assert torch.allclose(intensity, expected, rtol=1e-4, atol=1e-5)
+        assert (gradient - slope).norm() < 1e-4 * slope.norm()
+
+
+def test_a_held_model_forgets_its_maps_when_it_is_given_other_parameters() -> None:
+    spec = spec_of()
+    held, other = DisplayModel(spec).requires_grad_(False), DisplayModel(spec)
+    phase = random_phase(spec)
+    before = held(phase)
+    with torch.no_grad():
+        other.amplitude += 0.5
+        other.brightness -= 0.3
+        held.load_state_dict(other.state_dict())
+        assert torch.allclose(held(phase), other(phase), rtol=1e-4, atol=1e-5)
+    assert not torch.allclose(held(phase), before, rtol=1e-2)
