@@ -19,11 +19,13 @@ from .blocks import in_blocks, in_parts
 from .sizes import LANES, Steps, steps
 
 Numbers = npt.NDArray[np.int64]
+Axis = tuple[int, npt.NDArray[np.int64], npt.NDArray[np.float32], npt.NDArray[np.float32]]
 
 PARTS = 4
 """Of the kernel's work: a thread that is disturbed leaves some of it to another."""
 SMALLEST_SHARED = 2**19
 """Samples of padded fields from which on two threads are quicker than one."""
+NOTHING = np.empty(0, np.float32)
 
 
 class TransferFunction(Protocol):
@@ -87,7 +89,7 @@ class Fused:
         height, width = field.shape[-2:]
         if height > self.shape[0] or width > self.shape[1]:  # compiled code would write beyond its arrays
             raise ValueError(f"field is {(height, width)}, the transfer function {self.shape}")
-        grid = Grid((1, height, width), self._rows, self._columns, self._starts)
+        grid = Grid((1, height, width), axis(self._rows), axis(self._columns), self._starts)
         field = field.contiguous().resolve_conj().resolve_neg()
         images = field[..., 0, 0].numel()
         result, tiles = torch.empty_like(field), grid.tiles(images)
@@ -98,18 +100,28 @@ class Fused:
         return result
 
 
+def axis(steps: Steps, weights: Tensor | None = None) -> Axis:
+    """An axis of a grid. weights: complex ones ``(planes, size)`` that add the spectra of planes of samples, relative to
+    the first one's; of one plane by default."""
+    others = NOTHING if weights is None else _floats((weights[1:] / weights[0]).to(torch.complex64))
+    return *steps, others
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Fields ``(..., planes, planes, H, W)``, contiguous, that the kernel transforms, and the tiles of their spectra.
 
-    The planes of a field interleave in an image of as many samples a pixel and axis. shape: (planes, H, W); rows,
-    columns: steps of the transforms along axes 0 and 1; starts: the first column of each tile.
+    The planes of a field interleave in an image of as many samples a pixel and axis; those of an image that is one
+    plane of ``(n H, n W)`` lie in memory as they interleave. shape: (planes, H, W), or (1, n H, n W); rows, columns:
+    axes 0 and 1 of the transforms; starts: the first column of each tile; keeps: whether there is room in a tile for
+    the spectrum of its columns.
     """
 
     shape: tuple[int, int, int]
-    rows: Steps
-    columns: Steps
+    rows: Axis
+    columns: Axis
     starts: Numbers
+    keeps: bool = False
 
     def blocks(self, images: int = 1) -> Numbers:
         """Numbers of the blocks of sixteen rows of all planes."""
@@ -121,33 +133,53 @@ class Grid:
 
     def spectra(self, field: Tensor, tiles: Tensor, blocks: Numbers) -> None:
         """Transform blocks of rows of a field into tiles."""
-        source, target, along = _floats(field), tiles.numpy(), (self.starts, self.columns)
-        rows = _fused().rows_forward
-        self._share(lambda *ends: rows(source, self.shape, blocks, *ends, target, *along), blocks, tiles)
+        source, target, along = _floats(field), tiles.numpy(), (self._tile, self.starts, self.columns)
+        rows, place = _fused().rows_forward, (0, self.shape[1], self.shape)
+        self._share(lambda *ends: rows(source, *place, blocks, *ends, target, *along), blocks, tiles)
 
     def convolve(
         self, tiles: Tensor, taken: Numbers, target: Grid, to: Tensor, put: Numbers, transfer: Tensor,
-        conjugated: bool, add: bool = False,
+        conjugated: bool, keep: bool = False, kept: tuple[Grid, Tensor, Numbers] | None = None,
     ) -> None:  # fmt: skip
         """Convolve columns by a transfer function, see ``tiled``: tiles ``taken`` into tiles ``put`` of another grid.
 
-        add: to what these tiles hold already.
+        keep: leave the filtered spectra in their tiles, for a grid that ``keeps``; kept: a grid and its tiles after
+        that, and of each tile taken here, the one whose spectrum is added before the filter, -1 for none.
         """
-        of, factors = (tiles.numpy(), taken, self.shape, self.rows), transfer.numpy().reshape(-1)
-        into = to.numpy(), put, target.shape, target.rows
-        rest = factors, transfer.shape[1], np.float32(-1 if conjugated else 1), add
+        of, factors = (tiles.numpy(), self._tile, taken, self._height, self.rows), transfer.numpy().reshape(-1)
+        into = to.numpy(), target._tile, put, target._height, target.rows
+        grid, spectra, joins = kept or (self, tiles, np.full(len(taken), -1))
+        rest = factors, np.float32(-1 if conjugated else 1), keep, spectra.numpy(), grid._tile, joins
         self._share(lambda *ends: _fused().columns(*of, *into, *ends, *rest), taken, tiles)
 
     def fields(self, tiles: Tensor, field: Tensor, blocks: Numbers) -> None:
         """Transform what ``convolve`` left in tiles back, into blocks of rows of a field."""
-        source, target, along = tiles.numpy(), _floats(field), (self.starts, self.columns)
+        self._back(tiles, (_floats(field), NOTHING, np.float32(0), False), blocks)
+
+    def intensities(self, tiles: Tensor, light: Tensor, power: float, add: bool) -> None:
+        """``power`` times the squared modulus of what ``fields`` gives, float32, in its place; add: to what is there."""
+        self._back(tiles, (NOTHING, light.numpy().reshape(-1), np.float32(power), add), self.blocks())
+
+    def _back(self, tiles: Tensor, into: tuple[object, ...], blocks: Numbers) -> None:
+        source, along = tiles.numpy(), (self._tile, self.starts, self.columns)
         rows = _fused().rows_back
-        self._share(lambda *ends: rows(target, self.shape, blocks, *ends, source, *along), blocks, tiles)
+        self._share(lambda *ends: rows(*into, self.shape, blocks, *ends, source, *along), blocks, tiles)
+
+    @property
+    def _height(self) -> int:
+        """Rows of all planes."""
+        return self.shape[0] * self.shape[1]
+
+    @property
+    def _tile(self) -> int:
+        """Samples of a tile."""
+        room = _fused().room
+        return int(max(self.shape[0] * room(self.shape[1]), room(self.rows[0]) if self.keeps else 0))
 
     @property
     def _size(self) -> int:
         """Floats in the tiles of an image."""
-        return len(self.starts) * self.shape[0] * int(_fused().room(self.shape[1])) * 2 * LANES
+        return len(self.starts) * self._tile * 2 * LANES
 
     def _share(self, work: Callable[[int, int], object], each: Numbers, tiles: Tensor) -> None:
         images = tiles.numel() // max(1, self._size)

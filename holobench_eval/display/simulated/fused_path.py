@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,27 +11,27 @@ import torch
 from torch import Tensor
 
 from ...optics.sizes import LANES, steps
-from ...optics.transfer import Grid, Numbers, kernel, tile_starts, tiled
+from ...optics.transfer import Grid, Numbers, axis, kernel, tile_starts, tiled
 from .path import LightPath, OpticalPath
 
 
 def quickest(path: OpticalPath, device: torch.device) -> LightPath:
     """The path on a device: by the kernel where it can be."""
-    samples = len(path.rows)
-    sizes = [factor * size for size in path.transfer.shape for factor in (1, samples, path.finer)]
     ready = device.type == "cpu" and path.transfer.dtype == torch.complex64
-    if kernel() is None or not ready or None in map(steps, sizes) or path.transfer.shape[1] < 2 * LANES:
+    if kernel() is None or not ready or None in map(steps, path.transfer.shape) or path.transfer.shape[1] < 2 * LANES:
         return path.to(device)
     return FusedPath(path)
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """An end of the path. grid: of its light; shared: numbers of its tiles that are tiles of the other end, too; plane:
-    the plane of the dust, on the tiles of this end; transfer: from here to there or back."""
+    """An end of the path. grid: of its light; shared: numbers of its tiles that are tiles of the other end, too; others:
+    for each of its tiles, the number of that of the other end, or -1; plane: the plane of the dust, on the tiles of
+    this end; transfer: from here to there or back."""
 
     grid: Grid
     shared: Numbers
+    others: Numbers
     plane: Grid
     transfer: Tensor
 
@@ -37,76 +39,76 @@ class _Side:
 class FusedPath:
     """What ``OpticalPath`` does, by the kernel.
 
-    Interleaved sub-samples are a finer grid: one transform of ``samples`` times the size adds their spectra. Of these,
-    only the band of frequencies is used that the padded grid has. The weights of sub-sample (0, 0) become part of the
-    transfer function. Those of the others differ by a phase that the finer grid gives, and by a constant, ``turn``.
+    The weights of the first sub-sample become part of the transfer function. Finer samples of the image are planes that
+    interleave, as the sub-samples are: each is the same spectrum, shifted.
     """
 
     def __init__(self, path: OpticalPath) -> None:
         height, width = path.shape
         samples, n = len(path.rows), path.finer
-        turn = (path.rows[:, 0] / path.rows[0, 0])[:, None] * (path.columns[:, 0] / path.columns[0, 0])
-        self._turn = None if bool((turn == 1).all()) else turn[:, :, None, None]
         first = path.transfer * path.rows[0][:, None] * path.columns[0]
         last = torch.ones_like(first) if path.last is None else path.last
         through = first * last
         self._change, self._dusty, ends = None, np.arange(0), (through, through)
         if path.dust is not None and len(path.dust.rows):
-            self._change, ends = torch.zeros(path.shape, dtype=first.dtype), (first, last)
-            self._change[path.dust.rows] = path.dust.change
+            # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
+            self._change, ends = torch.zeros(path.shape, dtype=first.dtype), (first, last * first.numel())
+            self._change[path.dust.rows] = path.dust.change / first.numel()
             self._dusty = (path.dust.rows // LANES).unique().numpy()
         starts = [tile_starts(end) for end in ends]
-        common = np.intersect1d(tile_starts(through), np.intersect1d(starts[0], starts[1]))
-        self._through = tiled(through, common)
+        shifts = [finer_weights(size, n) for size in through.shape]
 
-        def grid(planes: int, factor: int, shape: tuple[int, int], starts: Numbers) -> Grid:
-            rows, columns = (steps(factor * size) for size in through.shape)
-            assert rows is not None
-            assert columns is not None
-            band, low = through.shape[1], (through.shape[1] + 1) // 2
-            placed = np.where(starts < low, starts, starts + (factor - 1) * band)
-            return Grid((planes, *shape), rows, columns, placed)
+        def side(shape: tuple[int, int, int], weights: Sequence[Tensor | None], end: int) -> _Side:
+            here, there = starts[end], starts[1 - end]
+            common = np.isin(here, there)
+            lines = [steps(size) for size in through.shape]
+            axes = [axis(line, each) for line, each in zip(lines, weights, strict=True) if line is not None]
+            grid = Grid(shape, axes[0], axes[1], here, keeps=self._change is not None)
+            plane = Grid((1, height, width), *(axis(line) for line in lines if line is not None), here)
+            others = np.where(common, np.searchsorted(there, here), -1)
+            return _Side(grid, np.flatnonzero(common), others, plane, tiled(ends[end], here))
 
-        def side(planes: int, factor: int, shape: tuple[int, int], starts: Numbers, end: Tensor) -> _Side:
-            plane = grid(1, 1, path.shape, starts)
-            shared = np.searchsorted(starts, common)
-            factors = self._through if end is through else tiled(end, starts)
-            return _Side(grid(planes, factor, shape, starts), shared, plane, factors)
-
-        self._panel = side(samples, samples, path.shape, starts[0], ends[0])
-        self._image = side(1, n, (n * height, n * width), starts[1], ends[1])
+        self._panel = side((samples, height, width), (path.rows, path.columns), 0)
+        self._image = side((1, n * height, n * width), shifts, 1)
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
-        field = (field if self._turn is None else field * self._turn).to(torch.complex64)
-        _, height, width = self._image.grid.shape
-        return self._pass(field, self._panel, self._image, field.new_empty(height, width), conjugated=False)
+        tiles = self._pass(field.to(torch.complex64), self._panel, self._image, conjugated=False)
+        seen = field.new_empty(self._image.grid.shape[1:], dtype=torch.complex64)
+        self._image.grid.fields(tiles, seen, self._image.grid.blocks())
+        return seen
 
     def adjoint(self, image: Tensor) -> Tensor:
         """See ``LightPath``."""
+        tiles = self._pass(image, self._image, self._panel, conjugated=True)
         planes, height, width = self._panel.grid.shape
-        empty = image.new_empty(planes, planes, height, width)
-        field = self._pass(image, self._image, self._panel, empty, conjugated=True)
-        return field if self._turn is None else field.mul_(self._turn.conj())
+        field = image.new_empty(planes, planes, height, width)
+        self._panel.grid.fields(tiles, field, self._panel.grid.blocks())
+        return field
 
-    def _pass(self, field: Tensor, source: _Side, target: _Side, seen: Tensor, conjugated: bool) -> Tensor:
-        """Light that passes the dust as if there were none, and what the dust changes of it, in ``seen``."""
+    def _pass(self, field: Tensor, source: _Side, target: _Side, conjugated: bool) -> Tensor:
+        """Light from one end, in the tiles of the other. Dust adds what it changes to the spectrum of the light there."""
         spectra, tiles = source.grid.tiles(), target.grid.tiles()
         source.grid.spectra(field.contiguous().resolve_conj().resolve_neg(), spectra, source.grid.blocks())
-        if self._change is not None:
-            every, other = np.arange(len(source.plane.starts)), np.arange(len(target.plane.starts))
-            before, behind = source.plane.tiles(), target.plane.tiles().zero_()
-            source.grid.convolve(spectra, every, source.plane, before, every, source.transfer, conjugated)
-            light = torch.empty_like(self._change)
-            source.plane.fields(before, light, self._dusty)
-            for block in self._dusty:
-                rows = slice(block * LANES, (block + 1) * LANES)
-                light[rows] *= self._change[rows].conj() if conjugated else self._change[rows]
-            target.plane.spectra(light, behind, self._dusty)
-            target.plane.convolve(behind, other, target.grid, tiles, other, target.transfer, conjugated)
-        dusty = self._change is not None
-        source.grid.convolve(
-            spectra, source.shared, target.grid, tiles, target.shared, self._through, conjugated, add=dusty
-        )
-        target.grid.fields(tiles, seen, target.grid.blocks())
-        return seen
+        if self._change is None:
+            source.grid.convolve(spectra, source.shared, target.grid, tiles, target.shared, source.transfer, conjugated)
+            return tiles
+        every, other = np.arange(len(source.plane.starts)), np.arange(len(target.plane.starts))
+        before, behind = source.plane.tiles(), target.plane.tiles().zero_()
+        source.grid.convolve(spectra, every, source.plane, before, every, source.transfer, conjugated, keep=True)
+        light = torch.empty_like(self._change)
+        source.plane.fields(before, light, self._dusty)
+        for block in self._dusty:
+            rows = slice(block * LANES, (block + 1) * LANES)
+            light[rows] *= self._change[rows].conj() if conjugated else self._change[rows]
+        target.plane.spectra(light, behind, self._dusty)
+        kept = source.grid, spectra, target.others
+        target.plane.convolve(behind, other, target.grid, tiles, other, target.transfer, conjugated, kept=kept)
+        return tiles
+
+
+def finer_weights(size: int, factor: int) -> Tensor:
+    """Of the spectra of interleaving planes of samples, ``(factor, size)``, that make up that of a finer line."""
+    shift = torch.arange(factor, dtype=torch.float64, device="cpu")[:, None] / factor
+    angle = -2 * math.pi * shift * torch.fft.fftfreq(size, dtype=torch.float64, device="cpu")
+    return torch.polar(torch.ones_like(angle), angle)
