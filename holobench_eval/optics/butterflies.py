@@ -199,10 +199,10 @@ def _store_transposed(builder: Any, lines: Sequence[Sequence[Vector]], target: _
 def _instructions(arguments: str, write: Callable[..., None]) -> Any:
     """Signature and body of a compiled function whose instructions ``write`` gives.
 
-    arguments: a letter each; s: array of samples, f: array of floats, i: integer, g: float, b: whether.
+    arguments: a letter each; s: array of samples, f: array of floats, i: integer, g: float.
     """
     array = types.Array(types.float32, 1, "C")
-    kinds = {"s": array, "f": array, "i": types.intp, "g": types.float32, "b": types.boolean}
+    kinds = {"s": array, "f": array, "i": types.intp, "g": types.float32}
     units = {"s": SAMPLE, "f": 1}
 
     def code(context: Any, builder: Any, _: Any, values: Sequence[Any]) -> None:
@@ -389,24 +389,19 @@ def joined(_: Any, source: Any, begin: Any, hop: Any, field: Any, start: Any, st
 
 
 @intrinsic
-def squared(
-    _: Any, source: Any, begin: Any, light: Any, start: Any, stride: Any, rows: Any, power: Any, add: Any
-) -> Any:
-    """Sixteen samples from ``begin`` on to ``rows`` rows of their squared moduli times ``power``, added to what is
-    there if ``add`` says so."""
+def squared(_: Any, source: Any, begin: Any, light: Any, start: Any, stride: Any, rows: Any, power: Any) -> Any:
+    """Squared moduli, times ``power``, of sixteen samples from ``begin`` on, to ``rows`` rows."""
 
     def write(
-        builder: Any, source: _Array, begin: Any, light: _Array, start: Any, stride: Any, rows: Any, *given: Any
+        builder: Any, source: _Array, begin: Any, light: _Array, start: Any, stride: Any, rows: Any, power: Any
     ) -> None:
-        writer, power, nothing = _Transform(builder), _spread(builder, given[0]), _constant(0)
+        writer, factor = _Transform(builder), _spread(builder, power)
         samples = [source.sample(_place(builder, begin, _int(1), k)) for k in range(LANES)]
-        for row, line in enumerate(_transposed(builder, [writer.modulus(sample, power) for sample in samples])):
+        for row, line in enumerate(_transposed(builder, [writer.modulus(sample, factor) for sample in samples])):
             with builder.if_then(builder.icmp_signed("<", _int(row), rows)):
-                place = _place(builder, start, stride, row)
-                before = builder.select(given[1], light.load(place), nothing)
-                light.store(builder.fadd(before, line), place)
+                light.store(line, _place(builder, start, stride, row))
 
-    return _instructions("sifiiigb", write)
+    return _instructions("sifiiig", write)
 
 
 @intrinsic

@@ -4,9 +4,9 @@ Rows are transformed, then each block of sixteen columns is transformed, filtere
 is in the cache, then rows are transformed back. No padded array is ever formed. Between these three functions, a tile
 holds the spectra of rows at sixteen neighbouring columns, a sample of sixteen lines for each row.
 
-Fields may be sampled more finely than the band of the filter asks for, by several planes of samples that interleave. The
-spectrum in the band is then the sum of those of the planes, each times weights that shift it to its place; what a longer
-transform would give beyond the band is never computed.
+Fields may be sampled more finely than the band of the filter asks for, by planes of samples that interleave. The
+spectrum in the band is then the sum of those of the planes, each times weights that shift it to its place; what a
+longer transform would give beyond the band is never computed.
 
 The transform is Stockham's (Van Loan, Computational Frameworks for the Fast Fourier Transform, 1992, section 1.7), in
 the steps of ``sizes.steps``. Real and imaginary parts lie apart: the inverse transform is the transform with the two
@@ -205,12 +205,11 @@ def columns(
             _finish(result, lines, plane, target_planes, target_height, size, radices, factors)
 
 
-@njit(f"void(f4[::1], f4[::1], f4, b1, {SHAPE}, i8[::1], i8, i8, f4[::1], i8, i8[::1], {AXIS})", **OPTIONS)
-def rows_back(fields, light, power, add, shape, blocks, first, last, tiles, tile, starts, axis):
+@njit(f"void(f4[::1], f4[::1], f4, {SHAPE}, i8[::1], i8, i8, f4[::1], i8, i8[::1], {AXIS})", **OPTIONS)
+def rows_back(fields, light, power, shape, blocks, first, last, tiles, tile, starts, axis):
     """The way back of ``rows_forward``: of the tiles, whose real and imaginary parts are exchanged.
 
-    light: if it is not empty, it takes the squared moduli times ``power`` in the place of ``fields``; add: to what it
-    holds already.
+    light: if it is not empty, it takes the squared moduli times ``power``, in the place of ``fields``.
     """
     planes, height, width = shape
     size, radices, factors, weights = axis
@@ -238,14 +237,11 @@ def rows_back(fields, light, power, add, shape, blocks, first, last, tiles, tile
             begin = ((across * planes + plane) * height + row) * width
             if len(light):
                 for column in range(0, rest, LANES):
-                    squared(line, column, light, begin + column, width, rows, power, add)
+                    squared(line, column, light, begin + column, width, rows, power)
                 for column in range(rest, width):
                     for lane in range(rows):
                         imaginary, real = line[column * SAMPLE + lane], line[column * SAMPLE + LANES + lane]
-                        at = begin + lane * width + column
-                        light[at] = power * (real * real + imaginary * imaginary) + (
-                            light[at] if add else np.float32(0)
-                        )
+                        light[begin + lane * width + column] = power * (real * real + imaginary * imaginary)
             else:
                 for column in range(0, rest, LANES):
                     joined(line, column, 1, fields, 2 * (begin + column), 2 * width, rows)

@@ -101,8 +101,8 @@ class Fused:
 
 
 def axis(steps: Steps, weights: Tensor | None = None) -> Axis:
-    """An axis of a grid. weights: complex ones ``(planes, size)`` that add the spectra of planes of samples, relative to
-    the first one's; of one plane by default."""
+    """An axis of a grid. weights: complex ones ``(planes, size)`` that add the spectra of planes of samples, of which
+    only the ratios to the first one's count; None for one plane."""
     others = NOTHING if weights is None else _floats((weights[1:] / weights[0]).to(torch.complex64))
     return *steps, others
 
@@ -137,6 +137,15 @@ class Grid:
         rows, place = _fused().rows_forward, (0, self.shape[1], self.shape)
         self._share(lambda *ends: rows(source, *place, blocks, *ends, target, *along), blocks, tiles)
 
+    def spectra_of_rows(self, field: Tensor, tiles: Tensor, rows: slice) -> None:
+        """``spectra`` of some rows ``(planes, planes, rows, W)``, whole blocks but the last one; by one thread."""
+        planes, height, _ = self.shape
+        some = np.arange(rows.start // LANES, -(-rows.stop // LANES))
+        blocks = (np.arange(planes)[:, None] * -(-height // LANES) + some).ravel()
+        place = rows.start, rows.stop - rows.start, self.shape
+        ends, along = (0, len(blocks)), (self._tile, self.starts, self.columns)
+        _fused().rows_forward(_floats(field), *place, blocks, *ends, tiles.numpy(), *along)
+
     def convolve(
         self, tiles: Tensor, taken: Numbers, target: Grid, to: Tensor, put: Numbers, transfer: Tensor,
         conjugated: bool, keep: bool = False, kept: tuple[Grid, Tensor, Numbers] | None = None,
@@ -154,11 +163,11 @@ class Grid:
 
     def fields(self, tiles: Tensor, field: Tensor, blocks: Numbers) -> None:
         """Transform what ``convolve`` left in tiles back, into blocks of rows of a field."""
-        self._back(tiles, (_floats(field), NOTHING, np.float32(0), False), blocks)
+        self._back(tiles, (_floats(field), NOTHING, np.float32(0)), blocks)
 
-    def intensities(self, tiles: Tensor, light: Tensor, power: float, add: bool) -> None:
-        """``power`` times the squared modulus of what ``fields`` gives, float32, in its place; add: to what is there."""
-        self._back(tiles, (NOTHING, light.numpy().reshape(-1), np.float32(power), add), self.blocks())
+    def intensities(self, tiles: Tensor, light: Tensor, power: float) -> None:
+        """``power`` times the squared modulus of what ``fields`` would give, in ``light``, float32."""
+        self._back(tiles, (NOTHING, light.numpy().reshape(-1), np.float32(power)), self.blocks())
 
     def _back(self, tiles: Tensor, into: tuple[object, ...], blocks: Numbers) -> None:
         source, along = tiles.numpy(), (self._tile, self.starts, self.columns)

@@ -10,9 +10,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ...optics.blocks import in_blocks
 from ...optics.sizes import LANES, steps
 from ...optics.transfer import Grid, Numbers, axis, kernel, tile_starts, tiled
-from .path import LightPath, OpticalPath
+from .path import Light, LightPath, OpticalPath
 
 
 def quickest(path: OpticalPath, device: torch.device) -> LightPath:
@@ -25,9 +26,9 @@ def quickest(path: OpticalPath, device: torch.device) -> LightPath:
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """An end of the path. grid: of its light; shared: numbers of its tiles that are tiles of the other end, too; others:
-    for each of its tiles, the number of that of the other end, or -1; plane: the plane of the dust, on the tiles of
-    this end; transfer: from here to there or back."""
+    """An end of the path. grid: of its light; shared: numbers of its tiles that are tiles of the other end, too;
+    others: for each of its tiles, the number of that of the other end, or -1; plane: the plane of the dust, on the
+    tiles of this end; transfer: from here to there or back."""
 
     grid: Grid
     shared: Numbers
@@ -73,23 +74,40 @@ class FusedPath:
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
-        tiles = self._pass(field.to(torch.complex64), self._panel, self._image, conjugated=False)
-        seen = field.new_empty(self._image.grid.shape[1:], dtype=torch.complex64)
-        self._image.grid.fields(tiles, seen, self._image.grid.blocks())
+        source, target = self._panel, self._image
+        tiles = self._pass(_spectra(source.grid, field.to(torch.complex64)), source, target, conjugated=False)
+        seen = field.new_empty(target.grid.shape[1:], dtype=torch.complex64)
+        target.grid.fields(tiles, seen, target.grid.blocks())
         return seen
 
     def adjoint(self, image: Tensor) -> Tensor:
         """See ``LightPath``."""
-        tiles = self._pass(image, self._image, self._panel, conjugated=True)
-        planes, height, width = self._panel.grid.shape
+        source, target = self._image, self._panel
+        tiles = self._pass(_spectra(source.grid, image), source, target, conjugated=True)
+        planes, height, width = target.grid.shape
         field = image.new_empty(planes, planes, height, width)
-        self._panel.grid.fields(tiles, field, self._panel.grid.blocks())
+        target.grid.fields(tiles, field, target.grid.blocks())
         return field
 
-    def _pass(self, field: Tensor, source: _Side, target: _Side, conjugated: bool) -> Tensor:
-        """Light from one end, in the tiles of the other. Dust adds what it changes to the spectrum of the light there."""
-        spectra, tiles = source.grid.tiles(), target.grid.tiles()
-        source.grid.spectra(field.contiguous().resolve_conj().resolve_neg(), spectra, source.grid.blocks())
+    def intensity(self, light: Light, power: float) -> Tensor:
+        """See ``LightPath``. The light of a few rows is transformed while it is in the cache."""
+        spectra, grid = self._panel.grid.tiles(), self._panel.grid
+        planes, height, width = grid.shape
+        blocks = -(-height // LANES)
+
+        def transform(some: slice) -> None:
+            rows = slice(some.start * LANES, min(some.stop * LANES, height))
+            grid.spectra_of_rows(light(rows), spectra, rows)
+
+        in_blocks(transform, spectra, blocks, 2 * planes**2 * height * width)
+        tiles = self._pass(spectra, self._panel, self._image, conjugated=False)
+        seen = torch.empty(self._image.grid.shape[1:], dtype=torch.float32, device="cpu")
+        self._image.grid.intensities(tiles, seen, power)
+        return seen
+
+    def _pass(self, spectra: Tensor, source: _Side, target: _Side, conjugated: bool) -> Tensor:
+        """Light from one end, in the tiles of the other; dust adds what it changes to the light's spectrum."""
+        tiles = target.grid.tiles()
         if self._change is None:
             source.grid.convolve(spectra, source.shared, target.grid, tiles, target.shared, source.transfer, conjugated)
             return tiles
@@ -105,6 +123,12 @@ class FusedPath:
         kept = source.grid, spectra, target.others
         target.plane.convolve(behind, other, target.grid, tiles, other, target.transfer, conjugated, kept=kept)
         return tiles
+
+
+def _spectra(grid: Grid, field: Tensor) -> Tensor:
+    tiles = grid.tiles()
+    grid.spectra(field.contiguous().resolve_conj().resolve_neg(), tiles, grid.blocks())
+    return tiles
 
 
 def finer_weights(size: int, factor: int) -> Tensor:

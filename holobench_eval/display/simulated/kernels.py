@@ -91,25 +91,19 @@ def pairs(distance: Any, direction: Any, x: Any, y: Any) -> None:
 
 
 @compiled
+def normal_row(row: int, key: Any, random: Any, out: Any) -> None:
+    """Normal numbers ``(4, columns)`` of a row; random: room for as many words."""
+    words(row, key, random)
+    pairs(random[0], random[1], out[0], out[1])
+    pairs(random[2], random[3], out[2], out[3])
+
+
+@compiled
 def normal_rows(first: int, key: Any, out: Any) -> None:
     """Normal numbers ``(rows, 4, columns)`` of the rows from ``first`` on."""
     random = np.empty(out.shape[1:], np.uint32)
     for r in range(out.shape[0]):
-        words(first + r, key, random)
-        pairs(random[0], random[1], out[r, 0], out[r, 1])
-        pairs(random[2], random[3], out[r, 2], out[r, 3])
-
-
-@compiled
-def count_rows(
-    light: Plane, response: Plane, normal: Plane, electrons: float, ambient: float, numbers: Any, out: Plane
-) -> None:
-    """Counts of ``light`` ``(rows, columns)``; see ``Sensor.expose``."""
-    read, bend, gain, dark, white = numbers
-    for r in range(out.shape[0]):
-        for c in range(out.shape[1]):
-            charge = response[r, c] * (light[r, c] * F(electrons) + F(ambient))
-            out[r, c] = _counts(charge, normal[r, c], F(read), F(bend), F(gain), F(dark), F(white))
+        normal_row(first + r, key, random, out[r])
 
 
 @compiled
@@ -123,24 +117,80 @@ def weigh(at: Any, last: int, pixel: Any, low: Any, high: Any) -> None:
 
 
 @compiled
+def sample_row(image: Plane, grid: Plane, places: Plane, weights: Plane, first: Any, out: Plane) -> None:
+    """Bilinear values of an image at a row of places ``(columns, 2)``; see ``relay.sample``.
+
+    places ``(2, columns)``, weights ``(4, columns)``, first ``(2, columns)``, int32: room for what is computed.
+    """
+    rows, columns = image.shape
+    one, x, y = np.uint64(1), places[0], places[1]
+    left, right, above, below = weights[0], weights[1], weights[2], weights[3]
+    for c in range(out.size):
+        x[c] = (grid[c, 0] + F(1)) * F((columns - 1) / 2)
+        y[c] = (grid[c, 1] + F(1)) * F((rows - 1) / 2)
+    weigh(x, columns - 1, first[0], left, right)
+    weigh(y, rows - 1, first[1], above, below)
+    for c in range(out.size):
+        i, j = np.uint64(first[0, c]), np.uint64(first[1, c])  # unsigned: not counted from the end
+        upper = image[j, i] * left[c] + image[j, i + one] * right[c]
+        lower = image[j + one, i] * left[c] + image[j + one, i + one] * right[c]
+        out[c] = upper * above[c] + lower * below[c]
+
+
+@compiled
 def sample_rows(image: Plane, grid: Plane, out: Plane) -> None:
     """Bilinear values of an image at a grid ``(rows, columns, 2)`` of (x, y) in [-1, 1]; see ``relay.sample``."""
-    rows, columns = image.shape
-    size, one = grid.shape[1], np.uint64(1)
-    x, y = np.empty(size, np.float32), np.empty(size, np.float32)
-    left, right, above, below = (np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x))
-    column, row = np.empty(size, np.int32), np.empty(size, np.int32)
+    size = grid.shape[1]
+    places, weights, first = np.empty((2, size), F), np.empty((4, size), F), np.empty((2, size), N)
     for r in range(grid.shape[0]):
+        sample_row(image, grid[r], places, weights, first, out[r])
+
+
+@compiled
+def expose_rows(
+    image: Plane,
+    grid: Plane,
+    response: Plane,
+    top: int,
+    key: Any,
+    electrons: float,
+    ambient: float,
+    numbers: Any,
+    out: Plane,
+) -> None:
+    """Counts of the rows of a sensor from ``top`` on: ``sample_rows``, with the noise of ``normal_rows``; see
+    ``Sensor.expose``."""
+    read, bend, gain, dark, white = numbers
+    size, quarter = grid.shape[1], -(-grid.shape[1] // 4)
+    places, weights, first = np.empty((2, size), F), np.empty((4, size), F), np.empty((2, size), N)
+    random, normal, light = np.empty((4, quarter), U), np.empty((4, quarter), F), np.empty(size, F)
+    noise = normal.reshape(4 * quarter)
+    for r in range(out.shape[0]):
+        sample_row(image, grid[r], places, weights, first, light)
+        normal_row(top + r, key, random, normal)
         for c in range(size):
-            x[c] = (grid[r, c, 0] + F(1)) * F((columns - 1) / 2)
-            y[c] = (grid[r, c, 1] + F(1)) * F((rows - 1) / 2)
-        weigh(x, columns - 1, column, left, right)
-        weigh(y, rows - 1, row, above, below)
-        for c in range(size):
-            j, i = np.uint64(row[c]), np.uint64(column[c])  # unsigned: not counted from the end
-            upper = image[j, i] * left[c] + image[j, i + one] * right[c]
-            lower = image[j + one, i] * left[c] + image[j + one, i + one] * right[c]
-            out[r, c] = upper * above[c] + lower * below[c]
+            charge = response[r, c] * (light[c] * F(electrons) + F(ambient))
+            out[r, c] = _counts(charge, noise[c], F(read), F(bend), F(gain), F(dark), F(white))
+
+
+@compiled
+def box_rows(image: Plane, taps: Plane, first: int, last: int, out: Plane) -> None:
+    """Rows ``first`` to ``last`` of an image filtered by ``taps`` along both axes, beyond its edges as at them."""
+    height, width = image.shape
+    reach = taps.size // 2
+    line, total = np.empty(width + 2 * reach, F), np.empty(width, F)
+    for r in range(first, last):
+        total[:] = 0
+        for k in range(taps.size):
+            row = image[min(max(r + k - reach, 0), height - 1)]
+            for c in range(width):
+                total[c] += taps[k] * row[c]
+        line[:reach], line[reach : reach + width], line[reach + width :] = total[0], total, total[width - 1]
+        for c in range(width):
+            out[r, c] = 0
+        for k in range(taps.size):
+            for c in range(width):
+                out[r, c] += taps[k] * line[c + k]
 
 
 @compiled
@@ -166,14 +216,17 @@ def modulate_rows(
     table: Plane,
     taps: Plane,
     modulated: Plane,
-    amplitude: Plane,
-    angle: Plane,
+    unmodulated: Plane,
+    incident: Plane,
     first: int,
     last: int,
     out: Plane,
 ) -> None:
-    """The light of the sub-samples ``(samples, samples, H, 2 W)``, real and imaginary parts in turn, in rows ``first``
-    to ``last`` of the panel; see ``SimulatedBench._modulated_field``."""
+    """The light of the sub-samples in rows ``first`` to ``last`` of the panel; see ``SimulatedBench._modulated_field``.
+
+    Complex numbers are real and imaginary parts in turn: unmodulated ``(samples, samples, 2)``, incident ``(H, 2 W)``,
+    out ``(samples, samples, rows, 2 W)``.
+    """
     height, width = phase.shape
     samples, reach, rows = len(taps), taps.shape[1] // 2, last - first
     driven = np.empty((rows + 2 * reach, width + 2 * reach), np.float32)
@@ -184,17 +237,20 @@ def modulate_rows(
         driven[r, reach + width :] = driven[r, reach + width - 1]
     line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
     for r in range(rows):
+        light = incident[first + r]
         for j in range(samples):
             line[:] = 0
             for k in range(taps.shape[1]):
                 for c in range(line.size):
                     line[c] += taps[j, k] * driven[r + k, c]
             for i in range(samples):
-                fine[:] = angle[first + r]
+                fine[:] = 0
                 for k in range(taps.shape[1]):
                     for c in range(width):
                         fine[c] += taps[i, k] * line[c + k]
+                share, real, imaginary = modulated[j, i], unmodulated[j, i, 0], unmodulated[j, i, 1]
                 for c in range(width):
                     sine, cosine = sincos(fine[c])
-                    light = modulated[j, i] * amplitude[first + r, c]
-                    out[j, i, first + r, 2 * c], out[j, i, first + r, 2 * c + 1] = light * cosine, light * sine
+                    a, b = share * cosine + real, share * sine + imaginary
+                    out[j, i, r, 2 * c] = a * light[2 * c] - b * light[2 * c + 1]
+                    out[j, i, r, 2 * c + 1] = a * light[2 * c + 1] + b * light[2 * c]

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from functools import partial, reduce
 from operator import add, mul
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from ...core.compiled import usable
@@ -22,13 +24,13 @@ from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .fused_path import quickest
 from .geometry import Geometry
-from .kernels import modulate_rows
-from .noise import normal
-from .path import Dust, LightPath, OpticalPath, image
+from .kernels import expose_rows, modulate_rows
+from .noise import halves, normal
+from .path import Dust, Light, LightPath, OpticalPath, image
 from .profile import Profile
 from .stages.panel import straight_through_level
 from .stages.propagation import sample_weights
-from .stages.relay import sample, sampling_grid
+from .stages.relay import finer_grid, sample, sampling_grid
 from .stages.sensor import IMAGE_SAMPLES
 
 
@@ -36,18 +38,16 @@ from .stages.sensor import IMAGE_SAMPLES
 class ChannelMaps:
     """What is fixed for one line of the source: every random pattern drawn, every transfer function built.
 
-    added: phase [rad] that the display adds to every hologram; lut_gain; amplitude and angle [rad] of the incident
-    light: ``(H, W)``; path: all that is linear in the light; still: at the image, light that no phase changes
-    ``(n H, n W)``; laser_power: of the line, relative to what the camera's exposure was set for.
+    added: phase [rad] that the display adds to every hologram; lut_gain; incident: complex amplitude of the light at
+    the panel: ``(H, W)``; path: all that is linear in the light; laser_power: of the line, relative to what the
+    camera's exposure was set for.
     """
 
     geometry: Geometry
     added: Tensor
     lut_gain: Tensor
-    amplitude: Tensor
-    angle: Tensor
+    incident: Tensor
     path: LightPath
-    still: Tensor
     laser_power: float
 
 
@@ -89,7 +89,7 @@ class SimulatedBench:
         dead = aperture.dead_share(self.samples) if aperture else torch.zeros(self.samples**2, 1, 1)
         grid = (self.samples, self.samples, 1, 1)
         self.modulated = (order.modulated * active).view(grid).to(device)
-        self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid)
+        self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid).to(device, torch.complex64)
         geometries = [
             Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names)
             for index, wavelength in enumerate(panel.wavelengths)
@@ -104,6 +104,8 @@ class SimulatedBench:
             panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape
         )
         self.grid = sampling_grid(self.points, panel.shape).to(device)
+        fine = [self.image_samples * size for size in panel.shape]
+        self.fine_grid = finer_grid(self.grid, fine, self.image_samples)
         self.response = profile.sensor.response((self.points.shape[0], self.points.shape[1]), geometry)
 
     def _lines(self, geometry: Geometry) -> list[tuple[float, Geometry]]:
@@ -142,10 +144,8 @@ class SimulatedBench:
             geometry=geometry,
             added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
             lut_gain=profile.lut.gain_map(geometry).to(self.device),
-            amplitude=incident.abs().to(self.device),
-            angle=incident.angle().to(self.device),
+            incident=incident.to(self.device, torch.complex64),
             path=path,
-            still=path.forward((self.unmodulated * incident).to(self.device)),
             laser_power=profile.drift.laser_power(geometry) * profile.illumination.power * share,
         )
 
@@ -154,36 +154,33 @@ class SimulatedBench:
         panel = self.profile.panel
         return padded_shape(panel.shape, panel.pitch, max(panel.wavelengths), panel.distance, panel.pupil, None)
 
-    def _modulated_field(self, phase: Tensor, maps: ChannelMaps, flicker: float) -> Tensor:
-        """Field ``(samples, samples, H, W)`` of the sub-samples' light that follows ``phase`` ``(H, W)`` [rad].
+    def _modulated_field(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Tensor:
+        """Field ``(samples, samples, H, W)`` of the sub-samples, the carrier off, of ``phase`` ``(H, W)`` [rad].
 
-        The carrier is off. The light that follows no phase is in ``ChannelMaps.still``.
+        gain: of the phase in this frame, relative.
         """
-        if tuple(phase.shape) != tuple(self.profile.panel.shape):  # compiled code would read beyond it
-            raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
-        if usable(phase) and phase.dtype == maps.amplitude.dtype:
-            return self._compiled_field(phase, maps, flicker * self.drift_gain)
-        profile, gain = self.profile, maps.lut_gain * (flicker * self.drift_gain)
+        profile = self.profile
         level = straight_through_level(phase + maps.added, profile.panel.bits)
-        driven = profile.lut.phase(level, profile.panel.bits, gain, maps.geometry.channel)
+        driven = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * gain, maps.geometry.channel)
         fine = profile.crosstalk.apply(driven, self.crosstalk).view(self.samples, self.samples, *driven.shape)
-        return phasor(self.modulated * maps.amplitude, fine + maps.angle)
+        return (phasor(self.modulated, fine) + self.unmodulated) * maps.incident
 
-    def _compiled_field(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Tensor:
-        """``_modulated_field`` without a gradient, a block of rows at a time; gain: relative, of the frame."""
+    def _compiled_light(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Light:
+        """``_modulated_field`` without a gradient, some rows at a time."""
         bits, channel = self.profile.panel.bits, maps.geometry.channel
         table = self.profile.lut.phase(torch.arange(2.0**bits), bits, torch.ones(()), channel).numpy()
         drive = phase.detach().contiguous().numpy(), maps.added.numpy(), maps.lut_gain.numpy()
-        share = self.crosstalk.numpy(), self.modulated[:, :, 0, 0].numpy()
-        light = maps.amplitude.numpy(), maps.angle.numpy()
-        field = torch.empty((self.samples, self.samples, *phase.shape), dtype=torch.complex64, device="cpu")
-        parts = torch.view_as_real(field).flatten(-2).numpy()
+        share = self.crosstalk.numpy(), self.modulated[:, :, 0, 0].numpy(), floats(self.unmodulated[:, :, 0, 0])
+        incident = floats(maps.incident).reshape(len(phase), -1)
 
-        def modulate(rows: slice) -> None:
-            modulate_rows(*drive, gain, table, *share, *light, rows.start, rows.stop, parts)
+        def light(rows: slice) -> Tensor:
+            some = (self.samples, self.samples, rows.stop - rows.start, phase.shape[1])
+            field = torch.empty(some, dtype=torch.complex64, device="cpu")
+            parts = floats(field).reshape(*some[:-1], -1)
+            modulate_rows(*drive, gain, table, *share, incident, rows.start, rows.stop, parts)
+            return field
 
-        in_blocks(modulate, field, len(phase), phase.numel())
-        return field
+        return light
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane.
@@ -202,12 +199,15 @@ class SimulatedBench:
         Tensor
             ``(n H, n W)`` for n = ``image_samples``; the mean incident intensity on the panel is 1.
         """
-        lines = (
-            squared_modulus(image(maps.path, self._modulated_field(phase, maps, flicker)).add_(maps.still))
-            * maps.laser_power
-            for maps in self.lines[channel]
-        )
-        return reduce(add, lines)
+        if tuple(phase.shape) != tuple(self.profile.panel.shape):  # compiled code would read beyond it
+            raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
+        return reduce(add, (self._of_line(phase, maps, flicker * self.drift_gain) for maps in self.lines[channel]))
+
+    def _of_line(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Tensor:
+        """``intensity`` of one line of the source; gain: of the phase in this frame, relative."""
+        if usable(phase) and phase.dtype == torch.float32:
+            return maps.path.intensity(self._compiled_light(phase, maps, gain), maps.laser_power)
+        return squared_modulus(image(maps.path, self._modulated_field(phase, maps, gain))) * maps.laser_power
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """``intensity`` as it falls on the sensor: after what spreads it, averaged over the area of a sensor pixel."""
@@ -242,9 +242,20 @@ class SimulatedBench:
 
     def _expose(self, light: Tensor, electrons: float, key: int, frame: Tensor, rows: slice) -> None:
         """Fill rows of a frame ``(Hs, Ws)`` with the counts of ``light``, as ``integrated`` gives it."""
-        seen = sample(light, self.grid[rows], self.image_samples).cpu()
-        noise = normal(key, rows, frame.shape[1])
-        frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise)
+        sensor, grid, response = self.profile.sensor, self.fine_grid[rows], self.response[rows]
+        if sensor.noise and usable(light):
+            draws, into = (rows.start, halves(key)), frame[rows].numpy()
+            planes = light.numpy(), grid.numpy(), response.numpy()
+            expose_rows(*planes, *draws, electrons, sensor.stray, sensor.numbers, into)
+        else:
+            seen, noise = sample(light, grid, 1).cpu(), normal(key, rows, frame.shape[1])
+            frame[rows] = sensor.expose(seen, electrons, response, noise)
+
+
+def floats(field: Tensor) -> NDArray[np.float32]:
+    """Real and imaginary parts of a complex tensor, in an axis of their own."""
+    parts: NDArray[np.float32] = torch.view_as_real(field).numpy()
+    return parts
 
 
 def present(tensors: Iterable[Tensor | None]) -> Iterator[Tensor]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+import numpy as np
 import torch
 import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
@@ -14,8 +15,9 @@ from torch import Tensor
 
 from ....core.compiled import usable
 from ....imaging.shifts import correlate
+from ....optics.blocks import in_blocks
 from ..geometry import Geometry
-from ..kernels import count_rows, counts
+from ..kernels import box_rows, counts
 from ..stage import Effect, Stage, percent
 
 if TYPE_CHECKING:
@@ -99,18 +101,21 @@ class Sensor(Stage):
         Shot noise is the normal approximation of Poisson noise; its error is below the read noise above 20 e-.
         normal: standard normal numbers ``(Hs, Ws)``, one for the noise of each pixel.
         """
-        ambient = self.ambient * self.full_well / self.headroom
+        charge = response * (light * electrons + self.stray)
         if not self.noise:
-            charge = response * (light * electrons + ambient)
             return (charge * self.counts_per_electron + self.dark).clamp(max=self.white)
-        planes = light.numpy(), response.numpy(), normal.numpy()
+        return torch.from_numpy(counts(charge.numpy(), normal.numpy(), *self.numbers))
+
+    @property
+    def stray(self) -> float:
+        """Charge of the ambient light in a pixel [electrons]."""
+        return self.ambient * self.full_well / self.headroom
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float]:
+        """What ``counts`` needs to know."""
         bend = self.nonlinearity / self.full_well
-        numbers = (self.read_noise**2, bend, self.counts_per_electron, self.dark, self.white)
-        if not usable(light):
-            return torch.from_numpy(counts(planes[1] * (planes[0] * electrons + ambient), planes[2], *numbers))
-        counted = torch.empty(light.shape, dtype=torch.float32, device="cpu")
-        count_rows(*planes, electrons, ambient, numbers, counted.numpy())
-        return counted
+        return self.read_noise**2, bend, self.counts_per_electron, self.dark, self.white
 
 
 def box_filter(image: Tensor, width: float) -> Tensor:
@@ -120,5 +125,15 @@ def box_filter(image: Tensor, width: float) -> Tensor:
     reach = math.ceil((width - 1) / 2)
     edge = (width - (2 * reach - 1)) / 2
     taps = [share / width for share in (edge, *[1.0] * (2 * reach - 1), edge)]
+    if usable(image) and image.ndim == 2 and image.dtype == torch.float32:
+        given, filtered = image.detach().contiguous().numpy(), torch.empty(image.shape, dtype=image.dtype, device="cpu")
+        shares = np.array(taps, np.float32)
+        in_blocks(
+            lambda rows: box_rows(given, shares, rows.start, rows.stop, filtered.numpy()),
+            filtered,
+            len(image),
+            image.numel(),
+        )
+        return filtered
     flat = F.pad(image.reshape(-1, 1, *image.shape[-2:]), (reach, reach, reach, reach), mode="replicate")
     return correlate(correlate(flat, taps, dim=-2), taps, dim=-1).reshape(image.shape)
