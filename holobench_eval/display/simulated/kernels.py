@@ -91,19 +91,25 @@ def pairs(distance: Any, direction: Any, x: Any, y: Any) -> None:
 
 
 @compiled
-def normal_row(row: int, key: Any, random: Any, out: Any) -> None:
-    """Normal numbers ``(4, columns)`` of a row; random: room for as many words."""
-    words(row, key, random)
-    pairs(random[0], random[1], out[0], out[1])
-    pairs(random[2], random[3], out[2], out[3])
-
-
-@compiled
 def normal_rows(first: int, key: Any, out: Any) -> None:
     """Normal numbers ``(rows, 4, columns)`` of the rows from ``first`` on."""
     random = np.empty(out.shape[1:], np.uint32)
     for r in range(out.shape[0]):
-        normal_row(first + r, key, random, out[r])
+        words(first + r, key, random)
+        pairs(random[0], random[1], out[r, 0], out[r, 1])
+        pairs(random[2], random[3], out[r, 2], out[r, 3])
+
+
+@compiled
+def count_rows(
+    light: Plane, response: Plane, normal: Plane, electrons: float, ambient: float, numbers: Any, out: Plane
+) -> None:
+    """Counts of ``light`` ``(rows, columns)``; see ``Sensor.expose``."""
+    read, bend, gain, dark, white = numbers
+    for r in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            charge = response[r, c] * (light[r, c] * F(electrons) + F(ambient))
+            out[r, c] = _counts(charge, normal[r, c], F(read), F(bend), F(gain), F(dark), F(white))
 
 
 @compiled
@@ -117,60 +123,24 @@ def weigh(at: Any, last: int, pixel: Any, low: Any, high: Any) -> None:
 
 
 @compiled
-def sample_row(image: Plane, grid: Plane, places: Plane, weights: Plane, first: Any, out: Plane) -> None:
-    """Bilinear values of an image at a row of places ``(columns, 2)``; see ``relay.sample``.
-
-    places ``(2, columns)``, weights ``(4, columns)``, first ``(2, columns)``, int32: room for what is computed.
-    """
-    rows, columns = image.shape
-    one, x, y = np.uint64(1), places[0], places[1]
-    left, right, above, below = weights[0], weights[1], weights[2], weights[3]
-    for c in range(out.size):
-        x[c] = (grid[c, 0] + F(1)) * F((columns - 1) / 2)
-        y[c] = (grid[c, 1] + F(1)) * F((rows - 1) / 2)
-    weigh(x, columns - 1, first[0], left, right)
-    weigh(y, rows - 1, first[1], above, below)
-    for c in range(out.size):
-        i, j = np.uint64(first[0, c]), np.uint64(first[1, c])  # unsigned: not counted from the end
-        upper = image[j, i] * left[c] + image[j, i + one] * right[c]
-        lower = image[j + one, i] * left[c] + image[j + one, i + one] * right[c]
-        out[c] = upper * above[c] + lower * below[c]
-
-
-@compiled
 def sample_rows(image: Plane, grid: Plane, out: Plane) -> None:
     """Bilinear values of an image at a grid ``(rows, columns, 2)`` of (x, y) in [-1, 1]; see ``relay.sample``."""
-    size = grid.shape[1]
-    places, weights, first = np.empty((2, size), F), np.empty((4, size), F), np.empty((2, size), N)
+    rows, columns = image.shape
+    size, one = grid.shape[1], np.uint64(1)
+    x, y = np.empty(size, np.float32), np.empty(size, np.float32)
+    left, right, above, below = (np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x))
+    column, row = np.empty(size, np.int32), np.empty(size, np.int32)
     for r in range(grid.shape[0]):
-        sample_row(image, grid[r], places, weights, first, out[r])
-
-
-@compiled
-def expose_rows(
-    image: Plane,
-    grid: Plane,
-    response: Plane,
-    top: int,
-    key: Any,
-    electrons: float,
-    ambient: float,
-    numbers: Any,
-    out: Plane,
-) -> None:
-    """Counts of the rows of a sensor from ``top`` on: ``sample_rows``, with the noise of ``normal_rows``; see
-    ``Sensor.expose``."""
-    read, bend, gain, dark, white = numbers
-    size, quarter = grid.shape[1], -(-grid.shape[1] // 4)
-    places, weights, first = np.empty((2, size), F), np.empty((4, size), F), np.empty((2, size), N)
-    random, normal, light = np.empty((4, quarter), U), np.empty((4, quarter), F), np.empty(size, F)
-    noise = normal.reshape(4 * quarter)
-    for r in range(out.shape[0]):
-        sample_row(image, grid[r], places, weights, first, light)
-        normal_row(top + r, key, random, normal)
         for c in range(size):
-            charge = response[r, c] * (light[c] * F(electrons) + F(ambient))
-            out[r, c] = _counts(charge, noise[c], F(read), F(bend), F(gain), F(dark), F(white))
+            x[c] = (grid[r, c, 0] + F(1)) * F((columns - 1) / 2)
+            y[c] = (grid[r, c, 1] + F(1)) * F((rows - 1) / 2)
+        weigh(x, columns - 1, column, left, right)
+        weigh(y, rows - 1, row, above, below)
+        for c in range(size):
+            j, i = np.uint64(row[c]), np.uint64(column[c])  # unsigned: not counted from the end
+            upper = image[j, i] * left[c] + image[j, i + one] * right[c]
+            lower = image[j + one, i] * left[c] + image[j + one, i + one] * right[c]
+            out[r, c] = upper * above[c] + lower * below[c]
 
 
 @compiled

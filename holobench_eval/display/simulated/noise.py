@@ -36,18 +36,14 @@ def normal(key: int, rows: slice, columns: int) -> Tensor:
     """
     quarter = math.ceil(columns / 4)
     numbers = np.empty((rows.stop - rows.start, 4, quarter), np.float32)
+    halves = np.uint64(key & 0xFFFFFFFF), np.uint64(key >> 32)
     if usable():
-        normal_rows(rows.start, halves(key), numbers)
+        normal_rows(rows.start, halves, numbers)
     else:
         counters = np.arange(quarter, dtype=np.uint64), np.arange(rows.start, rows.stop, dtype=np.uint64)[:, None]
-        words = philox(*counters, halves(key))
+        words = philox(*counters, halves)
         for pair in (0, 2):
             radius = np.sqrt(-2 * np.log(((words[pair] >> np.uint64(8)) + 0.5) * 2**-24))
             angle = words[pair + 1] * (2 * math.pi * 2**-32)
             numbers[:, pair], numbers[:, pair + 1] = radius * np.cos(angle), radius * np.sin(angle)
     return torch.from_numpy(numbers.reshape(len(numbers), -1)[:, :columns]).contiguous()
-
-
-def halves(key: int) -> tuple[np.uint64, np.uint64]:
-    """A key as ``kernels.philox`` takes it."""
-    return np.uint64(key & 0xFFFFFFFF), np.uint64(key >> 32)

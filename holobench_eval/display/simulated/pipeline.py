@@ -24,8 +24,8 @@ from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .fused_path import quickest
 from .geometry import Geometry
-from .kernels import expose_rows, modulate_rows
-from .noise import halves, normal
+from .kernels import modulate_rows
+from .noise import normal
 from .path import Dust, Light, LightPath, OpticalPath, image
 from .profile import Profile
 from .stages.panel import straight_through_level
@@ -242,14 +242,9 @@ class SimulatedBench:
 
     def _expose(self, light: Tensor, electrons: float, key: int, frame: Tensor, rows: slice) -> None:
         """Fill rows of a frame ``(Hs, Ws)`` with the counts of ``light``, as ``integrated`` gives it."""
-        sensor, grid, response = self.profile.sensor, self.fine_grid[rows], self.response[rows]
-        if sensor.noise and usable(light):
-            draws, into = (rows.start, halves(key)), frame[rows].numpy()
-            planes = light.numpy(), grid.numpy(), response.numpy()
-            expose_rows(*planes, *draws, electrons, sensor.stray, sensor.numbers, into)
-        else:
-            seen, noise = sample(light, grid, 1).cpu(), normal(key, rows, frame.shape[1])
-            frame[rows] = sensor.expose(seen, electrons, response, noise)
+        seen = sample(light, self.fine_grid[rows], 1).cpu()
+        noise = normal(key, rows, frame.shape[1])
+        frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise)
 
 
 def floats(field: Tensor) -> NDArray[np.float32]:

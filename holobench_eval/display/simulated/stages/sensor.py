@@ -17,7 +17,7 @@ from ....core.compiled import usable
 from ....imaging.shifts import correlate
 from ....optics.blocks import in_blocks
 from ..geometry import Geometry
-from ..kernels import box_rows, counts
+from ..kernels import box_rows, count_rows, counts
 from ..stage import Effect, Stage, percent
 
 if TYPE_CHECKING:
@@ -101,21 +101,18 @@ class Sensor(Stage):
         Shot noise is the normal approximation of Poisson noise; its error is below the read noise above 20 e-.
         normal: standard normal numbers ``(Hs, Ws)``, one for the noise of each pixel.
         """
-        charge = response * (light * electrons + self.stray)
+        ambient = self.ambient * self.full_well / self.headroom
         if not self.noise:
+            charge = response * (light * electrons + ambient)
             return (charge * self.counts_per_electron + self.dark).clamp(max=self.white)
-        return torch.from_numpy(counts(charge.numpy(), normal.numpy(), *self.numbers))
-
-    @property
-    def stray(self) -> float:
-        """Charge of the ambient light in a pixel [electrons]."""
-        return self.ambient * self.full_well / self.headroom
-
-    @property
-    def numbers(self) -> tuple[float, float, float, float, float]:
-        """What ``counts`` needs to know."""
+        planes = light.numpy(), response.numpy(), normal.numpy()
         bend = self.nonlinearity / self.full_well
-        return self.read_noise**2, bend, self.counts_per_electron, self.dark, self.white
+        numbers = (self.read_noise**2, bend, self.counts_per_electron, self.dark, self.white)
+        if not usable(light):
+            return torch.from_numpy(counts(planes[1] * (planes[0] * electrons + ambient), planes[2], *numbers))
+        counted = torch.empty(light.shape, dtype=torch.float32, device="cpu")
+        count_rows(*planes, electrons, ambient, numbers, counted.numpy())
+        return counted
 
 
 def box_filter(image: Tensor, width: float) -> Tensor:
