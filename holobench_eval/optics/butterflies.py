@@ -52,9 +52,9 @@ class _Transform:
             self._add(self._mul(a[0], b[1]), self._mul(a[1], b[0])),
         )
 
-    def modulus(self, a: Complex, factor: Vector) -> Vector:
-        """The squared modulus of a complex vector, times a real one."""
-        return self._mul(self._add(self._mul(a[0], a[0]), self._mul(a[1], a[1])), factor)
+    def modulus(self, a: Complex) -> Vector:
+        """The squared modulus of a complex vector."""
+        return self._add(self._mul(a[0], a[0]), self._mul(a[1], a[1]))
 
     def _of_signs(self, values: Sequence[Complex]) -> list[Complex]:
         if len(values) == 1:
@@ -389,19 +389,17 @@ def joined(_: Any, source: Any, begin: Any, hop: Any, field: Any, start: Any, st
 
 
 @intrinsic
-def squared(_: Any, source: Any, begin: Any, light: Any, start: Any, stride: Any, rows: Any, power: Any) -> Any:
-    """Squared moduli, times ``power``, of sixteen samples from ``begin`` on, to ``rows`` rows."""
+def squared(_: Any, source: Any, begin: Any, light: Any, start: Any, stride: Any, rows: Any) -> Any:
+    """Squared moduli of sixteen samples from ``begin`` on, to ``rows`` rows."""
 
-    def write(
-        builder: Any, source: _Array, begin: Any, light: _Array, start: Any, stride: Any, rows: Any, power: Any
-    ) -> None:
-        writer, factor = _Transform(builder), _spread(builder, power)
+    def write(builder: Any, source: _Array, begin: Any, light: _Array, start: Any, stride: Any, rows: Any) -> None:
+        writer = _Transform(builder)
         samples = [source.sample(_place(builder, begin, _int(1), k)) for k in range(LANES)]
-        for row, line in enumerate(_transposed(builder, [writer.modulus(sample, factor) for sample in samples])):
+        for row, line in enumerate(_transposed(builder, [writer.modulus(sample) for sample in samples])):
             with builder.if_then(builder.icmp_signed("<", _int(row), rows)):
                 light.store(line, _place(builder, start, stride, row))
 
-    return _instructions("sifiiig", write)
+    return _instructions("sifiii", write)
 
 
 @intrinsic

@@ -205,11 +205,11 @@ def columns(
             _finish(result, lines, plane, target_planes, target_height, size, radices, factors)
 
 
-@njit(f"void(f4[::1], f4[::1], f4, {SHAPE}, i8[::1], i8, i8, f4[::1], i8, i8[::1], {AXIS})", **OPTIONS)
-def rows_back(fields, light, power, shape, blocks, first, last, tiles, tile, starts, axis):
+@njit(f"void(f4[::1], f4[::1], {SHAPE}, i8[::1], i8, i8, f4[::1], i8, i8[::1], {AXIS})", **OPTIONS)
+def rows_back(fields, light, shape, blocks, first, last, tiles, tile, starts, axis):
     """The way back of ``rows_forward``: of the tiles, whose real and imaginary parts are exchanged.
 
-    light: if it is not empty, it takes the squared moduli times ``power``, in the place of ``fields``.
+    light: if it is not empty, it takes the squared moduli, in the place of ``fields``.
     """
     planes, height, width = shape
     size, radices, factors, weights = axis
@@ -237,11 +237,11 @@ def rows_back(fields, light, power, shape, blocks, first, last, tiles, tile, sta
             begin = ((across * planes + plane) * height + row) * width
             if len(light):
                 for column in range(0, rest, LANES):
-                    squared(line, column, light, begin + column, width, rows, power)
+                    squared(line, column, light, begin + column, width, rows)
                 for column in range(rest, width):
                     for lane in range(rows):
                         imaginary, real = line[column * SAMPLE + lane], line[column * SAMPLE + LANES + lane]
-                        light[begin + lane * width + column] = power * (real * real + imaginary * imaginary)
+                        light[begin + lane * width + column] = real * real + imaginary * imaginary
             else:
                 for column in range(0, rest, LANES):
                     joined(line, column, 1, fields, 2 * (begin + column), 2 * width, rows)

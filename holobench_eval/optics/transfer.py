@@ -163,11 +163,11 @@ class Grid:
 
     def fields(self, tiles: Tensor, field: Tensor, blocks: Numbers) -> None:
         """Transform what ``convolve`` left in tiles back, into blocks of rows of a field."""
-        self._back(tiles, (_floats(field), NOTHING, np.float32(0)), blocks)
+        self._back(tiles, (_floats(field), NOTHING), blocks)
 
-    def intensities(self, tiles: Tensor, light: Tensor, power: float) -> None:
-        """``power`` times the squared modulus of what ``fields`` would give, in ``light``, float32."""
-        self._back(tiles, (NOTHING, light.numpy().reshape(-1), np.float32(power)), self.blocks())
+    def intensities(self, tiles: Tensor, light: Tensor) -> None:
+        """The squared modulus of what ``fields`` would give, in ``light``, float32."""
+        self._back(tiles, (NOTHING, light.numpy().reshape(-1)), self.blocks())
 
     def _back(self, tiles: Tensor, into: tuple[object, ...], blocks: Numbers) -> None:
         source, along = tiles.numpy(), (self._tile, self.starts, self.columns)

@@ -89,7 +89,7 @@ class FusedPath:
         target.grid.fields(tiles, field, target.grid.blocks())
         return field
 
-    def intensity(self, light: Light, power: float) -> Tensor:
+    def intensity(self, light: Light) -> Tensor:
         """See ``LightPath``. The light of a few rows is transformed while it is in the cache."""
         spectra, grid = self._panel.grid.tiles(), self._panel.grid
         planes, height, width = grid.shape
@@ -102,7 +102,7 @@ class FusedPath:
         in_blocks(transform, spectra, blocks, 2 * planes**2 * height * width)
         tiles = self._pass(spectra, self._panel, self._image, conjugated=False)
         seen = torch.empty(self._image.grid.shape[1:], dtype=torch.float32, device="cpu")
-        self._image.grid.intensities(tiles, seen, power)
+        self._image.grid.intensities(tiles, seen)
         return seen
 
     def _pass(self, spectra: Tensor, source: _Side, target: _Side, conjugated: bool) -> Tensor:

@@ -164,50 +164,50 @@ def box_rows(image: Plane, taps: Plane, first: int, last: int, out: Plane) -> No
 
 
 @compiled
-def drive_row(phase: Plane, added: Plane, gain: Plane, factor: float, table: Plane, out: Plane) -> None:
-    """Phase ``(W,)`` [rad] that a row of the panel shows; see ``SimulatedBench._modulated_field``."""
-    levels = F(table.size)
-    level = np.empty(phase.size, np.int32)
+def show_row(phase: Plane, added: Plane, levels: Any, level: Any, out: Plane) -> None:
+    """Gray levels ``(W,)`` of a row of the panel; out: zero, or NaN where there is none."""
     for c in range(phase.size):
-        steps = np.rint((phase[c] + added[c]) * F(table.size / TURN))
-        wrapped = steps - levels * np.floor(steps / levels)
+        steps = np.rint((phase[c] + added[c]) * F(levels / TURN))
+        wrapped = steps - F(levels) * np.floor(steps / F(levels))
         level[c] = N(wrapped if wrapped > F(0) else F(0))  # NaN too: an entry of the table
-        out[c] = gain[c] * F(factor) + F(0) * wrapped  # where NaN stays
-    for c in range(phase.size):
-        out[c] *= table[U(level[c])]
+        out[c] = F(0) * wrapped
 
 
 @compiled
 def modulate_rows(
+    table: Plane,
     phase: Plane,
     added: Plane,
     gain: Plane,
     factor: float,
-    table: Plane,
     taps: Plane,
     modulated: Plane,
     unmodulated: Plane,
     incident: Plane,
     first: int,
     last: int,
+    top: int,
     out: Plane,
 ) -> None:
-    """The light of the sub-samples in rows ``first`` to ``last`` of the panel; see ``SimulatedBench._modulated_field``.
+    """The light of the sub-samples in rows ``first`` to ``last`` of the panel; see ``PanelLight.field``.
 
-    Complex numbers are real and imaginary parts in turn: unmodulated ``(samples, samples, 2)``, incident ``(H, 2 W)``,
-    out ``(samples, samples, rows, 2 W)``.
+    table: phase [rad] of each gray level; factor: of the frame, times ``gain``. Complex numbers are real and imaginary
+    parts in turn: unmodulated ``(samples, samples, 2)``, incident ``(H, 2 W)``, out ``(samples, samples, rows, 2 W)``,
+    the rows from ``top`` on.
     """
     height, width = phase.shape
     samples, reach, rows = len(taps), taps.shape[1] // 2, last - first
-    driven = np.empty((rows + 2 * reach, width + 2 * reach), np.float32)
+    driven, level = np.empty((rows + 2 * reach, width + 2 * reach), np.float32), np.empty(width, np.int32)
     for r in range(len(driven)):
-        row = min(max(first + r - reach, 0), height - 1)
-        drive_row(phase[row], added[row], gain[row], factor, table, driven[r, reach : reach + width])
+        row, line = min(max(first + r - reach, 0), height - 1), driven[r, reach : reach + width]
+        show_row(phase[row], added[row], table.size, level, line)
+        for c in range(width):
+            line[c] = (gain[row, c] * F(factor) + line[c]) * table[U(level[c])]
         driven[r, :reach] = driven[r, reach]
         driven[r, reach + width :] = driven[r, reach + width - 1]
     line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
     for r in range(rows):
-        light = incident[first + r]
+        light, place = incident[first + r], first + r - top
         for j in range(samples):
             line[:] = 0
             for k in range(taps.shape[1]):
@@ -222,5 +222,59 @@ def modulate_rows(
                 for c in range(width):
                     sine, cosine = sincos(fine[c])
                     a, b = share * cosine + real, share * sine + imaginary
-                    out[j, i, r, 2 * c] = a * light[2 * c] - b * light[2 * c + 1]
-                    out[j, i, r, 2 * c + 1] = a * light[2 * c + 1] + b * light[2 * c]
+                    out[j, i, place, 2 * c] = a * light[2 * c] - b * light[2 * c + 1]
+                    out[j, i, place, 2 * c + 1] = a * light[2 * c + 1] + b * light[2 * c]
+
+
+@compiled
+def modulate_back_rows(
+    slope: Plane,
+    phase: Plane,
+    added: Plane,
+    gain: Plane,
+    factor: float,
+    taps: Plane,
+    modulated: Plane,
+    unmodulated: Plane,
+    incident: Plane,
+    grad: Plane,
+    field: Plane,
+    first: int,
+    last: int,
+    out: Plane,
+) -> None:
+    """Gradient in the phase, in rows ``first`` to ``last``, from that in the ``field`` that ``modulate_rows`` gave.
+
+    slope: of the phase of each gray level in that of the hologram. Light that follows no phase is taken off the field.
+    """
+    height, width = phase.shape
+    samples, reach = len(taps), taps.shape[1] // 2
+    total = np.zeros((last - first, width + 2 * reach), np.float32)
+    line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
+    for r in range(max(first - reach, 0), min(last + reach, height)):
+        light = incident[r]
+        for j in range(samples):
+            line[:] = 0
+            for i in range(samples):
+                real, imaginary = unmodulated[j, i, 0], unmodulated[j, i, 1]
+                for c in range(width):
+                    a = field[j, i, r, 2 * c] - (real * light[2 * c] - imaginary * light[2 * c + 1])
+                    b = field[j, i, r, 2 * c + 1] - (real * light[2 * c + 1] + imaginary * light[2 * c])
+                    fine[c] = grad[j, i, r, 2 * c + 1] * a - grad[j, i, r, 2 * c] * b
+                for k in range(taps.shape[1]):
+                    for c in range(width):
+                        line[c + k] += taps[i, k] * fine[c]
+            for k in range(taps.shape[1]):
+                row = min(max(r + k - reach, 0), height - 1) - first
+                if 0 <= row < last - first:
+                    for c in range(line.size):
+                        total[row, c] += taps[j, k] * line[c]
+    level = np.empty(width, np.int32)
+    for r in range(last - first):
+        row, seen = first + r, total[r]
+        for k in range(reach):
+            seen[reach] += seen[k]
+            seen[reach + width - 1] += seen[reach + width + k]
+        show_row(phase[row], added[row], slope.size, level, fine)
+        for c in range(width):
+            out[row, c] = seen[reach + c] * (gain[row, c] * F(factor) + fine[c]) * slope[U(level[c])]

@@ -24,8 +24,8 @@ class LightPath(Protocol):
     def adjoint(self, image: Tensor) -> Tensor:
         """The adjoint of ``forward``."""
 
-    def intensity(self, light: Light, power: float) -> Tensor:
-        """``power`` times the squared modulus of what ``forward`` gives of all rows of a light; without a gradient."""
+    def intensity(self, light: Light) -> Tensor:
+        """The squared modulus of what ``forward`` gives of all rows of a light; without a gradient."""
 
 
 Light = Callable[[slice], Tensor]
@@ -135,9 +135,9 @@ class OpticalPath:
         self._each_column(leaving)
         return row_adjoint(lines, columns, self.shape[1])
 
-    def intensity(self, light: Light, power: float) -> Tensor:
+    def intensity(self, light: Light) -> Tensor:
         """See ``LightPath``."""
-        return squared_modulus(self.forward(light(slice(0, self.shape[0])))).mul_(power)
+        return squared_modulus(self.forward(light(slice(0, self.shape[0]))))
 
     def _through(self, dust: Dust, light: Callable[[slice], Tensor]) -> Callable[[slice], Tensor]:
         """The spectrum of a light behind the dust, or before it on the way back: a block of columns ``(block, rows)``.

@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
 from operator import add, mul
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-from ...core.compiled import usable
 from ...core.device import CPU
 from ...core.seeds import generator
 from ...optics.blocks import in_blocks
 from ...optics.convolution import frequencies
 from ...optics.padding import padded_shape
 from ...optics.phase import blaze
-from ...optics.phasor import phasor, squared_modulus
+from ...optics.phasor import squared_modulus
 from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .fused_path import quickest
 from .geometry import Geometry
-from .kernels import modulate_rows
 from .noise import normal
-from .path import Dust, Light, LightPath, OpticalPath, image
+from .panel_light import PanelLight, ready
+from .path import Dust, LightPath, OpticalPath, image
 from .profile import Profile
-from .stages.panel import straight_through_level
 from .stages.propagation import sample_weights
 from .stages.relay import finer_grid, sample, sampling_grid
 from .stages.sensor import IMAGE_SAMPLES
@@ -38,17 +35,13 @@ from .stages.sensor import IMAGE_SAMPLES
 class ChannelMaps:
     """What is fixed for one line of the source: every random pattern drawn, every transfer function built.
 
-    added: phase [rad] that the display adds to every hologram; lut_gain; incident: complex amplitude of the light at
-    the panel: ``(H, W)``; path: all that is linear in the light; laser_power: of the line, relative to what the
-    camera's exposure was set for.
+    light: from a phase to the light that leaves the panel, its power relative to what the camera's exposure was set
+    for; path: all that is linear in it.
     """
 
     geometry: Geometry
-    added: Tensor
-    lut_gain: Tensor
-    incident: Tensor
+    light: PanelLight
     path: LightPath
-    laser_power: float
 
 
 class SimulatedBench:
@@ -140,47 +133,28 @@ class SimulatedBench:
             ),
             self.device,
         )
+        power = profile.drift.laser_power(geometry) * profile.illumination.power * share
         return ChannelMaps(
             geometry=geometry,
-            added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
-            lut_gain=profile.lut.gain_map(geometry).to(self.device),
-            incident=incident.to(self.device, torch.complex64),
+            light=PanelLight(
+                bits=profile.panel.bits,
+                channel=geometry.channel,
+                lut=profile.lut,
+                crosstalk=profile.crosstalk,
+                weights=self.crosstalk,
+                modulated=self.modulated,
+                unmodulated=self.unmodulated,
+                added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
+                lut_gain=profile.lut.gain_map(geometry).to(self.device),
+                incident=(math.sqrt(power) * incident).to(self.device, torch.complex64),
+            ),
             path=path,
-            laser_power=profile.drift.laser_power(geometry) * profile.illumination.power * share,
         )
 
     def _padded(self) -> tuple[int, int]:
         """One size for all channels: that of the longest wavelength, whose light spreads furthest."""
         panel = self.profile.panel
         return padded_shape(panel.shape, panel.pitch, max(panel.wavelengths), panel.distance, panel.pupil, None)
-
-    def _modulated_field(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Tensor:
-        """Field ``(samples, samples, H, W)`` of the sub-samples, the carrier off, of ``phase`` ``(H, W)`` [rad].
-
-        gain: of the phase in this frame, relative.
-        """
-        profile = self.profile
-        level = straight_through_level(phase + maps.added, profile.panel.bits)
-        driven = profile.lut.phase(level, profile.panel.bits, maps.lut_gain * gain, maps.geometry.channel)
-        fine = profile.crosstalk.apply(driven, self.crosstalk).view(self.samples, self.samples, *driven.shape)
-        return (phasor(self.modulated, fine) + self.unmodulated) * maps.incident
-
-    def _compiled_light(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Light:
-        """``_modulated_field`` without a gradient, some rows at a time."""
-        bits, channel = self.profile.panel.bits, maps.geometry.channel
-        table = self.profile.lut.phase(torch.arange(2.0**bits), bits, torch.ones(()), channel).numpy()
-        drive = phase.detach().contiguous().numpy(), maps.added.numpy(), maps.lut_gain.numpy()
-        share = self.crosstalk.numpy(), self.modulated[:, :, 0, 0].numpy(), floats(self.unmodulated[:, :, 0, 0])
-        incident = floats(maps.incident).reshape(len(phase), -1)
-
-        def light(rows: slice) -> Tensor:
-            some = (self.samples, self.samples, rows.stop - rows.start, phase.shape[1])
-            field = torch.empty(some, dtype=torch.complex64, device="cpu")
-            parts = floats(field).reshape(*some[:-1], -1)
-            modulate_rows(*drive, gain, table, *share, incident, rows.start, rows.stop, parts)
-            return field
-
-        return light
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane.
@@ -201,13 +175,14 @@ class SimulatedBench:
         """
         if tuple(phase.shape) != tuple(self.profile.panel.shape):  # compiled code would read beyond it
             raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
-        return reduce(add, (self._of_line(phase, maps, flicker * self.drift_gain) for maps in self.lines[channel]))
+        gain = flicker * self.drift_gain
 
-    def _of_line(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Tensor:
-        """``intensity`` of one line of the source; gain: of the phase in this frame, relative."""
-        if usable(phase) and phase.dtype == torch.float32:
-            return maps.path.intensity(self._compiled_light(phase, maps, gain), maps.laser_power)
-        return squared_modulus(image(maps.path, self._modulated_field(phase, maps, gain))) * maps.laser_power
+        def of_line(maps: ChannelMaps) -> Tensor:
+            if ready(phase):
+                return maps.path.intensity(maps.light.rows(phase, gain))
+            return squared_modulus(image(maps.path, maps.light.field(phase, gain)))
+
+        return reduce(add, map(of_line, self.lines[channel]))
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """``intensity`` as it falls on the sensor: after what spreads it, averaged over the area of a sensor pixel."""
@@ -245,12 +220,6 @@ class SimulatedBench:
         seen = sample(light, self.fine_grid[rows], 1).cpu()
         noise = normal(key, rows, frame.shape[1])
         frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise)
-
-
-def floats(field: Tensor) -> NDArray[np.float32]:
-    """Real and imaginary parts of a complex tensor, in an axis of their own."""
-    parts: NDArray[np.float32] = torch.view_as_real(field).numpy()
-    return parts
 
 
 def present(tensors: Iterable[Tensor | None]) -> Iterator[Tensor]:
