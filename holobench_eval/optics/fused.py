@@ -250,3 +250,33 @@ def rows_back(fields, light, shape, blocks, first, last, tiles, tile, starts, ax
                         for part in range(2):
                             value = line[column * SAMPLE + (1 - part) * LANES + lane]
                             fields[2 * (begin + lane * width + column) + part] = value
+
+
+@njit(
+    f"void(f4[::1], i8, i8[::1], f4[::1], f4, i8[::1], i8, i8, f4[::1], i8, i8[::1], i8, {AXIS})",
+    **OPTIONS,
+)
+def rows_past(source, tile, starts, change, sign, blocks, first, last, target, target_tile, target_starts, width, axis):
+    """Blocks of 16 rows of one plane: back from tiles as by ``rows_back``, times what changes them, and to other tiles
+    as by ``rows_forward``.
+
+    change: complex factors ``(blocks, width)`` in samples of sixteen rows, of which ``sign`` multiplies the imaginary
+    parts.
+    """
+    size, radices, factors, _ = axis
+    x, y, gaps = _lines(size), _lines(size), _gaps(starts, size)
+    for k in range(first, last):
+        row = blocks[k] * LANES
+        if gaps:
+            x[:] = 0
+        for n in range(len(starts)):
+            crossed(source, row + n * tile, 1, x, starts[n], 1)
+        field, other = _begin(x, 0, 1, size, y, x, size, radices, factors)
+        _finish(field, field, 0, 1, size, size, radices, factors)
+        for c in range(width):  # the field is the one with its parts exchanged: that asks for the conjugate
+            filtered_sample(field, field, c, change, k * width, -sign)
+        field[width * SAMPLE : (width + 1) * SAMPLE] = 0
+        spectrum, _ = _begin(field, 0, 1, width, other, field, size, radices, factors)
+        _finish(spectrum, spectrum, 0, 1, size, size, radices, factors)
+        for n in range(len(target_starts)):
+            crossed(spectrum, target_starts[n], 1, target, row + n * target_tile, 1)

@@ -19,7 +19,8 @@ from .blocks import in_blocks, in_parts
 from .sizes import LANES, Steps, steps
 
 Numbers = npt.NDArray[np.int64]
-Axis = tuple[int, npt.NDArray[np.int64], npt.NDArray[np.float32], npt.NDArray[np.float32]]
+Floats = npt.NDArray[np.float32]
+Axis = tuple[int, Numbers, Floats, Floats]
 
 PARTS = 4
 """Of the kernel's work: a thread that is disturbed leaves some of it to another."""
@@ -93,10 +94,10 @@ class Fused:
         field = field.contiguous().resolve_conj().resolve_neg()
         images = field[..., 0, 0].numel()
         result, tiles = torch.empty_like(field), grid.tiles(images)
-        blocks, each = grid.blocks(images), np.arange(images * len(self._starts))
-        grid.spectra(field, tiles, blocks)
+        each = np.arange(images * len(self._starts))
+        grid.spectra(field, tiles)
         grid.convolve(tiles, each, grid, tiles, each, self._tiles, conjugated)
-        grid.fields(tiles, result, blocks)
+        grid.fields(tiles, result)
         return result
 
 
@@ -123,19 +124,16 @@ class Grid:
     starts: Numbers
     keeps: bool = False
 
-    def blocks(self, images: int = 1) -> Numbers:
-        """Numbers of the blocks of sixteen rows of all planes."""
-        return np.arange(images * self.shape[0] * -(-self.shape[1] // LANES))
-
     def tiles(self, images: int = 1) -> Tensor:
         """Room for spectra."""
         return torch.empty(images * self._size, dtype=torch.float32, device="cpu")
 
-    def spectra(self, field: Tensor, tiles: Tensor, blocks: Numbers) -> None:
-        """Transform blocks of rows of a field into tiles."""
-        source, target, along = _floats(field), tiles.numpy(), (self._tile, self.starts, self.columns)
-        rows, place = _fused().rows_forward, (0, self.shape[1], self.shape)
-        self._share(lambda *ends: rows(source, *place, blocks, *ends, target, *along), blocks, tiles)
+    def spectra(self, field: Tensor, tiles: Tensor) -> None:
+        """Transform rows of a field into tiles."""
+        source, target, blocks = _floats(field), tiles.numpy(), self._blocks(field)
+        rows, place = _fused().rows_forward, (0, self.shape[1], self.shape, blocks)
+        along = self._tile, self.starts, self.columns
+        self._share(lambda *ends: rows(source, *place, *ends, target, *along), blocks, tiles)
 
     def spectra_of_rows(self, field: Tensor, tiles: Tensor, rows: slice) -> None:
         """``spectra`` of some rows ``(planes, planes, rows, W)``, whole blocks but the last one; by one thread."""
@@ -161,18 +159,34 @@ class Grid:
         rest = factors, np.float32(-1 if conjugated else 1), keep, spectra.numpy(), grid._tile, joins
         self._share(lambda *ends: _fused().columns(*of, *into, *ends, *rest), taken, tiles)
 
-    def fields(self, tiles: Tensor, field: Tensor, blocks: Numbers) -> None:
-        """Transform what ``convolve`` left in tiles back, into blocks of rows of a field."""
-        self._back(tiles, (_floats(field), NOTHING), blocks)
+    def fields(self, tiles: Tensor, field: Tensor) -> None:
+        """Transform what ``convolve`` left in tiles back, into a field."""
+        self._back(tiles, _floats(field), NOTHING, self._blocks(field))
 
     def intensities(self, tiles: Tensor, light: Tensor) -> None:
         """The squared modulus of what ``fields`` would give, in ``light``, float32."""
-        self._back(tiles, (NOTHING, light.numpy().reshape(-1)), self.blocks())
+        self._back(tiles, NOTHING, light.numpy().reshape(-1), self._blocks(light))
 
-    def _back(self, tiles: Tensor, into: tuple[object, ...], blocks: Numbers) -> None:
+    def past(self, tiles: Tensor, change: Tensor, conjugated: bool, blocks: Numbers, target: Grid, to: Tensor) -> None:
+        """Fields of one plane, in some blocks of rows, times complex factors, to the tiles of another grid.
+
+        change: ``(blocks, W, 2, 16)``, real and imaginary parts of sixteen rows apart.
+        """
+        of, factors = (tiles.numpy(), self._tile, self.starts), change.numpy().reshape(-1)
+        into = to.numpy(), target._tile, target.starts, self.shape[2], self.columns
+        sign, past = np.float32(-1 if conjugated else 1), _fused().rows_past
+        self._share(lambda *ends: past(*of, factors, sign, blocks, *ends, *into), blocks, tiles)
+
+    def _back(self, tiles: Tensor, field: Floats, light: Floats, blocks: Numbers) -> None:
         source, along = tiles.numpy(), (self._tile, self.starts, self.columns)
         rows = _fused().rows_back
-        self._share(lambda *ends: rows(*into, self.shape, blocks, *ends, source, *along), blocks, tiles)
+        self._share(lambda *ends: rows(field, light, self.shape, blocks, *ends, source, *along), blocks, tiles)
+
+    def _blocks(self, field: Tensor) -> Numbers:
+        """Numbers of the blocks of sixteen rows of all planes of all images."""
+        planes, height, width = self.shape
+        images = field.numel() // max(1, planes**2 * height * width)
+        return np.arange(images * planes * -(-height // LANES))
 
     @property
     def _height(self) -> int:
@@ -226,7 +240,7 @@ def _columns_of(starts: Numbers, band: int) -> Tensor:
     return torch.from_numpy(starts)[:, None].add(torch.arange(LANES, device="cpu")).clamp(max=band - 1)
 
 
-def _floats(field: Tensor) -> npt.NDArray[np.float32]:
+def _floats(field: Tensor) -> Floats:
     return torch.view_as_real(field).numpy().reshape(-1)
 
 

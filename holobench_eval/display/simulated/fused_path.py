@@ -46,38 +46,43 @@ class FusedPath:
 
     def __init__(self, path: OpticalPath) -> None:
         height, width = path.shape
-        samples, n = len(path.rows), path.finer
+        n = path.finer
         first = path.transfer * path.rows[0][:, None] * path.columns[0]
         last = torch.ones_like(first) if path.last is None else path.last
         through = first * last
         self._change, self._dusty, ends = None, np.arange(0), (through, through)
         if path.dust is not None and len(path.dust.rows):
             # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
-            self._change, ends = torch.zeros(path.shape, dtype=first.dtype), (first, last * first.numel())
-            self._change[path.dust.rows] = path.dust.change / first.numel()
             self._dusty = (path.dust.rows // LANES).unique().numpy()
+            # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
+            change = first.new_zeros(LANES * -(-height // LANES), width)
+            change[path.dust.rows] = path.dust.change / first.numel()
+            lanes = torch.view_as_real(change.view(-1, LANES, width)[self._dusty]).permute(0, 2, 3, 1)
+            self._change, ends = lanes.contiguous(), (first, last * first.numel())
         starts = [tile_starts(end) for end in ends]
-        shifts = [finer_weights(size, n) for size in through.shape]
+        rows, columns = (steps(size) for size in through.shape)
+        assert rows is not None
+        assert columns is not None
+        shift = [finer_weights(size, n) for size in through.shape]
 
-        def side(shape: tuple[int, int, int], weights: Sequence[Tensor | None], end: int) -> _Side:
+        def side(planes: int, finer: int, weights: Sequence[Tensor], end: int) -> _Side:
             here, there = starts[end], starts[1 - end]
+            axes, shape = (axis(rows, weights[0]), axis(columns, weights[1])), (planes, finer * height, finer * width)
             common = np.isin(here, there)
-            lines = [steps(size) for size in through.shape]
-            axes = [axis(line, each) for line, each in zip(lines, weights, strict=True) if line is not None]
-            grid = Grid(shape, axes[0], axes[1], here, keeps=self._change is not None)
-            plane = Grid((1, height, width), *(axis(line) for line in lines if line is not None), here)
             others = np.where(common, np.searchsorted(there, here), -1)
+            plane = Grid((1, height, width), axis(rows), axis(columns), here)
+            grid = Grid(shape, *axes, here, keeps=self._change is not None)
             return _Side(grid, np.flatnonzero(common), others, plane, tiled(ends[end], here))
 
-        self._panel = side((samples, height, width), (path.rows, path.columns), 0)
-        self._image = side((1, n * height, n * width), shifts, 1)
+        self._panel = side(len(path.rows), 1, (path.rows, path.columns), 0)
+        self._image = side(1, n, shift, 1)
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
         source, target = self._panel, self._image
         tiles = self._pass(_spectra(source.grid, field.to(torch.complex64)), source, target, conjugated=False)
         seen = field.new_empty(target.grid.shape[1:], dtype=torch.complex64)
-        target.grid.fields(tiles, seen, target.grid.blocks())
+        target.grid.fields(tiles, seen)
         return seen
 
     def adjoint(self, image: Tensor) -> Tensor:
@@ -86,7 +91,7 @@ class FusedPath:
         tiles = self._pass(_spectra(source.grid, image), source, target, conjugated=True)
         planes, height, width = target.grid.shape
         field = image.new_empty(planes, planes, height, width)
-        target.grid.fields(tiles, field, target.grid.blocks())
+        target.grid.fields(tiles, field)
         return field
 
     def intensity(self, light: Light) -> Tensor:
@@ -114,12 +119,7 @@ class FusedPath:
         every, other = np.arange(len(source.plane.starts)), np.arange(len(target.plane.starts))
         before, behind = source.plane.tiles(), target.plane.tiles().zero_()
         source.grid.convolve(spectra, every, source.plane, before, every, source.transfer, conjugated, keep=True)
-        light = torch.empty_like(self._change)
-        source.plane.fields(before, light, self._dusty)
-        for block in self._dusty:
-            rows = slice(block * LANES, (block + 1) * LANES)
-            light[rows] *= self._change[rows].conj() if conjugated else self._change[rows]
-        target.plane.spectra(light, behind, self._dusty)
+        source.plane.past(before, self._change, conjugated, self._dusty, target.plane, behind)
         kept = source.grid, spectra, target.others
         target.plane.convolve(behind, other, target.grid, tiles, other, target.transfer, conjugated, kept=kept)
         return tiles
@@ -127,7 +127,7 @@ class FusedPath:
 
 def _spectra(grid: Grid, field: Tensor) -> Tensor:
     tiles = grid.tiles()
-    grid.spectra(field.contiguous().resolve_conj().resolve_neg(), tiles, grid.blocks())
+    grid.spectra(field.contiguous().resolve_conj().resolve_neg(), tiles)
     return tiles
 
 
