@@ -174,27 +174,15 @@ def show_row(phase: Plane, added: Plane, levels: Any, level: Any, out: Plane) ->
 
 
 @compiled
-def modulate_rows(
-    table: Plane,
-    phase: Plane,
-    added: Plane,
-    gain: Plane,
-    factor: float,
-    taps: Plane,
-    modulated: Plane,
-    unmodulated: Plane,
-    incident: Plane,
-    first: int,
-    last: int,
-    top: int,
-    out: Plane,
-) -> None:
+def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: int, top: int, out: Plane) -> None:
     """The light of the sub-samples in rows ``first`` to ``last`` of the panel; see ``PanelLight.field``.
 
-    table: phase [rad] of each gray level; factor: of the frame, times ``gain``. Complex numbers are real and imaginary
-    parts in turn: unmodulated ``(samples, samples, 2)``, incident ``(H, 2 W)``, out ``(samples, samples, rows, 2 W)``,
-    the rows from ``top`` on.
+    lit: phase, what is added to it, gain of each pixel and of the frame, shares of the neighbours ``(samples, taps)``,
+    light that follows no phase ``(samples, samples, 2)`` and incident light ``(H, 2 W)``; table: phase [rad] of each
+    gray level; out ``(samples, samples, rows, 2 W)``: the rows from ``top`` on. Complex numbers are real and imaginary
+    parts in turn.
     """
+    phase, added, gain, factor, taps, unmodulated, incident = lit
     height, width = phase.shape
     samples, reach, rows = len(taps), taps.shape[1] // 2, last - first
     driven, level = np.empty((rows + 2 * reach, width + 2 * reach), np.float32), np.empty(width, np.int32)
@@ -227,26 +215,12 @@ def modulate_rows(
 
 
 @compiled
-def modulate_back_rows(
-    slope: Plane,
-    phase: Plane,
-    added: Plane,
-    gain: Plane,
-    factor: float,
-    taps: Plane,
-    modulated: Plane,
-    unmodulated: Plane,
-    incident: Plane,
-    grad: Plane,
-    field: Plane,
-    first: int,
-    last: int,
-    out: Plane,
-) -> None:
+def modulate_back_rows(lit: Any, slope: Plane, grad: Plane, field: Plane, first: int, last: int, out: Plane) -> None:
     """Gradient in the phase, in rows ``first`` to ``last``, from that in the ``field`` that ``modulate_rows`` gave.
 
     slope: of the phase of each gray level in that of the hologram. Light that follows no phase is taken off the field.
     """
+    phase, added, gain, factor, taps, unmodulated, incident = lit
     height, width = phase.shape
     samples, reach = len(taps), taps.shape[1] // 2
     total = np.zeros((last - first, width + 2 * reach), np.float32)

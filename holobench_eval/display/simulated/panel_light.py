@@ -65,43 +65,45 @@ class PanelLight:
 
     def rows(self, phase: Tensor, gain: float) -> Light:
         """``field`` a few rows at a time, compiled and without a gradient; for a phase that is ``ready``."""
-        arguments, samples = self._arguments(phase, gain), len(self.weights)
+        lit, samples = self._lit(phase, gain), len(self.weights)
+        shares = self._curve[0], self.modulated[:, :, 0, 0].numpy()
 
         def light(rows: slice) -> Tensor:
             some = (samples, samples, rows.stop - rows.start, phase.shape[1])
             field = torch.empty(some, dtype=torch.complex64, device="cpu")
-            modulate_rows(*arguments, rows.start, rows.stop, rows.start, _planes(field))
+            modulate_rows(lit, *shares, rows.start, rows.stop, rows.start, _planes(field))
             return field
 
         return light
 
     def whole(self, phase: Tensor, gain: float) -> Tensor:
         """``field``, compiled and without a gradient."""
-        arguments, samples = self._arguments(phase, gain), len(self.weights)
+        lit, samples = self._lit(phase, gain), len(self.weights)
         field = torch.empty((samples, samples, *phase.shape), dtype=torch.complex64, device="cpu")
-        parts = _planes(field)
-        in_blocks(
-            lambda rows: modulate_rows(*arguments, rows.start, rows.stop, 0, parts), field, len(phase), field.numel()
-        )
+        shares, parts = (self._curve[0], self.modulated[:, :, 0, 0].numpy()), _planes(field)
+
+        def light(rows: slice) -> None:
+            modulate_rows(lit, *shares, rows.start, rows.stop, 0, parts)
+
+        in_blocks(light, field, len(phase), field.numel())
         return field
 
     def back(self, grad: Tensor, field: Tensor, phase: Tensor, gain: float) -> Tensor:
         """Gradient ``(H, W)`` in the phase, from that in the ``field``."""
+        lit, slope = self._lit(phase, gain), self._curve[1]
         result = torch.empty(phase.shape, dtype=torch.float32, device="cpu")
         parts = _planes(grad.contiguous().resolve_conj().resolve_neg()), _planes(field)
-        arguments = self._curve[1], *self._arguments(phase, gain)[1:]
 
         def back(rows: slice) -> None:
-            modulate_back_rows(*arguments, *parts, rows.start, rows.stop, result.numpy())
+            modulate_back_rows(lit, slope, *parts, rows.start, rows.stop, result.numpy())
 
         in_blocks(back, field, len(phase), field.numel())
         return result
 
-    def _arguments(self, phase: Tensor, gain: float) -> tuple[Any, ...]:
+    def _lit(self, phase: Tensor, gain: float) -> tuple[Any, ...]:
         """What compiled functions take first."""
         drive = phase.detach().contiguous().numpy(), self.added.numpy(), self.lut_gain.numpy(), gain
-        share = self.weights.numpy(), self.modulated[:, :, 0, 0].numpy(), _floats(self.unmodulated[:, :, 0, 0])
-        return self._curve[0], *drive, *share, _planes(self.incident)
+        return *drive, self.weights.numpy(), _floats(self.unmodulated[:, :, 0, 0]), _planes(self.incident)
 
     @cached_property
     def _curve(self) -> tuple[Floats, Floats]:
