@@ -164,6 +164,28 @@ def box_rows(image: Plane, taps: Plane, first: int, last: int, out: Plane) -> No
 
 
 @compiled
+def box_back_rows(grad: Plane, taps: Plane, first: int, last: int, out: Plane) -> None:
+    """The adjoint of ``box_rows``."""
+    height, width = grad.shape
+    reach = taps.size // 2
+    line = np.empty(width + 2 * reach, np.float32)
+    out[first:last] = 0
+    for r in range(max(first - reach, 0), min(last + reach, height)):
+        line[:] = 0
+        for k in range(taps.size):
+            for c in range(width):
+                line[c + k] += taps[k] * grad[r, c]
+        for k in range(reach):
+            line[reach] += line[k]
+            line[reach + width - 1] += line[reach + width + k]
+        for k in range(taps.size):
+            row = min(max(r + k - reach, 0), height - 1)
+            if first <= row < last:
+                for c in range(width):
+                    out[row, c] += taps[k] * line[c + reach]
+
+
+@compiled
 def show_row(phase: Plane, added: Plane, levels: Any, level: Any, out: Plane) -> None:
     """Gray levels ``(W,)`` of a row of the panel; out: zero, or NaN where there is none."""
     for c in range(phase.size):

@@ -65,9 +65,14 @@ def test_intensity_without_a_gradient_is_that_with_one(name, phase):
 
 
 @pytest.mark.parametrize("width", [1.16, 2.9, 4.0])
-def test_the_area_of_a_pixel_is_that_of_torch(width):
-    image = torch.rand(41, 58, generator=torch.Generator().manual_seed(5))
-    assert torch.allclose(box_filter(image, width), box_filter(image[None], width)[0], rtol=1e-6)
+@pytest.mark.parametrize("size", [2**30, 1000])
+def test_the_area_of_a_pixel_and_its_gradient_are_those_of_torch(width, size, monkeypatch):
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+    image, slope = torch.rand(2, 41, 58, generator=torch.Generator().manual_seed(5))
+    image.requires_grad_()
+    fast, slow = box_filter(image, width), box_filter(image[None], width)[0]  # compiled for one picture
+    assert torch.allclose(fast, slow, rtol=1e-6)
+    assert torch.allclose(*(torch.autograd.grad(light, image, slope)[0] for light in (fast, slow)), rtol=2e-6)
 
 
 @pytest.mark.parametrize("per_pixel", [1, 2])
