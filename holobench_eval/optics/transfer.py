@@ -193,10 +193,10 @@ class Grid:
         """Rows of all planes."""
         return self.shape[0] * self.shape[1]
 
-    @property
+    @cached_property
     def _tile(self) -> int:
         """Samples of a tile."""
-        room = _fused().room
+        room = _fused().room.py_func  # as it stands there: a call of what is compiled takes longer
         return int(max(self.shape[0] * room(self.shape[1]), room(self.rows[0]) if self.keeps else 0))
 
     @property
