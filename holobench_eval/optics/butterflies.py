@@ -52,29 +52,33 @@ class _Transform:
             self._add(self._mul(a[0], b[1]), self._mul(a[1], b[0])),
         )
 
+    def modulus(self, a: Complex) -> Vector:
+        """The squared modulus of a complex vector."""
+        return self._add(self._mul(a[0], a[0]), self._mul(a[1], a[1]))
+
     def _of_signs(self, values: Sequence[Complex]) -> list[Complex]:
         if len(values) == 1:
             return list(values)
         if len(values) == 2:
-            return [self._plus(*values), self._minus(*values)]
+            return [self.plus(*values), self._minus(*values)]
         a, b, c, d = values
-        even, other, odd, rest = self._plus(a, c), self._minus(a, c), self._plus(b, d), self._minus(b, d)
-        return [self._plus(even, odd), self._minus_i(other, rest), self._minus(even, odd), self._plus_i(other, rest)]
+        even, other, odd, rest = self.plus(a, c), self._minus(a, c), self.plus(b, d), self._minus(b, d)
+        return [self.plus(even, odd), self._minus_i(other, rest), self._minus(even, odd), self._plus_i(other, rest)]
 
     def _of_prime(self, values: Sequence[Complex]) -> list[Complex]:
         first, count = values[0], len(values)
         pairs = [(values[k], values[count - k]) for k in range(1, count // 2 + 1)]
-        sums, differences = [self._plus(*pair) for pair in pairs], [self._minus(*pair) for pair in pairs]
+        sums, differences = [self.plus(*pair) for pair in pairs], [self._minus(*pair) for pair in pairs]
         result = [first] * count
         for value in sums:
-            result[0] = self._plus(result[0], value)
+            result[0] = self.plus(result[0], value)
         for j in range(1, count // 2 + 1):
             angles = [2 * math.pi * j * k / count for k in range(1, count // 2 + 1)]
             even, odd = first, self._scaled(differences[0], math.sin(angles[0]))
             for angle, value in zip(angles, sums, strict=True):
-                even = self._plus(even, self._scaled(value, math.cos(angle)))
+                even = self.plus(even, self._scaled(value, math.cos(angle)))
             for angle, value in zip(angles[1:], differences[1:], strict=True):
-                odd = self._plus(odd, self._scaled(value, math.sin(angle)))
+                odd = self.plus(odd, self._scaled(value, math.sin(angle)))
             result[j], result[count - j] = self._minus_i(even, odd), self._plus_i(even, odd)
         return result
 
@@ -101,7 +105,7 @@ class _Transform:
     def _mul(self, a: Vector, b: Vector) -> Vector:
         return self.builder.fmul(a, b, flags=("contract",))
 
-    def _plus(self, a: Complex, b: Complex) -> Complex:
+    def plus(self, a: Complex, b: Complex) -> Complex:
         return self._add(a[0], b[0]), self._add(a[1], b[1])
 
     def _minus(self, a: Complex, b: Complex) -> Complex:
@@ -240,6 +244,11 @@ def _filtered(writer: _Transform, value: Complex, transfer: _Array, at: Any, sig
     return product[1], product[0]
 
 
+def _weight(builder: Any, weights: _Array, at: Any, place: Any) -> Complex:
+    first = builder.add(at, builder.mul(place, _int(2)))
+    return weights.spread(first, 0), weights.spread(first, 1)
+
+
 @intrinsic
 def turned_butterfly(
     _: Any, radix: Any, source: Any, begin: Any, stride: Any, end: Any,
@@ -279,13 +288,66 @@ def filtered_butterfly(
 
 
 @intrinsic
-def filtered_sample(_: Any, source: Any, begin: Any, target: Any, start: Any, transfer: Any, at: Any, sign: Any) -> Any:
+def joining_butterfly(
+    _: Any, radix: Any, source: Any, begin: Any, stride: Any, end: Any,
+    target: Any, start: Any, hop: Any, limit: Any, transfer: Any, at: Any, sign: Any, kept: Any, first: Any,
+) -> Any:  # fmt: skip
+    """``filtered_butterfly`` of the results and what another one gave, the samples of ``kept`` from ``first`` on."""
+
+    def write(builder: Any, radix: Any, *given: Any) -> None:
+        *places, transfer, at, sign, kept, first = given
+        start, hop = places[5], places[6]
+
+        def filtered(writer: _Transform, k: int, value: Complex) -> Complex:
+            imaginary, real = kept.sample(_place(builder, builder.add(first, start), hop, k))
+            value = writer.plus(value, (real, imaginary))
+            return _filtered(writer, value, transfer, _place(builder, builder.add(at, start), hop, k), sign)
+
+        _butterfly(builder, radix, places, filtered)
+
+    return _instructions("isiiisiiisigsi", write)
+
+
+@intrinsic
+def adding_butterfly(
+    _: Any, radix: Any, source: Any, begin: Any, stride: Any, end: Any,
+    target: Any, start: Any, hop: Any, limit: Any, weights: Any, at: Any,
+) -> Any:  # fmt: skip
+    """See ``_butterfly``; results are added to the target, times complex weights, the floats from ``at`` on."""
+
+    def write(builder: Any, radix: Any, *given: Any) -> None:
+        *places, weights, at = given
+        target, start, hop = places[4], places[5], places[6]
+
+        def added(writer: _Transform, k: int, value: Complex) -> Complex:
+            place = _place(builder, start, hop, k)
+            return writer.plus(target.sample(place), writer.times(value, _weight(builder, weights, at, place)))
+
+        _butterfly(builder, radix, places, added)
+
+    return _instructions("isiiisiiifi", write)
+
+
+@intrinsic
+def filtered_sample(_: Any, source: Any, target: Any, place: Any, transfer: Any, at: Any, sign: Any) -> Any:
     """What ``filtered_butterfly`` does to one sample of a spectrum."""
 
-    def write(builder: Any, source: _Array, begin: Any, target: _Array, start: Any, *given: Any) -> None:
-        target.store_sample(_filtered(_Transform(builder), source.sample(begin), *given), start)
+    def write(builder: Any, source: _Array, target: _Array, place: Any, transfer: _Array, at: Any, sign: Any) -> None:
+        product = _filtered(_Transform(builder), source.sample(place), transfer, builder.add(at, place), sign)
+        target.store_sample(product, place)
 
-    return _instructions("sisisig", write)
+    return _instructions("ssisig", write)
+
+
+@intrinsic
+def weighted_sample(_: Any, source: Any, target: Any, place: Any, weights: Any, at: Any) -> Any:
+    """One sample of a spectrum times its complex weight, of the floats from ``at`` on."""
+
+    def write(builder: Any, source: _Array, target: _Array, place: Any, weights: _Array, at: Any) -> None:
+        weight = _weight(builder, weights, at, place)
+        target.store_sample(_Transform(builder).times(source.sample(place), weight), place)
+
+    return _instructions("ssifi", write)
 
 
 @intrinsic
@@ -324,6 +386,20 @@ def joined(_: Any, source: Any, begin: Any, hop: Any, field: Any, start: Any, st
                 field.store(line, _place(builder, start, stride, row))
 
     return _instructions("siifiii", write)
+
+
+@intrinsic
+def squared(_: Any, source: Any, begin: Any, light: Any, start: Any, stride: Any, rows: Any) -> Any:
+    """Squared moduli of sixteen samples from ``begin`` on, to ``rows`` rows."""
+
+    def write(builder: Any, source: _Array, begin: Any, light: _Array, start: Any, stride: Any, rows: Any) -> None:
+        writer = _Transform(builder)
+        samples = [source.sample(_place(builder, begin, _int(1), k)) for k in range(LANES)]
+        for row, line in enumerate(_transposed(builder, [writer.modulus(sample) for sample in samples])):
+            with builder.if_then(builder.icmp_signed("<", _int(row), rows)):
+                light.store(line, _place(builder, start, stride, row))
+
+    return _instructions("sifiii", write)
 
 
 @intrinsic

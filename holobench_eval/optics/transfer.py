@@ -19,11 +19,14 @@ from .blocks import in_blocks, in_parts
 from .sizes import LANES, Steps, steps
 
 Numbers = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float32]
+Axis = tuple[int, Numbers, Floats, Floats]
 
 PARTS = 4
 """Of the kernel's work: a thread that is disturbed leaves some of it to another."""
 SMALLEST_SHARED = 2**19
 """Samples of padded fields from which on two threads are quicker than one."""
+NOTHING = np.empty(0, np.float32)
 
 
 class TransferFunction(Protocol):
@@ -88,67 +91,119 @@ class Fused:
         height, width = field.shape[-2:]
         if height > self.shape[0] or width > self.shape[1]:  # compiled code would write beyond its arrays
             raise ValueError(f"field is {(height, width)}, the transfer function {self.shape}")
-        grid = Grid((1, height, width), self._rows, self._columns, self._starts)
+        grid = Grid((1, height, width), axis(self._rows), axis(self._columns), self._starts)
         field = field.contiguous().resolve_conj().resolve_neg()
         images = field[..., 0, 0].numel()
         result, tiles = field if spent else torch.empty_like(field), grid.tiles(images)
-        blocks, each = grid.blocks(images), np.arange(images * len(self._starts))
-        grid.spectra(field, tiles, blocks)
+        each = np.arange(images * len(self._starts))
+        grid.spectra(field, tiles)
         grid.convolve(tiles, each, grid, tiles, each, self._tiles, conjugated)
-        grid.fields(tiles, result, blocks)
+        grid.fields(tiles, result)
         return result
+
+
+def axis(steps: Steps, weights: Tensor | None = None) -> Axis:
+    """An axis of a grid. weights: complex ones ``(planes, size)`` that add the spectra of planes of samples, of which
+    only the ratios to the first one's count; None for one plane."""
+    others = NOTHING if weights is None else _floats((weights[1:] / weights[0]).to(torch.complex64))
+    return *steps, others
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Fields ``(..., planes, planes, H, W)``, contiguous, that the kernel transforms, and the tiles of their spectra.
 
-    The planes of a field interleave in an image of as many samples a pixel and axis. shape: (planes, H, W); rows,
-    columns: steps of the transforms along axes 0 and 1; starts: the first column of each tile.
+    The planes of a field interleave in an image of as many samples a pixel and axis; those of an image that is one
+    plane of ``(n H, n W)`` lie in memory as they interleave. shape: (planes, H, W), or (1, n H, n W); rows, columns:
+    axes 0 and 1 of the transforms; starts: the first column of each tile; keeps: whether there is room in a tile for
+    the spectrum of its columns.
     """
 
     shape: tuple[int, int, int]
-    rows: Steps
-    columns: Steps
+    rows: Axis
+    columns: Axis
     starts: Numbers
-
-    def blocks(self, images: int = 1) -> Numbers:
-        """Numbers of the blocks of sixteen rows of all planes."""
-        return np.arange(images * self.shape[0] * -(-self.shape[1] // LANES))
+    keeps: bool = False
 
     def tiles(self, images: int = 1) -> Tensor:
         """Room for spectra."""
         return torch.empty(images * self._size, dtype=torch.float32, device="cpu")
 
-    def spectra(self, field: Tensor, tiles: Tensor, blocks: Numbers) -> None:
-        """Transform blocks of rows of a field into tiles."""
-        source, target, along = _floats(field), tiles.numpy(), (self.starts, self.columns)
-        rows = _fused().rows_forward
-        self._share(lambda *ends: rows(source, self.shape, blocks, *ends, target, *along), blocks, tiles)
+    def spectra(self, field: Tensor, tiles: Tensor) -> None:
+        """Transform rows of a field into tiles."""
+        source, target, blocks = _floats(field), tiles.numpy(), self._blocks(field)
+        rows, place = _fused().rows_forward, (0, self.shape[1], self.shape, blocks)
+        along = self._tile, self.starts, self.columns
+        self._share(lambda *ends: rows(source, *place, *ends, target, *along), blocks, tiles)
+
+    def spectra_of_rows(self, field: Tensor, tiles: Tensor, rows: slice) -> None:
+        """``spectra`` of some rows ``(planes, planes, rows, W)``, whole blocks but the last one; by one thread."""
+        planes, height, _ = self.shape
+        some = np.arange(rows.start // LANES, -(-rows.stop // LANES))
+        blocks = (np.arange(planes)[:, None] * -(-height // LANES) + some).ravel()
+        place = rows.start, rows.stop - rows.start, self.shape
+        ends, along = (0, len(blocks)), (self._tile, self.starts, self.columns)
+        _fused().rows_forward(_floats(field), *place, blocks, *ends, tiles.numpy(), *along)
 
     def convolve(
         self, tiles: Tensor, taken: Numbers, target: Grid, to: Tensor, put: Numbers, transfer: Tensor,
-        conjugated: bool, add: bool = False,
+        conjugated: bool, keep: bool = False, kept: tuple[Grid, Tensor, Numbers] | None = None,
     ) -> None:  # fmt: skip
         """Convolve columns by a transfer function, see ``tiled``: tiles ``taken`` into tiles ``put`` of another grid.
 
-        add: to what these tiles hold already.
+        keep: leave the filtered spectra in their tiles, for a grid that ``keeps``; kept: a grid and its tiles after
+        that, and of each tile taken here, the one whose spectrum is added before the filter, -1 for none.
         """
-        of, factors = (tiles.numpy(), taken, self.shape, self.rows), transfer.numpy().reshape(-1)
-        into = to.numpy(), put, target.shape, target.rows
-        rest = factors, transfer.shape[1], np.float32(-1 if conjugated else 1), add
+        of, factors = (tiles.numpy(), self._tile, taken, self._height, self.rows), transfer.numpy().reshape(-1)
+        into = to.numpy(), target._tile, put, target._height, target.rows
+        grid, spectra, joins = kept or (self, tiles, np.full(len(taken), -1))
+        rest = factors, np.float32(-1 if conjugated else 1), keep, spectra.numpy(), grid._tile, joins
         self._share(lambda *ends: _fused().columns(*of, *into, *ends, *rest), taken, tiles)
 
-    def fields(self, tiles: Tensor, field: Tensor, blocks: Numbers) -> None:
-        """Transform what ``convolve`` left in tiles back, into blocks of rows of a field."""
-        source, target, along = tiles.numpy(), _floats(field), (self.starts, self.columns)
+    def fields(self, tiles: Tensor, field: Tensor) -> None:
+        """Transform what ``convolve`` left in tiles back, into a field."""
+        self._back(tiles, _floats(field), NOTHING, self._blocks(field))
+
+    def intensities(self, tiles: Tensor, light: Tensor) -> None:
+        """The squared modulus of what ``fields`` would give, in ``light``, float32."""
+        self._back(tiles, NOTHING, light.numpy().reshape(-1), self._blocks(light))
+
+    def past(self, tiles: Tensor, change: Tensor, conjugated: bool, blocks: Numbers, target: Grid, to: Tensor) -> None:
+        """Fields of one plane, in some blocks of rows, times complex factors, to the tiles of another grid.
+
+        change: ``(blocks, W, 2, 16)``, real and imaginary parts of sixteen rows apart.
+        """
+        of, factors = (tiles.numpy(), self._tile, self.starts), change.numpy().reshape(-1)
+        into = to.numpy(), target._tile, target.starts, self.shape[2], self.columns
+        sign, past = np.float32(-1 if conjugated else 1), _fused().rows_past
+        self._share(lambda *ends: past(*of, factors, sign, blocks, *ends, *into), blocks, tiles)
+
+    def _back(self, tiles: Tensor, field: Floats, light: Floats, blocks: Numbers) -> None:
+        source, along = tiles.numpy(), (self._tile, self.starts, self.columns)
         rows = _fused().rows_back
-        self._share(lambda *ends: rows(target, self.shape, blocks, *ends, source, *along), blocks, tiles)
+        self._share(lambda *ends: rows(field, light, self.shape, blocks, *ends, source, *along), blocks, tiles)
+
+    def _blocks(self, field: Tensor) -> Numbers:
+        """Numbers of the blocks of sixteen rows of all planes of all images."""
+        planes, height, width = self.shape
+        images = field.numel() // max(1, planes**2 * height * width)
+        return np.arange(images * planes * -(-height // LANES))
+
+    @property
+    def _height(self) -> int:
+        """Rows of all planes."""
+        return self.shape[0] * self.shape[1]
+
+    @cached_property
+    def _tile(self) -> int:
+        """Samples of a tile."""
+        room = _fused().room.py_func  # as it stands there: a call of what is compiled takes longer
+        return int(max(self.shape[0] * room(self.shape[1]), room(self.rows[0]) if self.keeps else 0))
 
     @property
     def _size(self) -> int:
         """Floats in the tiles of an image."""
-        return len(self.starts) * self.shape[0] * int(_fused().room(self.shape[1])) * 2 * LANES
+        return len(self.starts) * self._tile * 2 * LANES
 
     def _share(self, work: Callable[[int, int], object], each: Numbers, tiles: Tensor) -> None:
         images = tiles.numel() // max(1, self._size)
@@ -186,7 +241,7 @@ def _columns_of(starts: Numbers, band: int) -> Tensor:
     return torch.from_numpy(starts)[:, None].add(torch.arange(LANES, device="cpu")).clamp(max=band - 1)
 
 
-def _floats(field: Tensor) -> npt.NDArray[np.float32]:
+def _floats(field: Tensor) -> Floats:
     return torch.view_as_real(field).numpy().reshape(-1)
 
 

@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from ...optics.blocks import in_blocks
 from ...optics.sizes import LANES, steps
-from ...optics.transfer import Grid, Numbers, kernel, tile_starts, tiled
-from .path import LightPath, OpticalPath
+from ...optics.transfer import Grid, Numbers, axis, kernel, tile_starts, tiled
+from .path import Light, LightPath, OpticalPath
 
 
 def quickest(path: OpticalPath, device: torch.device) -> LightPath:
     """The path on a device: by the kernel where it can be."""
-    samples = len(path.rows)
-    sizes = [factor * size for size in path.transfer.shape for factor in (1, samples, path.finer)]
     ready = device.type == "cpu" and path.transfer.dtype == torch.complex64
-    if kernel() is None or not ready or None in map(steps, sizes) or path.transfer.shape[1] < 2 * LANES:
+    if kernel() is None or not ready or None in map(steps, path.transfer.shape) or path.transfer.shape[1] < 2 * LANES:
         return path.to(device)
     return FusedPath(path)
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """An end of the path. grid: of its light; shared: numbers of its tiles that are tiles of the other end, too; plane:
-    the plane of the dust, on the tiles of this end; transfer: from here to there or back."""
+    """An end of the path. grid: of its light; shared: numbers of its tiles that are tiles of the other end, too;
+    others: for each of its tiles, the number of that of the other end, or -1; plane: the plane of the dust, on the
+    tiles of this end; transfer: from here to there or back."""
 
     grid: Grid
     shared: Numbers
+    others: Numbers
     plane: Grid
     transfer: Tensor
 
@@ -37,76 +40,99 @@ class _Side:
 class FusedPath:
     """What ``OpticalPath`` does, by the kernel.
 
-    Interleaved sub-samples are a finer grid: one transform of ``samples`` times the size adds their spectra. Of these,
-    only the band of frequencies is used that the padded grid has. The weights of sub-sample (0, 0) become part of the
-    transfer function. Those of the others differ by a phase that the finer grid gives, and by a constant, ``turn``.
+    The weights of the first sub-sample become part of the transfer function. Finer samples of the image are planes that
+    interleave, as the sub-samples are: each is the same spectrum, shifted.
     """
 
     def __init__(self, path: OpticalPath) -> None:
         height, width = path.shape
-        samples, n = len(path.rows), path.finer
-        turn = (path.rows[:, 0] / path.rows[0, 0])[:, None] * (path.columns[:, 0] / path.columns[0, 0])
-        self._turn = None if bool((turn == 1).all()) else turn[:, :, None, None]
+        n = path.finer
         first = path.transfer * path.rows[0][:, None] * path.columns[0]
         last = torch.ones_like(first) if path.last is None else path.last
         through = first * last
         self._change, self._dusty, ends = None, np.arange(0), (through, through)
         if path.dust is not None and len(path.dust.rows):
-            self._change, ends = torch.zeros(path.shape, dtype=first.dtype), (first, last)
-            self._change[path.dust.rows] = path.dust.change
+            # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
             self._dusty = (path.dust.rows // LANES).unique().numpy()
+            # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
+            change = first.new_zeros(LANES * -(-height // LANES), width)
+            change[path.dust.rows] = path.dust.change / first.numel()
+            lanes = torch.view_as_real(change.view(-1, LANES, width)[self._dusty]).permute(0, 2, 3, 1)
+            self._change, ends = lanes.contiguous(), (first, last * first.numel())
         starts = [tile_starts(end) for end in ends]
-        common = np.intersect1d(tile_starts(through), np.intersect1d(starts[0], starts[1]))
-        self._through = tiled(through, common)
+        rows, columns = (steps(size) for size in through.shape)
+        assert rows is not None
+        assert columns is not None
+        shift = [finer_weights(size, n) for size in through.shape]
 
-        def grid(planes: int, factor: int, shape: tuple[int, int], starts: Numbers) -> Grid:
-            rows, columns = (steps(factor * size) for size in through.shape)
-            assert rows is not None
-            assert columns is not None
-            band, low = through.shape[1], (through.shape[1] + 1) // 2
-            placed = np.where(starts < low, starts, starts + (factor - 1) * band)
-            return Grid((planes, *shape), rows, columns, placed)
+        def side(planes: int, finer: int, weights: Sequence[Tensor], end: int) -> _Side:
+            here, there = starts[end], starts[1 - end]
+            axes, shape = (axis(rows, weights[0]), axis(columns, weights[1])), (planes, finer * height, finer * width)
+            common = np.isin(here, there)
+            others = np.where(common, np.searchsorted(there, here), -1)
+            plane = Grid((1, height, width), axis(rows), axis(columns), here)
+            grid = Grid(shape, *axes, here, keeps=self._change is not None)
+            return _Side(grid, np.flatnonzero(common), others, plane, tiled(ends[end], here))
 
-        def side(planes: int, factor: int, shape: tuple[int, int], starts: Numbers, end: Tensor) -> _Side:
-            plane = grid(1, 1, path.shape, starts)
-            shared = np.searchsorted(starts, common)
-            factors = self._through if end is through else tiled(end, starts)
-            return _Side(grid(planes, factor, shape, starts), shared, plane, factors)
-
-        self._panel = side(samples, samples, path.shape, starts[0], ends[0])
-        self._image = side(1, n, (n * height, n * width), starts[1], ends[1])
+        self._panel = side(len(path.rows), 1, (path.rows, path.columns), 0)
+        self._image = side(1, n, shift, 1)
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
-        field = (field if self._turn is None else field * self._turn).to(torch.complex64)
-        _, height, width = self._image.grid.shape
-        return self._pass(field, self._panel, self._image, field.new_empty(height, width), conjugated=False)
+        source, target = self._panel, self._image
+        tiles = self._pass(_spectra(source.grid, field.to(torch.complex64)), source, target, conjugated=False)
+        seen = field.new_empty(target.grid.shape[1:], dtype=torch.complex64)
+        target.grid.fields(tiles, seen)
+        return seen
 
     def adjoint(self, image: Tensor) -> Tensor:
         """See ``LightPath``."""
-        planes, height, width = self._panel.grid.shape
-        empty = image.new_empty(planes, planes, height, width)
-        field = self._pass(image, self._image, self._panel, empty, conjugated=True)
-        return field if self._turn is None else field.mul_(self._turn.conj())
+        source, target = self._image, self._panel
+        tiles = self._pass(_spectra(source.grid, image), source, target, conjugated=True)
+        planes, height, width = target.grid.shape
+        field = image.new_empty(planes, planes, height, width)
+        target.grid.fields(tiles, field)
+        return field
 
-    def _pass(self, field: Tensor, source: _Side, target: _Side, seen: Tensor, conjugated: bool) -> Tensor:
-        """Light that passes the dust as if there were none, and what the dust changes of it, in ``seen``."""
-        spectra, tiles = source.grid.tiles(), target.grid.tiles()
-        source.grid.spectra(field.contiguous().resolve_conj().resolve_neg(), spectra, source.grid.blocks())
-        if self._change is not None:
-            every, other = np.arange(len(source.plane.starts)), np.arange(len(target.plane.starts))
-            before, behind = source.plane.tiles(), target.plane.tiles().zero_()
-            source.grid.convolve(spectra, every, source.plane, before, every, source.transfer, conjugated)
-            light = torch.empty_like(self._change)
-            source.plane.fields(before, light, self._dusty)
-            for block in self._dusty:
-                rows = slice(block * LANES, (block + 1) * LANES)
-                light[rows] *= self._change[rows].conj() if conjugated else self._change[rows]
-            target.plane.spectra(light, behind, self._dusty)
-            target.plane.convolve(behind, other, target.grid, tiles, other, target.transfer, conjugated)
-        dusty = self._change is not None
-        source.grid.convolve(
-            spectra, source.shared, target.grid, tiles, target.shared, self._through, conjugated, add=dusty
-        )
-        target.grid.fields(tiles, seen, target.grid.blocks())
+    def intensity(self, light: Light) -> Tensor:
+        """See ``LightPath``. The light of a few rows is transformed while it is in the cache."""
+        spectra, grid = self._panel.grid.tiles(), self._panel.grid
+        planes, height, width = grid.shape
+        blocks = -(-height // LANES)
+
+        def transform(some: slice) -> None:
+            rows = slice(some.start * LANES, min(some.stop * LANES, height))
+            grid.spectra_of_rows(light(rows), spectra, rows)
+
+        in_blocks(transform, spectra, blocks, 2 * planes**2 * height * width)
+        tiles = self._pass(spectra, self._panel, self._image, conjugated=False)
+        seen = torch.empty(self._image.grid.shape[1:], dtype=torch.float32, device="cpu")
+        self._image.grid.intensities(tiles, seen)
         return seen
+
+    def _pass(self, spectra: Tensor, source: _Side, target: _Side, conjugated: bool) -> Tensor:
+        """Light from one end, in the tiles of the other; dust adds what it changes to the light's spectrum."""
+        tiles = target.grid.tiles()
+        if self._change is None:
+            source.grid.convolve(spectra, source.shared, target.grid, tiles, target.shared, source.transfer, conjugated)
+            return tiles
+        every, other = np.arange(len(source.plane.starts)), np.arange(len(target.plane.starts))
+        before, behind = source.plane.tiles(), target.plane.tiles().zero_()
+        source.grid.convolve(spectra, every, source.plane, before, every, source.transfer, conjugated, keep=True)
+        source.plane.past(before, self._change, conjugated, self._dusty, target.plane, behind)
+        kept = source.grid, spectra, target.others
+        target.plane.convolve(behind, other, target.grid, tiles, other, target.transfer, conjugated, kept=kept)
+        return tiles
+
+
+def _spectra(grid: Grid, field: Tensor) -> Tensor:
+    tiles = grid.tiles()
+    grid.spectra(field.contiguous().resolve_conj().resolve_neg(), tiles)
+    return tiles
+
+
+def finer_weights(size: int, factor: int) -> Tensor:
+    """Of the spectra of interleaving planes of samples, ``(factor, size)``, that make up that of a finer line."""
+    shift = torch.arange(factor, dtype=torch.float64, device="cpu")[:, None] / factor
+    angle = -2 * math.pi * shift * torch.fft.fftfreq(size, dtype=torch.float64, device="cpu")
+    return torch.polar(torch.ones_like(angle), angle)

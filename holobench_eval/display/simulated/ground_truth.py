@@ -28,17 +28,17 @@ def truth(bench: SimulatedBench) -> list[Estimate]:
 
 def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     profile, maps = bench.profile, bench.channels[colour]
-    gain = maps.lut_gain.double().mean().cpu() * bench.drift_gain
+    gain = maps.light.lut_gain.double().mean().cpu() * bench.drift_gain
     levels = torch.arange(1, LEVELS - 1, dtype=torch.float64) / (LEVELS - 1)
     law = stroke(levels, profile.lut.phase(levels * 2**profile.panel.bits, profile.panel.bits, gain, colour))
     modulated, unmodulated = complex(bench.modulated.mean()), complex(bench.unmodulated.mean())
-    light = (abs(modulated) ** 2 + abs(unmodulated) ** 2) * float(maps.amplitude.square().mean())
+    light = (abs(modulated) ** 2 + abs(unmodulated) ** 2) * float(maps.light.incident.abs().square().mean())
     return [
         estimate("lut_exponent", colour, law.exponent),
         estimate("phase_gain", colour, law.gain),
         estimate("crosstalk", colour, profile.crosstalk.width),
         *undiffracted(unmodulated / modulated * _passed(bench), colour),
-        estimate("light", colour, light * maps.laser_power * float(bench.response.mean())),
+        estimate("light", colour, light * float(bench.response.mean())),
     ]
 
 

@@ -128,57 +128,133 @@ def sample_rows(image: Plane, grid: Plane, out: Plane) -> None:
 
 
 @compiled
-def drive_row(phase: Plane, added: Plane, gain: Plane, factor: float, table: Plane, out: Plane) -> None:
-    """Phase ``(W,)`` [rad] that a row of the panel shows; see ``SimulatedBench._modulated_field``."""
-    levels = F(table.size)
-    level = np.empty(phase.size, np.int32)
-    for c in range(phase.size):
-        steps = np.rint((phase[c] + added[c]) * F(table.size / TURN))
-        wrapped = steps - levels * np.floor(steps / levels)
-        level[c] = N(wrapped if wrapped > F(0) else F(0))  # NaN too: an entry of the table
-        out[c] = gain[c] * F(factor) + F(0) * wrapped  # where NaN stays
-    for c in range(phase.size):
-        out[c] *= table[U(level[c])]
+def box_rows(image: Plane, taps: Plane, first: int, last: int, out: Plane) -> None:
+    """Rows ``first`` to ``last`` of an image filtered by ``taps`` along both axes, beyond its edges as at them."""
+    height, width = image.shape
+    reach = taps.size // 2
+    line, total = np.empty(width + 2 * reach, F), np.empty(width, F)
+    for r in range(first, last):
+        total[:] = 0
+        for k in range(taps.size):
+            row = image[min(max(r + k - reach, 0), height - 1)]
+            for c in range(width):
+                total[c] += taps[k] * row[c]
+        line[:reach], line[reach : reach + width], line[reach + width :] = total[0], total, total[width - 1]
+        for c in range(width):
+            out[r, c] = 0
+        for k in range(taps.size):
+            for c in range(width):
+                out[r, c] += taps[k] * line[c + k]
 
 
 @compiled
-def modulate_rows(
-    phase: Plane,
-    added: Plane,
-    gain: Plane,
-    factor: float,
-    table: Plane,
-    taps: Plane,
-    modulated: Plane,
-    amplitude: Plane,
-    angle: Plane,
-    first: int,
-    last: int,
-    out: Plane,
-) -> None:
-    """The light of the sub-samples ``(samples, samples, H, 2 W)``, real and imaginary parts in turn, in rows ``first``
-    to ``last`` of the panel; see ``SimulatedBench._modulated_field``."""
+def box_back_rows(grad: Plane, taps: Plane, first: int, last: int, out: Plane) -> None:
+    """The adjoint of ``box_rows``."""
+    height, width = grad.shape
+    reach = taps.size // 2
+    line = np.empty(width + 2 * reach, np.float32)
+    out[first:last] = 0
+    for r in range(max(first - reach, 0), min(last + reach, height)):
+        line[:] = 0
+        for k in range(taps.size):
+            for c in range(width):
+                line[c + k] += taps[k] * grad[r, c]
+        for k in range(reach):
+            line[reach] += line[k]
+            line[reach + width - 1] += line[reach + width + k]
+        for k in range(taps.size):
+            row = min(max(r + k - reach, 0), height - 1)
+            if first <= row < last:
+                for c in range(width):
+                    out[row, c] += taps[k] * line[c + reach]
+
+
+@compiled
+def show_row(phase: Plane, added: Plane, levels: Any, level: Any, out: Plane) -> None:
+    """Gray levels ``(W,)`` of a row of the panel; out: zero, or NaN where there is none."""
+    for c in range(phase.size):
+        steps = np.rint((phase[c] + added[c]) * F(levels / TURN))
+        wrapped = steps - F(levels) * np.floor(steps / F(levels))
+        level[c] = N(wrapped if wrapped > F(0) else F(0))  # NaN too: an entry of the table
+        out[c] = F(0) * wrapped
+
+
+@compiled
+def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: int, top: int, out: Plane) -> None:
+    """The light of the sub-samples in rows ``first`` to ``last`` of the panel; see ``PanelLight.field``.
+
+    lit: phase, what is added to it, gain of each pixel and of the frame, shares of the neighbours ``(samples, taps)``,
+    light that follows no phase ``(samples, samples, 2)`` and incident light ``(H, 2 W)``; table: phase [rad] of each
+    gray level; out ``(samples, samples, rows, 2 W)``: the rows from ``top`` on. Complex numbers are real and imaginary
+    parts in turn.
+    """
+    phase, added, gain, factor, taps, unmodulated, incident = lit
     height, width = phase.shape
     samples, reach, rows = len(taps), taps.shape[1] // 2, last - first
-    driven = np.empty((rows + 2 * reach, width + 2 * reach), np.float32)
+    driven, level = np.empty((rows + 2 * reach, width + 2 * reach), np.float32), np.empty(width, np.int32)
     for r in range(len(driven)):
-        row = min(max(first + r - reach, 0), height - 1)
-        drive_row(phase[row], added[row], gain[row], factor, table, driven[r, reach : reach + width])
+        row, line = min(max(first + r - reach, 0), height - 1), driven[r, reach : reach + width]
+        show_row(phase[row], added[row], table.size, level, line)
+        for c in range(width):
+            line[c] = (gain[row, c] * F(factor) + line[c]) * table[U(level[c])]
         driven[r, :reach] = driven[r, reach]
         driven[r, reach + width :] = driven[r, reach + width - 1]
     line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
     for r in range(rows):
+        light, place = incident[first + r], first + r - top
         for j in range(samples):
             line[:] = 0
             for k in range(taps.shape[1]):
                 for c in range(line.size):
                     line[c] += taps[j, k] * driven[r + k, c]
             for i in range(samples):
-                fine[:] = angle[first + r]
+                fine[:] = 0
                 for k in range(taps.shape[1]):
                     for c in range(width):
                         fine[c] += taps[i, k] * line[c + k]
+                share, real, imaginary = modulated[j, i], unmodulated[j, i, 0], unmodulated[j, i, 1]
                 for c in range(width):
                     sine, cosine = sincos(fine[c])
-                    light = modulated[j, i] * amplitude[first + r, c]
-                    out[j, i, first + r, 2 * c], out[j, i, first + r, 2 * c + 1] = light * cosine, light * sine
+                    a, b = share * cosine + real, share * sine + imaginary
+                    out[j, i, place, 2 * c] = a * light[2 * c] - b * light[2 * c + 1]
+                    out[j, i, place, 2 * c + 1] = a * light[2 * c + 1] + b * light[2 * c]
+
+
+@compiled
+def modulate_back_rows(lit: Any, slope: Plane, grad: Plane, field: Plane, first: int, last: int, out: Plane) -> None:
+    """Gradient in the phase, in rows ``first`` to ``last``, from that in the ``field`` that ``modulate_rows`` gave.
+
+    slope: of the phase of each gray level in that of the hologram. Light that follows no phase is taken off the field.
+    """
+    phase, added, gain, factor, taps, unmodulated, incident = lit
+    height, width = phase.shape
+    samples, reach = len(taps), taps.shape[1] // 2
+    total = np.zeros((last - first, width + 2 * reach), np.float32)
+    line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
+    for r in range(max(first - reach, 0), min(last + reach, height)):
+        light = incident[r]
+        for j in range(samples):
+            line[:] = 0
+            for i in range(samples):
+                real, imaginary = unmodulated[j, i, 0], unmodulated[j, i, 1]
+                for c in range(width):
+                    a = field[j, i, r, 2 * c] - (real * light[2 * c] - imaginary * light[2 * c + 1])
+                    b = field[j, i, r, 2 * c + 1] - (real * light[2 * c + 1] + imaginary * light[2 * c])
+                    fine[c] = grad[j, i, r, 2 * c + 1] * a - grad[j, i, r, 2 * c] * b
+                for k in range(taps.shape[1]):
+                    for c in range(width):
+                        line[c + k] += taps[i, k] * fine[c]
+            for k in range(taps.shape[1]):
+                row = min(max(r + k - reach, 0), height - 1) - first
+                if 0 <= row < last - first:
+                    for c in range(line.size):
+                        total[row, c] += taps[j, k] * line[c]
+    level = np.empty(width, np.int32)
+    for r in range(last - first):
+        row, seen = first + r, total[r]
+        for k in range(reach):
+            seen[reach] += seen[k]
+            seen[reach + width - 1] += seen[reach + width + k]
+        show_row(phase[row], added[row], slope.size, level, fine)
+        for c in range(width):
+            out[row, c] = seen[reach + c] * (gain[row, c] * F(factor) + fine[c]) * slope[U(level[c])]

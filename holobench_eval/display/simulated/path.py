@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from ...optics.blocks import in_blocks
+from ...optics.phasor import squared_modulus
 
 
 class LightPath(Protocol):
@@ -22,6 +23,13 @@ class LightPath(Protocol):
 
     def adjoint(self, image: Tensor) -> Tensor:
         """The adjoint of ``forward``."""
+
+    def intensity(self, light: Light) -> Tensor:
+        """The squared modulus of what ``forward`` gives of all rows of a light; without a gradient."""
+
+
+Light = Callable[[slice], Tensor]
+"""Some rows of the sub-samples' light: ``(samples, samples, rows, W)``, contiguous. Starts are multiples of sixteen."""
 
 
 def image(path: LightPath, field: Tensor) -> Tensor:
@@ -126,6 +134,10 @@ class OpticalPath:
 
         self._each_column(leaving)
         return row_adjoint(lines, columns, self.shape[1])
+
+    def intensity(self, light: Light) -> Tensor:
+        """See ``LightPath``."""
+        return squared_modulus(self.forward(light(slice(0, self.shape[0]))))
 
     def _through(self, dust: Dust, light: Callable[[slice], Tensor]) -> Callable[[slice], Tensor]:
         """The spectrum of a light behind the dust, or before it on the way back: a block of columns ``(block, rows)``.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
@@ -10,25 +11,23 @@ from operator import add, mul
 import torch
 from torch import Tensor
 
-from ...core.compiled import usable
 from ...core.device import CPU
 from ...core.seeds import generator
 from ...optics.blocks import in_blocks
 from ...optics.convolution import frequencies
 from ...optics.padding import padded_shape
 from ...optics.phase import blaze
-from ...optics.phasor import phasor, squared_modulus
+from ...optics.phasor import squared_modulus
 from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .fused_path import quickest
 from .geometry import Geometry
-from .kernels import modulate_rows
 from .noise import normal
+from .panel_light import PanelLight, ready
 from .path import Dust, LightPath, OpticalPath, image
 from .profile import Profile
-from .stages.panel import straight_through_level
 from .stages.propagation import sample_weights
-from .stages.relay import sample, sampling_grid
+from .stages.relay import finer_grid, sample, sampling_grid
 from .stages.sensor import IMAGE_SAMPLES
 
 
@@ -36,19 +35,13 @@ from .stages.sensor import IMAGE_SAMPLES
 class ChannelMaps:
     """What is fixed for one line of the source: every random pattern drawn, every transfer function built.
 
-    added: phase [rad] that the display adds to every hologram; lut_gain; amplitude and angle [rad] of the incident
-    light: ``(H, W)``; path: all that is linear in the light; still: at the image, light that no phase changes
-    ``(n H, n W)``; laser_power: of the line, relative to what the camera's exposure was set for.
+    light: from a phase to the light that leaves the panel, its power relative to what the camera's exposure was set
+    for; path: all that is linear in it.
     """
 
     geometry: Geometry
-    added: Tensor
-    lut_gain: Tensor
-    amplitude: Tensor
-    angle: Tensor
+    light: PanelLight
     path: LightPath
-    still: Tensor
-    laser_power: float
 
 
 class SimulatedBench:
@@ -89,7 +82,7 @@ class SimulatedBench:
         dead = aperture.dead_share(self.samples) if aperture else torch.zeros(self.samples**2, 1, 1)
         grid = (self.samples, self.samples, 1, 1)
         self.modulated = (order.modulated * active).view(grid).to(device)
-        self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid)
+        self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid).to(device, torch.complex64)
         geometries = [
             Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names, panel.blaze)
             for index, wavelength in enumerate(panel.wavelengths)
@@ -104,6 +97,8 @@ class SimulatedBench:
             panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape
         )
         self.grid = sampling_grid(self.points, panel.shape).to(device)
+        fine = [self.image_samples * size for size in panel.shape]
+        self.fine_grid = finer_grid(self.grid, fine, self.image_samples)
         self.response = profile.sensor.response((self.points.shape[0], self.points.shape[1]), geometry)
 
     def _lines(self, geometry: Geometry) -> list[tuple[float, Geometry]]:
@@ -138,52 +133,28 @@ class SimulatedBench:
             ),
             self.device,
         )
+        power = profile.drift.laser_power(geometry) * profile.illumination.power * share
         return ChannelMaps(
             geometry=geometry,
-            added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
-            lut_gain=profile.lut.gain_map(geometry).to(self.device),
-            amplitude=incident.abs().to(self.device),
-            angle=incident.angle().to(self.device),
+            light=PanelLight(
+                bits=profile.panel.bits,
+                channel=geometry.channel,
+                lut=profile.lut,
+                crosstalk=profile.crosstalk,
+                weights=self.crosstalk,
+                modulated=self.modulated,
+                unmodulated=self.unmodulated,
+                added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
+                lut_gain=profile.lut.gain_map(geometry).to(self.device),
+                incident=(math.sqrt(power) * incident).to(self.device, torch.complex64),
+            ),
             path=path,
-            still=path.forward((self.unmodulated * incident).to(self.device)),
-            laser_power=profile.drift.laser_power(geometry) * profile.illumination.power * share,
         )
 
     def _padded(self) -> tuple[int, int]:
         """One size for all channels: that of the longest wavelength, whose light spreads furthest."""
         panel = self.profile.panel
         return padded_shape(panel.shape, panel.pitch, max(panel.wavelengths), panel.distance, panel.pupil, None)
-
-    def _modulated_field(self, phase: Tensor, maps: ChannelMaps, flicker: float) -> Tensor:
-        """Field ``(samples, samples, H, W)`` of the sub-samples' light that follows ``phase`` ``(H, W)`` [rad].
-
-        The carrier is off. The light that follows no phase is in ``ChannelMaps.still``.
-        """
-        if tuple(phase.shape) != tuple(self.profile.panel.shape):  # compiled code would read beyond it
-            raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
-        if usable(phase) and phase.dtype == maps.amplitude.dtype:
-            return self._compiled_field(phase, maps, flicker * self.drift_gain)
-        profile, gain = self.profile, maps.lut_gain * (flicker * self.drift_gain)
-        level = straight_through_level(phase + maps.added, profile.panel.bits)
-        driven = profile.lut.phase(level, profile.panel.bits, gain, maps.geometry.channel)
-        fine = profile.crosstalk.apply(driven, self.crosstalk).view(self.samples, self.samples, *driven.shape)
-        return phasor(self.modulated * maps.amplitude, fine + maps.angle)
-
-    def _compiled_field(self, phase: Tensor, maps: ChannelMaps, gain: float) -> Tensor:
-        """``_modulated_field`` without a gradient, a block of rows at a time; gain: relative, of the frame."""
-        bits, channel = self.profile.panel.bits, maps.geometry.channel
-        table = self.profile.lut.phase(torch.arange(2.0**bits), bits, torch.ones(()), channel).numpy()
-        drive = phase.detach().contiguous().numpy(), maps.added.numpy(), maps.lut_gain.numpy()
-        share = self.crosstalk.numpy(), self.modulated[:, :, 0, 0].numpy()
-        light = maps.amplitude.numpy(), maps.angle.numpy()
-        field = torch.empty((self.samples, self.samples, *phase.shape), dtype=torch.complex64, device="cpu")
-        parts = torch.view_as_real(field).flatten(-2).numpy()
-
-        def modulate(rows: slice) -> None:
-            modulate_rows(*drive, gain, table, *share, *light, rows.start, rows.stop, parts)
-
-        in_blocks(modulate, field, len(phase), phase.numel())
-        return field
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """Noise-free intensity at the image plane.
@@ -202,12 +173,16 @@ class SimulatedBench:
         Tensor
             ``(n H, n W)`` for n = ``image_samples``; the mean incident intensity on the panel is 1.
         """
-        lines = (
-            squared_modulus(image(maps.path, self._modulated_field(phase, maps, flicker)).add_(maps.still))
-            * maps.laser_power
-            for maps in self.lines[channel]
-        )
-        return reduce(add, lines)
+        if tuple(phase.shape) != tuple(self.profile.panel.shape):  # compiled code would read beyond it
+            raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
+        gain = flicker * self.drift_gain
+
+        def of_line(maps: ChannelMaps) -> Tensor:
+            if ready(phase):
+                return maps.path.intensity(maps.light.rows(phase, gain))
+            return squared_modulus(image(maps.path, maps.light.field(phase, gain)))
+
+        return reduce(add, map(of_line, self.lines[channel]))
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """``intensity`` as it falls on the sensor: after what spreads it, averaged over the area of a sensor pixel."""
@@ -242,7 +217,7 @@ class SimulatedBench:
 
     def _expose(self, light: Tensor, electrons: float, key: int, frame: Tensor, rows: slice) -> None:
         """Fill rows of a frame ``(Hs, Ws)`` with the counts of ``light``, as ``integrated`` gives it."""
-        seen = sample(light, self.grid[rows], self.image_samples).cpu()
+        seen = sample(light, self.fine_grid[rows], 1).cpu()
         noise = normal(key, rows, frame.shape[1])
         frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise)
 

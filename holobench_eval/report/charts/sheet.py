@@ -95,7 +95,7 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     axes[0].plot(levels, 2 * levels / 2**profile.panel.bits, "k:", label="nominal")
     axes[0].set(title="look-up table", xlabel="gray level", ylabel="phase [pi rad]")
     axes[0].legend(fontsize=8)
-    _picture(axes[1], bench.channels[GREEN].lut_gain, "phase gain over the panel, green", "relative gain")
+    _picture(axes[1], bench.channels[GREEN].light.lut_gain, "phase gain over the panel, green", "relative gain")
     offsets, share = profile.crosstalk.kernel()
     axes[2].plot(offsets, share)
     axes[2].set(
@@ -116,7 +116,7 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
     height, width = bench.spec.shape
     ramp = (2 * torch.pi * 0.11 * torch.arange(width, dtype=torch.float32)).expand(height, width)
     level = torch.remainder(torch.round(ramp / (2 * torch.pi) * 2**bench.spec.bits), 2**bench.spec.bits)
-    phase = bench.profile.lut.phase(level, bench.spec.bits, bench.channels[GREEN].lut_gain, GREEN)
+    phase = bench.profile.lut.phase(level, bench.spec.bits, bench.channels[GREEN].light.lut_gain, GREEN)
     fine = bench.profile.crosstalk.apply(phase, bench.crosstalk)[:, height // 2]
     row = fine.reshape(bench.samples, bench.samples, width)[bench.samples // 2].T.reshape(-1)
     count = 30 * bench.samples

@@ -11,6 +11,7 @@ from holobench_eval.display.simulated.path import Dust, OpticalPath
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.profile import load_profile
 from holobench_eval.display.simulated.stages.propagation import sample_weights
+from holobench_eval.optics import blocks
 from holobench_eval.optics.transfer import kernel
 
 CPU = torch.device("cpu")
@@ -49,13 +50,15 @@ def relative(found, expected):
 
 
 def same(one):
-    """Forward and adjoint of the kernel are those of torch in double precision."""
+    """Forward, adjoint and intensity of the kernel are those of torch in double precision."""
     fused, samples = quickest(single(one), CPU), len(one.rows)
     assert isinstance(fused, FusedPath)
     light = random(samples, samples, *one.shape, seed=4)
     image = random(*(one.finer * side for side in one.shape), seed=5)
     assert relative(fused.forward(light.to(torch.complex64)), one.forward(light)) < 1e-6
     assert relative(fused.adjoint(image.to(torch.complex64)), one.adjoint(image)) < 1e-6
+    shown = fused.intensity(lambda rows: light[:, :, rows].to(torch.complex64).contiguous())
+    assert relative(shown, one.intensity(lambda rows: light[:, :, rows])) < 2e-6
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3, 5])
@@ -89,6 +92,15 @@ def test_columns_that_one_transfer_function_stops_are_left_out(dusty, clear):
         assert len(quickest(single(one), CPU)._panel.grid.starts) < len(
             quickest(single(path(3, 2)), CPU)._panel.grid.starts
         )
+
+
+def test_intensity_does_not_depend_on_the_rows_that_are_lit_at_once(monkeypatch):
+    one, found = quickest(single(path(3, 2, [4, 18])), CPU), []
+    light = random(3, 3, 37, 50).to(torch.complex64)
+    for size in (1, 2**30):
+        monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+        found.append(one.intensity(lambda rows: light[:, :, rows].contiguous()))
+    assert torch.equal(*found)
 
 
 def test_a_light_path_may_be_used_by_several_threads():

@@ -10,6 +10,8 @@ from holobench_eval.display.simulated import kernels
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.profile import names
 from holobench_eval.display.simulated.stages.relay import sample
+from holobench_eval.display.simulated.stages.sensor import box_filter
+from holobench_eval.optics import blocks
 
 PANEL = (96, 128)
 
@@ -21,23 +23,56 @@ def hide(monkeypatch):
 
 
 @pytest.mark.parametrize("name", names())
-def test_light_of_the_panel_is_that_of_the_differentiable_form(name, phase):
+def test_light_of_the_panel_and_its_gradient_are_those_of_torch(name, phase):
     bench = SimulatedBench(load_profile(name).scaled(PANEL))
     for channel, maps in enumerate(bench.channels):
-        given = 40 * phase[channel] - 100  # wrapped many times, to both sides
-        fast = bench._modulated_field(given, maps, 1.02)
-        slow = bench._modulated_field(given.clone().requires_grad_(), maps, 1.02).detach()
-        assert float((fast - slow).norm() / slow.norm()) < 1e-6
+        given = (40 * phase[channel] - 100).requires_grad_()  # wrapped many times, to both sides
+        fast, slow = maps.light.field(given, 1.02), maps.light.in_torch(given, 1.02)
+        slope = torch.randn(slow.shape, dtype=slow.dtype, generator=torch.Generator().manual_seed(4))
+        grads = [torch.autograd.grad(light, given, slope)[0] for light in (fast, slow)]
+        assert float((fast - slow).detach().norm() / slow.detach().norm()) < 1e-6
+        assert float((grads[0] - grads[1]).norm() / grads[1].norm()) < 2e-6
+
+
+@pytest.mark.parametrize("name", ["leto-aged", "ideal"])
+def test_light_and_gradient_do_not_depend_on_the_blocks_of_rows(name, phase, monkeypatch):
+    light = SimulatedBench(load_profile(name).scaled(PANEL)).channels[1].light
+    given, found = phase[1].clone().requires_grad_(), []
+    for size in (2**30, 2**16):
+        monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+        field = light.field(given, 1.0)
+        found.append((field.detach(), *torch.autograd.grad(field.real.sum(), given)))
+    assert all(torch.equal(*pair) for pair in zip(*found, strict=True))
+    assert torch.equal(light.rows(given.detach(), 1.0)(slice(32, 80)), found[0][0][:, :, 32:80])
 
 
 def test_a_phase_that_is_no_number_stays_none(phase):
-    bench = SimulatedBench(load_profile("leto-aged").scaled(PANEL))
+    light = SimulatedBench(load_profile("leto-aged").scaled(PANEL)).channels[1].light
     given = phase[1].clone()
     given[40, 50], given[41, 60] = float("nan"), float("inf")
-    field = bench._modulated_field(given, bench.channels[1], 1.0)
+    field = light.field(given, 1.0)
     assert bool(field[:, :, 40, 50].isnan().all())
     assert bool(field[:, :, 41, 60].isnan().all())
     assert bool(field[:, :, 60:].isfinite().all())
+
+
+@pytest.mark.parametrize("name", ["leto-aged", "pluto-offaxis", "ideal"])
+def test_intensity_without_a_gradient_is_that_with_one(name, phase):
+    bench = SimulatedBench(load_profile(name).scaled(PANEL))
+    fast = bench.integrated(phase[1], 1)
+    slow = bench.integrated(phase[1].clone().requires_grad_(), 1).detach()
+    assert float((fast - slow).norm() / slow.norm()) < 1e-6
+
+
+@pytest.mark.parametrize("width", [1.16, 2.9, 4.0])
+@pytest.mark.parametrize("size", [2**30, 1000])
+def test_the_area_of_a_pixel_and_its_gradient_are_those_of_torch(width, size, monkeypatch):
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+    image, slope = torch.rand(2, 41, 58, generator=torch.Generator().manual_seed(5))
+    image.requires_grad_()
+    fast, slow = box_filter(image, width), box_filter(image[None], width)[0]  # compiled for one picture
+    assert torch.allclose(fast, slow, rtol=1e-6)
+    assert torch.allclose(*(torch.autograd.grad(light, image, slope)[0] for light in (fast, slow)), rtol=2e-6)
 
 
 @pytest.mark.parametrize("per_pixel", [1, 2])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -78,15 +78,21 @@ def sampling_grid(points: Tensor, shape: tuple[int, int]) -> Tensor:
     return (2 * points / (size - 1) - 1).flip(-1).float()
 
 
-def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
-    """Bilinear values of an image ``(H, W)``, sampled ``per_pixel`` times a pixel, at a ``sampling_grid``.
+def finer_grid(grid: Tensor, shape: Sequence[int], per_pixel: int) -> Tensor:
+    """A ``sampling_grid`` for an image of ``shape``, sampled ``per_pixel`` times a pixel.
 
     The finer samples start at the first pixel's centre and go on past the last one's; the grid is scaled for that.
     """
-    rows, columns = image.shape
+    if per_pixel == 1:
+        return grid
+    rows, columns = shape
     pixels = grid.new_tensor([columns / per_pixel - 1, rows / per_pixel - 1])
-    scale = pixels * per_pixel / grid.new_tensor([columns - 1.0, rows - 1.0])
-    fine = grid if per_pixel == 1 else (grid + 1) * scale - 1
+    return (grid + 1) * (pixels * per_pixel / grid.new_tensor([columns - 1.0, rows - 1.0])) - 1
+
+
+def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
+    """Bilinear values of an image ``(H, W)``, sampled ``per_pixel`` times a pixel, at a ``sampling_grid``."""
+    fine = finer_grid(grid, image.shape, per_pixel)
     if usable(image):
         seen = torch.empty(grid.shape[:2], dtype=torch.float32, device="cpu")
         sample_rows(image.detach().contiguous().numpy(), fine.contiguous().numpy(), seen.numpy())
