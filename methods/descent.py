@@ -73,6 +73,7 @@ class Adam:
 
     def step(self, gradient: Tensor) -> None:
         """One step by a gradient ``(..., H, W)``."""
+        gradient = gradient.contiguous().resolve_neg()  # torch's fused step reads memory as it lies
         if self._in_torch is not None:
             self._phase.grad = gradient
             self._in_torch.step()
@@ -80,7 +81,7 @@ class Adam:
         self._steps += 1
         first, second = (1 - beta**self._steps for beta in self.BETAS)  # the moments begin at zero
         step, epsilon = self._rate * math.sqrt(second) / first, self._epsilon * math.sqrt(second)
-        rows = [floats(array.flatten(0, -2)) for array in (self._phase, gradient.contiguous(), *self._moments)]
+        rows = [floats(array.flatten(0, -2)) for array in (self._phase, gradient, *self._moments)]
 
         def work(some: slice) -> None:
             phase, slope, mean, square = (array[some] for array in rows)
@@ -110,7 +111,8 @@ def adam(
     >>> adam(torch.zeros(1, 2, 2), bowl, iterations=60, step=0.1, decay=True).mean().round(decimals=2)
     tensor(1.)
     """
-    phase, best = start.detach().clone(), Best(start)
+    start = start.detach().contiguous()
+    phase, best = start.clone(), Best(start)
     optimiser = Adam(phase, step)
 
     def iterate() -> Tensor:

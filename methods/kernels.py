@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiled import compiled, compiled_sums
-from ..optics.elementary import sincos
+from ..optics.kernel.elementary import sincos
 
 Floats = NDArray[np.float32]
 F = np.float32

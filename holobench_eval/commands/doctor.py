@@ -47,7 +47,7 @@ if "torch" in sys.modules:
     found["threads"] = torch.get_num_threads()
     cuda = torch.cuda.is_available()
     try:
-        import holobench_eval.optics.fused
+        import holobench_eval.optics.kernel.fused
     except Exception as error:
         found["kernel"] = f"{type(error).__name__}: {error}"[:200]
     found["gpus"] = [torch.cuda.get_device_name(i) for i in range(torch.cuda.device_count())] if cuda else []

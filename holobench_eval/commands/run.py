@@ -88,7 +88,7 @@ def _panel(config: Path) -> tuple[int, int] | None:
     try:
         rows, columns = yaml.safe_load(config.read_bytes())["display"]["panel"]
         return int(rows), int(columns)
-    except (OSError, ValueError, TypeError, LookupError, yaml.YAMLError):
+    except (OSError, ValueError, TypeError, LookupError, ArithmeticError, yaml.YAMLError):
         return None
 
 

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from .convolution import Convolution, frequencies, iris
+from .kernel.sizes import fast_size
 from .padding import DEFAULT_ERROR, Padding, padded_shape
-from .sizes import fast_size
 from .transfer import TransferFunction, transfer_function
 
 LINES = 256

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from .sizes import fast_size
+from .kernel.sizes import fast_size
 
 Padding = int | Literal["reference"] | None
 

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from .angular_spectrum import check_geometry
 from .convolution import Convolution
-from .sizes import fast_size
+from .kernel.sizes import fast_size
 from .transfer import TransferFunction, transfer_function
 
 TAPER = 0.1

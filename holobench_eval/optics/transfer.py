@@ -16,7 +16,7 @@ from torch import Tensor
 from ..core.allocator import LARGEST_KEPT
 from ..core.compiled import AVAILABLE
 from .blocks import in_blocks, in_parts
-from .sizes import LANES, Steps, steps
+from .kernel.sizes import LANES, Steps, steps
 
 Numbers = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float32]
@@ -63,7 +63,7 @@ def kernel() -> ModuleType | None:
     if not AVAILABLE:
         return None
     try:
-        from . import fused
+        from .kernel import fused
     except Exception:  # whatever a compiler raises that does not know the processor, or has no folder to write to
         return None
     return fused
@@ -213,7 +213,7 @@ class Grid:
 
 def _fused() -> ModuleType:
     """The kernel, known to be there; not kept in what uses it, so that models can be copied."""
-    from . import fused
+    from .kernel import fused
 
     return fused
 

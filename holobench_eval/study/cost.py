@@ -33,6 +33,7 @@ from ..core.hashing import digest
 from ..core.io import write_atomically
 from .definition import Study
 from .plan import Plan, Task
+from .versions import HARNESS
 
 PROCESS = Path("/proc/self")
 _KIB_PER_MIB, _BYTES_PER_MIB = 1024, 1024**2
@@ -181,7 +182,7 @@ def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
             "learned": [cell.measure, *cell.prepared],
             "measure": cell.measure,
             "machine": [cpu_model(), platform.machine(), threads, workers, *([gpu] if gpu else [])],
-            "versions": [_torch(), __version__],
+            "versions": [_torch(), __version__, HARNESS],
         }
     )
 

@@ -51,7 +51,13 @@ def test_a_sheet_that_cannot_be_drawn_is_a_line(
 def test_the_panel_of_a_config_is_known_before_it_is_checked(tmp_path: Path) -> None:
     study = load_study(write_config(tmp_path))
     assert _panel(study.file) == study.display.panel
-    for text in ("display: {profiles: [ideal]}", "display: [", "3", "display: {panel: large}"):
+    for text in (
+        "display: {profiles: [ideal]}",
+        "display: [",
+        "3",
+        "display: {panel: large}",
+        "display: {panel: [.inf, 64]}",
+    ):
         (tmp_path / "other.yaml").write_text(text)
         assert _panel(tmp_path / "other.yaml") is None
     assert _panel(tmp_path / "missing.yaml") is None

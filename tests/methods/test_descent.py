@@ -43,3 +43,20 @@ def test_the_size_of_the_panel_changes_no_pixel_of_the_descent():
 
     large = descend(small.repeat(1, 5, 5))
     assert torch.allclose(descend(small).repeat(1, 5, 5), large, atol=1e-6)
+
+
+@pytest.mark.parametrize("with_numba", [True, False])
+def test_the_layout_of_arrays_in_memory_changes_nothing(with_numba, monkeypatch):
+    monkeypatch.setattr(compiled, "AVAILABLE", with_numba and compiled.AVAILABLE)
+    start, goal = torch.rand(2, 1, 12, 20, generator=torch.Generator().manual_seed(2))
+
+    def turned(phase):  # its gradient lies column by column
+        return ((phase.mT.contiguous() - goal.mT).square()).mean((1, 2))
+
+    def plain(phase):
+        return (phase - goal).square().mean((1, 2))
+
+    found = [adam(start, by_autograd(loss), iterations=20, step=0.05) for loss in (plain, turned)]
+    by_columns = adam(start.mT.contiguous().mT, by_autograd(plain), iterations=20, step=0.05)
+    assert torch.allclose(found[0], found[1], atol=1e-6)
+    assert torch.allclose(found[0], by_columns, atol=1e-6)

@@ -1,6 +1,6 @@
 import numpy as np
 
-from holobench_eval.optics.elementary import sincos
+from holobench_eval.optics.kernel.elementary import sincos
 
 
 def test_sine_and_cosine_have_the_accuracy_that_they_state():

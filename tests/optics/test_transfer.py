@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holobench_eval.optics import AngularSpectrum, blocks, transfer
-from holobench_eval.optics.sizes import RADICES, fast_size, steps
+from holobench_eval.optics.kernel.sizes import RADICES, fast_size, steps
 from holobench_eval.optics.transfer import Fused, InTorch, transfer_function
 
 SIZES = st.sampled_from([size for size in range(4, 400) if steps(size)])

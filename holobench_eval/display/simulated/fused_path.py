@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from ...optics.blocks import in_blocks
-from ...optics.sizes import LANES, steps
+from ...optics.kernel.sizes import LANES, steps
 from ...optics.transfer import Grid, Numbers, axis, kernel, tile_starts, tiled
 from .path import Light, LightPath, OpticalPath
 
@@ -52,7 +52,6 @@ class FusedPath:
         through = first * last
         self._change, self._dusty, ends = None, np.arange(0), (through, through)
         if path.dust is not None and len(path.dust.rows):
-            # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
             self._dusty = (path.dust.rows // LANES).unique().numpy()
             # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
             change = first.new_zeros(LANES * -(-height // LANES), width)

@@ -32,7 +32,8 @@ def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     levels = torch.arange(1, LEVELS - 1, dtype=torch.float64) / (LEVELS - 1)
     law = stroke(levels, profile.lut.phase(levels * 2**profile.panel.bits, profile.panel.bits, gain, colour))
     modulated, unmodulated = complex(bench.modulated.mean()), complex(bench.unmodulated.mean())
-    light = (abs(modulated) ** 2 + abs(unmodulated) ** 2) * float(maps.light.incident.abs().square().mean())
+    incident = sum(float(line.light.incident.abs().square().mean()) for line in bench.lines[colour])
+    light = (abs(modulated) ** 2 + abs(unmodulated) ** 2) * incident
     return [
         estimate("lut_exponent", colour, law.exponent),
         estimate("phase_gain", colour, law.gain),

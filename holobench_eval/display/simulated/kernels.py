@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import compiled
-from ...optics.elementary import sincos
+from ...optics.kernel.elementary import sincos
 
 Plane = NDArray[np.float32]
 

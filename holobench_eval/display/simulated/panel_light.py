@@ -108,7 +108,7 @@ class PanelLight:
     @cached_property
     def _curve(self) -> tuple[Floats, Floats]:
         """Phase [rad] of every gray level, and its slope in the phase that is asked for."""
-        with torch.enable_grad():
+        with torch.inference_mode(mode=False), torch.enable_grad():
             level = torch.arange(2.0**self.bits, dtype=torch.float32, device="cpu").requires_grad_()
             shown = self.lut.phase(level, self.bits, level.new_ones(()), self.channel)
             (slope,) = torch.autograd.grad(shown.sum(), level)

@@ -35,11 +35,12 @@ from .stages.sensor import IMAGE_SAMPLES
 class ChannelMaps:
     """What is fixed for one line of the source: every random pattern drawn, every transfer function built.
 
-    light: from a phase to the light that leaves the panel, its power relative to what the camera's exposure was set
-    for; path: all that is linear in it.
+    power: of the line, relative to what the camera's exposure was set for; light: from a phase to the light of that
+    power that leaves the panel; path: all that is linear in it.
     """
 
     geometry: Geometry
+    power: float
     light: PanelLight
     path: LightPath
 
@@ -136,6 +137,7 @@ class SimulatedBench:
         power = profile.drift.laser_power(geometry) * profile.illumination.power * share
         return ChannelMaps(
             geometry=geometry,
+            power=power,
             light=PanelLight(
                 bits=profile.panel.bits,
                 channel=geometry.channel,

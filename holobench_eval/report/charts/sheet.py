@@ -160,7 +160,7 @@ def _spectrum(axis: Axes, bench: SimulatedBench) -> None:
     offsets = [torch.tensor([1e9 * line.geometry.detuning for line in lines]) for lines in bench.lines]
     apart = 0.01 * float(torch.cat(offsets).abs().max().clamp_min(1))
     for number, (places, lines) in enumerate(zip(offsets, bench.lines, strict=True)):
-        powers = [line.laser_power for line in lines]
+        powers = [line.power for line in lines]
         axis.vlines((places + (number - 1) * apart).tolist(), 0, powers, color=COLOURS[number], linewidth=2)
     axis.set(title="spectrum of the source", xlabel="offset from the nominal wavelength [nm]", ylabel="power of a line")
 

@@ -166,3 +166,10 @@ def test_a_phase_of_another_size_than_the_panel_is_refused(shape, grad):
     bench = SimulatedBench(load_profile("leto-mild").scaled((64, 64)))
     with torch.set_grad_enabled(grad), pytest.raises(ValueError, match="the panel is"):
         bench.intensity(torch.zeros(shape, requires_grad=grad), channel=0)
+
+
+def test_the_first_capture_of_a_process_may_be_in_inference_mode():
+    profile = load_profile("leto-mild").scaled((64, 96))
+    with torch.inference_mode():
+        light = SimulatedBench(profile).intensity(torch.zeros(64, 96), 1)
+    assert torch.equal(light, SimulatedBench(profile).intensity(torch.zeros(64, 96), 1))

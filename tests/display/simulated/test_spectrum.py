@@ -13,8 +13,9 @@ from torch import Tensor
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import Profile, load_profile
 from holobench_eval.display.simulated.geometry import Geometry
+from holobench_eval.display.simulated.ground_truth import truth
 from holobench_eval.display.simulated.pipeline import SimulatedBench
-from holobench_eval.display.simulated.stages import Illumination, LookUpTable, Spectrum
+from holobench_eval.display.simulated.stages import AddedLens, Illumination, LookUpTable, Spectrum
 from holobench_eval.optics.angular_spectrum import AngularSpectrum
 
 BLAZE, DISTANCE = (0.0, 0.25), 0.06
@@ -104,8 +105,8 @@ def test_the_effect_is_listed_with_its_width_and_what_the_blaze_makes_of_it(idea
     panel = replace(ideal.panel, blaze=(0.0, 0.25), distance=0.1, pitch=6.4e-6)
     listed = replace(ideal, panel=panel, spectrum=measured((-1e-9, 1.0), (1e-9, 1.0))).effects()
     text = next(effect.text for effect in listed if effect.name == "spectrum")
-    assert "2/2/2 nm" in text
-    assert f"{2e-9 * 0.1 * 0.25 / 6.4e-6**2:.2g} px" in text
+    assert "1/1/1 nm" in text
+    assert f"{1e-9 * 0.1 * 0.25 / 6.4e-6**2:.2g} px" in text
 
 
 def test_a_spectrum_for_too_few_colours_is_refused_with_its_place(tmp_path: Path) -> None:
@@ -113,4 +114,29 @@ def test_a_spectrum_for_too_few_colours_is_refused_with_its_place(tmp_path: Path
     file = tmp_path / "mine.yaml"
     file.write_text(ideal.read_text() + "\nspectrum: {measured: [[[0.0, 1.0]]]}\n")
     with pytest.raises(UserError, match=r"mine.yaml:\d+:\d+: there are 1 measured spectra; the panel has 3"):
+        load_profile(str(file))
+
+
+def test_all_lines_meet_the_same_hologram_of_an_added_lens(ideal: Profile, geometry: Geometry) -> None:
+    ((_, long),) = measured((2e-8, 1.0)).spectrum(geometry)
+    lens = AddedLens(move=(0.1, 0.1, 0.0))
+    assert torch.allclose(lens.hologram(long), lens.hologram(geometry), rtol=1e-6)
+
+
+def test_the_light_that_the_ground_truth_states_is_that_of_all_lines(ideal: Profile) -> None:
+    def light(spectrum: Spectrum) -> list[float]:
+        bench = SimulatedBench(replace(ideal, spectrum=spectrum))
+        return [estimate.value for estimate in truth(bench) if estimate.name == "light"]
+
+    assert light(Spectrum(width=(2e-9,) * 3, lines=5)) == pytest.approx(light(Spectrum()), rel=1e-6)
+
+
+@pytest.mark.parametrize("spectrum", ["{measured: [[[-7e-7, 1]], [[0, 1]], [[0, 1]]]}", "{width: [1e-3, 0, 0]}"])
+def test_a_spectrum_far_from_its_colour_is_refused(spectrum: str, tmp_path: Path) -> None:
+    ideal = files("holobench_eval.display.simulated") / "profiles" / "ideal.yaml"
+    file = tmp_path / "mine.yaml"
+    file.write_text(ideal.read_text() + f"\nspectrum: {spectrum}\n")
+    with pytest.raises(
+        UserError, match=r"mine.yaml:18:2.: spectrum\.(measured|width)\[0\].* should be .* than or equal to"
+    ):
         load_profile(str(file))

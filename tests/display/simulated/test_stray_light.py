@@ -67,3 +67,22 @@ def test_it_acts_on_the_light_and_is_listed(ideal: Profile, phase: Tensor) -> No
     assert torch.allclose(dim, 0.5 * clear + 0.5 * gaussian(clear, 0.3 * clear.shape[0]), atol=1e-5)
     assert "50 %" in next(effect.text for effect in veiled.effects() if effect.name == "stray_light")
     assert "stray_light" not in {effect.name for effect in ideal.effects()}
+
+
+def test_any_number_of_threads_gives_the_same_veil() -> None:
+    light = torch.rand(540, 960, generator=torch.Generator().manual_seed(1))
+    before = torch.get_num_threads()
+    try:
+        seen = []
+        for threads in (1, 2, 3):
+            torch.set_num_threads(threads)
+            seen.append(gaussian(light, 5.4))
+    finally:
+        torch.set_num_threads(before)
+    assert all(torch.equal(seen[0], other) for other in seen[1:])
+
+
+def test_a_veil_narrower_than_a_sample_keeps_the_power(ideal: Profile, geometry: Geometry) -> None:
+    light = torch.zeros(21, 21)
+    light[10, 10] = 1
+    assert float(StrayLight(1.0, 0.01).image(light, ideal, geometry).sum()) == pytest.approx(1, rel=1e-3)

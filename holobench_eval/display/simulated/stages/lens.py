@@ -40,7 +40,8 @@ class AddedLens(Stage):
         inverse = ((1 + columns) / determinant - 1, (1 + rows) / determinant - 1, -cross / determinant)
         y, x = (axis * geometry.shape[0] * geometry.pitch for axis in geometry.coordinates())
         form = inverse[0] * y * y + inverse[1] * x * x + 2 * inverse[2] * y * x
-        return (-math.pi / (geometry.wavelength * geometry.distance) * form).float()
+        wavelength = geometry.wavelength - geometry.detuning  # one hologram for all lines of the source
+        return (-math.pi / (wavelength * geometry.distance) * form).float()
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from ..stage import Effect, Stage
 if TYPE_CHECKING:
     from ..profile import Profile
 
-Width = Annotated[float, Interval(ge=0, le=1e-7)]
+Width = Annotated[float, Interval(ge=0, le=6e-8)]
+Offset = Annotated[float, Interval(ge=-1e-7, le=1e-7)]
 Share = Annotated[float, Interval(gt=0)]
-Spectral = Annotated[tuple[tuple[float, Share], ...], Len(1, 99)]
+Spectral = Annotated[tuple[tuple[Offset, Share], ...], Len(1, 99)]
 FWHM = 2 * math.sqrt(2 * math.log(2))  # full width at half maximum of a Gaussian, in standard deviations
 
 
@@ -28,9 +29,9 @@ FWHM = 2 * math.sqrt(2 * math.log(2))  # full width at half maximum of a Gaussia
 class Spectrum(Stage):
     """A Gaussian line, or a measured spectrum: an incoherent sum over a few wavelengths.
 
-    width: full width at half maximum [m] per colour (R, G, B); lines: wavelengths that stand for it (Gauss-Hermite
-    quadrature), which have to lie closer than a pixel in the image; measured: in the place of width, pairs (offset
-    from the nominal wavelength [m], share of the power) for every colour, shares in any unit.
+    width: full width at half maximum [m] per colour (R, G, B; of a single colour the first); lines: wavelengths that
+    stand for it (Gauss-Hermite quadrature), which have to lie closer than a pixel in the image; measured: in the place
+    of width, pairs (offset from the nominal wavelength [m], share of the power) for every colour, shares in any unit.
 
     Laser diodes emit over 1 to 5 nm, superluminescent diodes over 5 to 15 nm, light-emitting diodes over 20 to 40 nm.
     The blaze of a display is a grating: a wavelength ``d`` off the nominal one leaves the axis and arrives ``z f d``
@@ -43,18 +44,19 @@ class Spectrum(Stage):
     )
 
     width: tuple[Width, Width, Width] = (0.0, 0.0, 0.0)
-    lines: Annotated[int, Interval(ge=1, le=99)] = 3
+    lines: Annotated[int, Interval(ge=1, le=31)] = 3
     measured: tuple[Spectral, ...] = ()
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
-        """Its width, and how far the blaze spreads it."""
+        """How far its lines lie from the nominal wavelengths, and how far the blaze moves them."""
         panel = profile.panel
-        widths = [2 * _deviation(self._offsets(channel)) for channel in range(len(panel.wavelengths))]
-        if any(widths):
-            spread = max(widths) * panel.distance * math.hypot(*panel.blaze) / panel.pitch**2
-            nanometres = "/".join(f"{1e9 * width:.2g}" for width in widths)
-            text = f"a source {nanometres} nm wide (two standard deviations)"
-            yield Effect("spectrum", f"{text}, which the blaze spreads over {spread:.2g} px" if spread else text)
+        colours = [self._offsets(channel) for channel in range(len(panel.wavelengths))]
+        reaches = [max(abs(offset) for offset, _ in lines) for lines in colours]
+        if any(reaches):
+            spread = max(reaches) * panel.distance * math.hypot(*panel.blaze) / panel.pitch**2
+            nanometres = "/".join(f"{1e9 * reach:.2g}" for reach in reaches)
+            text = f"lines up to {nanometres} nm beside the nominal wavelengths (R/G/B)"
+            yield Effect("spectrum", f"{text}, which the blaze moves by up to {spread:.2g} px" if spread else text)
 
     def spectrum(self, geometry: Geometry) -> Sequence[tuple[float, Geometry]]:
         """The wavelengths of a colour, the one nearest to the nominal wavelength first."""
@@ -83,9 +85,3 @@ class Spectrum(Stage):
         else:
             pairs = [(0.0, 1.0)]
         return sorted(pairs, key=lambda pair: (abs(pair[0]), pair[0]))
-
-
-def _deviation(pairs: Sequence[tuple[float, float]]) -> float:
-    """Standard deviation of offsets with shares."""
-    mean = sum(share * offset for offset, share in pairs)
-    return math.sqrt(max(0.0, sum(share * (offset - mean) ** 2 for offset, share in pairs)))

@@ -42,7 +42,7 @@ class StrayLight(Stage):
         """The light with its veil."""
         if not self.share:
             return light
-        spread = self.reach * light.shape[-2]
+        spread = max(1.0, self.reach * light.shape[-2])  # a narrower one would not keep the power
         return (1 - self.share) * light + self.share * gaussian(light, spread)
 
 
@@ -52,13 +52,14 @@ def gaussian(light: Tensor, spread: float) -> Tensor:
     The Gaussian is two narrower ones in a row, and one every that many samples of them is enough: the error is
     2e-4 of the Gaussian's height, since the trapezoidal rule converges exponentially for it.
     """
-    rows, columns = (_narrower(side, spread / math.sqrt(2), light) for side in light.shape)
-    return rows.T @ (rows @ light @ columns.T) @ columns
+    rows, columns = (_narrower(side, spread / math.sqrt(2), light.device) for side in light.shape)
+    # in double precision, in which the order of a sum, and so the number of threads, is lost in the rounding
+    return (rows.T @ (rows @ light.double() @ columns.T) @ columns).to(light.dtype)
 
 
-def _narrower(side: int, spread: float, like: Tensor) -> Tensor:
+def _narrower(side: int, spread: float, device: torch.device) -> Tensor:
     """Gaussians ``(centres, side)``, one every ``spread`` samples, as far beyond the ends as they reach."""
     places = torch.arange(side, dtype=torch.float64)
     centres = torch.arange(-4 * spread, side + 4 * spread, spread, dtype=torch.float64)
     gaussians = torch.exp(-((places - centres[:, None]) ** 2) / (2 * spread**2))
-    return (gaussians / math.sqrt(2 * math.pi * spread)).to(like)
+    return (gaussians / math.sqrt(2 * math.pi * spread)).to(device)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.compiled import compiled
+from ...core.compiled import compiled
 
 F, N = np.float32, np.int32  # constants of these types keep float32 what it is
 

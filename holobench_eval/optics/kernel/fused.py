@@ -19,19 +19,16 @@ import numpy as np
 from numba import njit
 
 from .butterflies import (
-    SAMPLE,
     adding_butterfly,
-    crossed,
     filtered_butterfly,
     filtered_sample,
-    joined,
     joining_butterfly,
-    split,
-    squared,
     turned_butterfly,
     weighted_sample,
 )
+from .lanes import SAMPLE
 from .sizes import LANES
+from .transpositions import crossed, joined, split, squared
 
 OPTIONS = {"nogil": True, "cache": True, "boundscheck": False, "error_model": "numpy"}
 SHAPE, AXIS = "UniTuple(i8, 3)", "Tuple((i8, i8[::1], f4[::1], f4[::1]))"

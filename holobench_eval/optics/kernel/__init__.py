@@ -1,0 +1,1 @@
+"""The compiled kernel: convolutions of padded fields, sixteen lines at a time; see ``fused``."""
