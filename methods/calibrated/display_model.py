@@ -7,11 +7,13 @@ parameters of its own, so that Eq. 13, |P(H) + R|^2, is kept as it stands: a com
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+from torch.nn.utils import parameters_to_vector
 
 from ...display.api import DisplaySpec
 from ...imaging.shifts import correlate_each
@@ -71,7 +73,10 @@ class DisplayModel(nn.Module):
         self.aberration = nn.Parameter(torch.zeros(channels, len(MODES)))
         self.brightness = nn.Parameter(torch.zeros(channels))
         self.register_buffer("modes", pupil_modes(spec.region.shape, spec.pupil), persistent=False)
-        self._held: tuple[list[object], Maps] | None = None
+        self._held: tuple[Tensor, Maps] | None = None
+
+    def __getstate__(self) -> dict[str, object]:
+        return self.__dict__ | {"_held": None}  # copies compute their own
 
     def forward(self, phase: Tensor) -> Tensor:
         """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; its intensity is in the captures' unit."""
@@ -82,12 +87,17 @@ class DisplayModel(nn.Module):
         return torch.fft.ifft2(torch.fft.fft2(torch.stack(region)) * maps.pupil) * maps.amplitude
 
     def _maps(self) -> Maps:
-        """Computed once for parameters that are constants, as in a retrieval; anew after one has changed."""
-        if any(parameter.requires_grad for parameter in self.parameters()):
+        """Computed once for parameters that are constants, as in a retrieval; anew after one has changed.
+
+        Values are compared, as torch does not count what is changed through ``data`` or NumPy. A GPU would have to be
+        waited for, which recorded steps must not (core.graphs): there the maps are computed each time.
+        """
+        if not self.table.is_cpu or any(parameter.requires_grad for parameter in self.parameters()):
             return self._fresh_maps()
-        now: list[object] = [(parameter.data_ptr(), parameter._version) for parameter in self.parameters()]
-        if self._held is None or self._held[0] != now:
-            self._held = now, self._fresh_maps()
+        with torch.inference_mode(False):  # a later step may need gradients
+            now = parameters_to_vector(self.parameters())
+            if self._held is None or self._held[0].dtype != now.dtype or not torch.equal(self._held[0], now):
+                self._held = now, self._fresh_maps()
         return self._held[1]
 
     def _fresh_maps(self) -> Maps:
@@ -152,9 +162,15 @@ def enlarged(grid: Tensor, shape: tuple[int, int]) -> Tensor:
 
 def weighted(grid: Tensor, shape: tuple[int, int]) -> Tensor:
     """``enlarged`` as two products with matrices: bicubic interpolation has no deterministic gradient on a GPU."""
-    points = torch.eye(grid.shape[-1])[:, None, :, None]  # (n, 1, n, 1): what each point alone becomes along an axis
-    rows, columns = (_bicubic(points, (side, 1))[:, 0, :, 0].to(grid) for side in shape)
+    rows, columns = (_weights(grid.shape[-1], side, grid.device, grid.dtype) for side in shape)
     return rows.T @ grid @ columns
+
+
+@cache
+def _weights(points: int, side: int, device: torch.device, dtype: torch.dtype) -> Tensor:
+    """What each point alone becomes along an axis, ``(points, side)``; a recorded step could not copy it to a GPU."""
+    with torch.inference_mode(False):
+        return _bicubic(torch.eye(points)[:, None, :, None], (side, 1))[:, 0, :, 0].to(device, dtype)
 
 
 def _bicubic(images: Tensor, shape: tuple[int, int]) -> Tensor:

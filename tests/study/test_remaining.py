@@ -55,12 +55,52 @@ def test_time_passes_while_a_task_is_at_work_and_never_runs_out() -> None:
     assert remaining.seconds() == 0
 
 
-def test_what_was_measured_before_is_weighted_by_what_rows_cost_now() -> None:
+def test_to_what_was_measured_before_is_added_what_tasks_cost_beyond_it_after_the_first() -> None:
     clock = Clock()
-    remaining = Remaining([("slow", False), ("quick", False), ("quick", False)], ROWS, 1, clock)
-    assert remaining.seconds() == pytest.approx(20 + 2 + 2)
-    compute(remaining, clock, "quick", 3)  # half as much again: it is scored, too
-    assert remaining.seconds() == pytest.approx(1.5 * 20 + 3)
+    remaining = Remaining([("slow", False)] + [("quick", False)] * 3, ROWS, 1, clock)
+    assert remaining.seconds() == pytest.approx(20 + 3 * 2)
+    compute(remaining, clock, "quick", 60)
+    assert remaining.seconds() == pytest.approx(20 + 2 * 2)
+    compute(remaining, clock, "quick", 3)  # a second more: it is scored, too
+    assert remaining.seconds() == pytest.approx(20 + 1 + 3)
+    compute(remaining, clock, "quick", 0.2)
+    assert remaining.seconds() == pytest.approx(20)  # nothing is taken off
+
+
+def test_only_the_first_tasks_of_the_run_are_left_out_not_those_of_every_row() -> None:
+    clock = Clock()
+    remaining = Remaining([("slow", False)] + [("quick", False)] * 3, {}, 1, clock)
+    compute(remaining, clock, "slow", 20)
+    compute(remaining, clock, "quick", 4)
+    compute(remaining, clock, "quick", 2)
+    assert remaining.seconds() == pytest.approx(3)
+
+
+def test_tasks_may_begin_and_end_while_the_time_left_is_looked_up() -> None:
+    turns = 0
+    looking = False
+
+    class Interrupted(str):
+        """A row during whose look-up another thread has a turn, in which one task begins and ends and one begins."""
+
+        def __hash__(self) -> int:
+            nonlocal turns
+            if looking:
+                turns += 1
+                for part in ("ended", "begun"):
+                    remaining.begins(f"{turns} {part}", f"{turns} {part}", False)
+                remaining.ends(f"{turns} ended")
+            return super().__hash__()
+
+    clock = Clock()
+    rows = {row: Interrupted(row) for row in ("first", "done", "at work", "waiting")}
+    remaining = Remaining([(row, False) for row in rows.values()], {}, 1, clock)
+    compute(remaining, clock, rows["first"], 1)
+    compute(remaining, clock, rows["done"], 1)
+    remaining.begins("at work", rows["at work"], False)
+    looking = True
+    assert remaining.seconds() is not None
+    assert turns > 3
 
 
 def test_workers_share_what_is_left_but_for_a_long_task_and_those_that_run_alone() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -371,3 +374,55 @@ def test_a_held_model_forgets_its_maps_when_it_is_given_other_parameters() -> No
         held.load_state_dict(other.state_dict())
         assert torch.allclose(held(phase), other(phase), rtol=1e-4, atol=1e-5)
     assert not torch.allclose(held(phase), before, rtol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda values: values.data.add_(1),
+        lambda values: values.data.copy_(torch.ones_like(values)),
+        lambda values: values.numpy().fill(1),
+    ],
+    ids=["data.add_", "data.copy_", "numpy"],
+)
+def test_a_held_model_notices_changes_that_torch_does_not_count(change: Callable[[Tensor], object]) -> None:
+    spec = spec_of()
+    held, phase = DisplayModel(spec).requires_grad_(False), random_phase(spec)
+    before = intensity_of(held, phase)
+    change(held.brightness)
+    assert torch.allclose(intensity_of(held, phase), math.e * before, rtol=1e-4)
+
+
+def test_a_held_model_follows_its_parameters_to_another_precision() -> None:
+    spec = spec_of()
+    held, phase = DisplayModel(spec).requires_grad_(False), random_phase(spec)
+    held(phase)
+    assert torch.equal(held.double()(phase.double()), DisplayModel(spec).double()(phase.double()))
+
+
+@pytest.mark.parametrize("made", [False, True])
+def test_a_model_held_in_inference_mode_gives_gradients_later(made: bool) -> None:
+    """made: its parameters are made in that mode, too."""
+    spec = spec_of()
+    phase = random_phase(spec)
+    with torch.inference_mode(made):
+        held = DisplayModel(spec).requires_grad_(False)
+    with torch.inference_mode():
+        held(phase)
+    results = []
+    for model in (held, DisplayModel(spec).requires_grad_(False)):
+        own = phase.clone().requires_grad_()
+        results += torch.autograd.grad(intensity_of(model, own).square().sum(), own)
+    assert torch.equal(*results)
+
+
+def test_a_copy_of_a_held_model_does_not_carry_the_maps() -> None:
+    spec = spec_of()
+    held, phase = DisplayModel(spec).requires_grad_(False), random_phase(spec)
+    size = len(pickle.dumps(held))
+    shown = held(phase)
+    assert len(pickle.dumps(held)) == size
+    for other in (copy.deepcopy(held), pickle.loads(pickle.dumps(held))):
+        assert other._held is None
+        assert torch.equal(other(phase), shown)
+    assert held._held is not None
