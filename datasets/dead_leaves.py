@@ -45,7 +45,7 @@ class DeadLeaves:
 
     count: how many images; seed: another number gives other images; colours: "uniform", gray levels uniform in sRGB,
     with more contrast than photographs have, or "natural", with the mean and standard deviation of the photographs in
-    ImageNet. Drawn for the shape asked for, not resized.
+    ImageNet, before clipping. Drawn for the shape asked for, not resized.
     """
 
     count: Annotated[int, Interval(ge=1, le=100_000)] = 24
@@ -93,10 +93,10 @@ def _leaves(shape: tuple[int, int], draw: torch.Generator, colours: Colours) -> 
     # OpenCV counts from the centre of the first pixel, in 1/16 px with shift=4.
     places = ((centre * SAMPLES - 0.5) * 16).round().int().tolist()
     sizes = (radius * SAMPLES * 16).round().int().tolist()
-    colours = colour.tolist()
+    painted = colour.tolist()
     for index in seen.nonzero()[:, 0].tolist():
         y, x = places[index]
-        cv2.circle(canvas, (x, y), sizes[index], colours[index], thickness=cv2.FILLED, shift=4)
+        cv2.circle(canvas, (x, y), sizes[index], painted[index], thickness=cv2.FILLED, shift=4)
     image = planes(canvas)
     return torch.nn.functional.avg_pool2d(image, SAMPLES).clamp(0.0, 1.0)
 

@@ -22,8 +22,8 @@ from .displays import Preparation
 from .executors import Executor, Serial
 from .executors.clusters import Address
 from .executors.local import Local
+from .executors.remaining import Remaining
 from .plan import Cell, Plan, Task
-from .remaining import Remaining
 from .scoring.cell import work
 from .scoring.job import Job, Setting
 from .store import Record, Store

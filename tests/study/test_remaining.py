@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from holobench_eval.study.remaining import Remaining
+from holobench_eval.study.executors.remaining import Remaining
 
 ROWS = {"slow": 20.0, "quick": 2.0}
 
