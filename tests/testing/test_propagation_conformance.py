@@ -167,12 +167,15 @@ def test_a_constant_phase_is_no_mistake_and_a_constant_amplitude_is_one():
     ]
 
 
-def test_a_propagator_in_single_precision_has_no_wrong_gradient():
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_a_propagator_in_single_precision_has_no_wrong_gradient(size):
     class Single(Written):
+        padding = size  # unpadded, the loss hardly changes along a random direction
+
         def forward(self, field):
             return self.filtered(field, self.transfer.to(torch.complex64)).to(torch.complex64)
 
-    assert found(Single, "phase gradient").verdict == "PASS"
+    assert found(Single, "phase gradient").value < 1e-4
     assert found(Single, "adjointness").verdict == "PASS"
 
 
