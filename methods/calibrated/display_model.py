@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 from torch.nn.utils import parameters_to_vector
 
+from ...core.graphs import is_recorded
 from ...display.api import DisplaySpec
 from ...imaging.shifts import correlate_each
 from ...optics import AngularSpectrum
@@ -92,7 +93,7 @@ class DisplayModel(nn.Module):
         Values are compared, as torch does not count what is changed through ``data`` or NumPy. A GPU would have to be
         waited for, which recorded steps must not (core.graphs): there the maps are computed each time.
         """
-        if not self.table.is_cpu or any(parameter.requires_grad for parameter in self.parameters()):
+        if is_recorded(self.table.device) or any(parameter.requires_grad for parameter in self.parameters()):
             return self._fresh_maps()
         with torch.inference_mode(False):  # a later step may need gradients
             now = parameters_to_vector(self.parameters())
@@ -144,7 +145,7 @@ def lit(phase: Tensor, taps: Tensor) -> Tensor:
     """
     channels = len(phase)
     padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
-    if phase.is_cpu and not taps.requires_grad:  # half the time of what follows
+    if not is_recorded(phase.device) and not taps.requires_grad:  # half the time of what follows
         pairs = zip(padded[0], taps.tolist(), strict=True)
         blurred = (correlate_each(correlate_each(colour, own, -2), own, -1).flatten(0, 1) for colour, own in pairs)
         return torch.stack([mean_phasor(colour, 0) for colour in blurred])
