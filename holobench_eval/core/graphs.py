@@ -99,14 +99,14 @@ def _results(step: Callable[[], T], recorder: Recorder) -> Iterator[T]:
         # A recording that fails leaves torch's random numbers of a GPU unusable: what would make it fail is looked for.
         first = recorder.run(step, watched=True)
     except RuntimeError:
-        pass
+        pass  # it waits, and runs as it is from here on
     else:
         yield first
         del first
         try:
             result = recorder.record(step)
         except RuntimeError:
-            pass
+            pass  # it cannot be recorded, or there is no memory for that: as it is, too
         else:
             while True:
                 recorder.replay()
