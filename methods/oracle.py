@@ -2,55 +2,71 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ..display.api import Simulation
 from ..display.metered import MeteredDisplay
-from .descent import adam, by_autograd
-from .losses import intensity_l2
+from .common import TINY
+from .descent import Best, adam, by_autograd
 from .wirtinger import Wirtinger
 
 
 @dataclass(frozen=True)
 class Oracle:
-    """Adam on the phase for the intensity in the region, differentiated through every stage of the simulated bench.
+    """Adam on the phase for the expected score, differentiated through every stage of the simulated bench.
 
-    It knows all that is fixed about the bench (look-up table, crosstalk, illumination, aberrations) but not the
-    noise of a capture. It starts from ``start_iterations`` of Wirtinger, few on purpose: a converged nominal
-    phase is full of wraps, and where a panel blurs its wraps, descent does not get out of them again. The phase of the
-    least loss that was seen is returned, per colour. SI units throughout.
+    It knows all that is fixed about the bench (look-up table, crosstalk, illumination, aberrations, registration), and
+    how strong the noise of a capture is, but not the noise itself. It descends twice: from ``start_iterations`` of
+    Wirtinger, few on purpose, since a converged nominal phase is full of wraps, and where a panel blurs its wraps,
+    descent does not get out of them again; and from the best phase that any other method of the study found for the
+    target on the display. Of all phases it has seen, those others included, the one of the best expected score is
+    returned, per colour: no method is above it, but for the noise of a capture. SI units throughout.
+
+    A descent is made of rounds, each from the best phase so far with the step falling to zero along half a cosine: on
+    ``leto-aged`` at 256 px, four rounds of 40 iterations reached 31.2 dB where two of 80 reached 30.8.
 
     Parameters
     ----------
     iterations : int
-        Evaluations of the loss (Chakravarthula et al. 2020, Eq. 12) and its gradient.
+        Of a round: evaluations of the expected squared error and of its gradient.
     step : float
-        Adam's first step [rad], cosine-decayed to zero.
+        Adam's first step of a round [rad].
     start_iterations : int
         Of Wirtinger holography.
+    tolerance : float
+        A descent has converged when a round has lowered the squared error of no colour by as much [dB].
+    rounds : int
+        At most so many.
     """
 
-    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
-    step: Annotated[float, Interval(gt=0, le=10)] = 0.12
+    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 40
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.06
     start_iterations: Annotated[int, Interval(ge=1, le=100_000)] = 5
+    tolerance: Annotated[float, Interval(gt=0, le=10)] = 0.1
+    rounds: Annotated[int, Interval(ge=1, le=1000)] = 10
 
-    version: ClassVar[int] = 2
+    version: ClassVar[int] = 3
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = True
+    follows: ClassVar[bool] = True
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases of least loss in what the bench itself would capture without noise.
+        """Phases of the best expected score.
 
         Parameters
         ----------
         target : Tensor
             Linear intensity ``(B, C, h, w)`` in [0, 1].
         bench : MeteredDisplay
-            A simulated display that is open to this method.
+            A simulated display that is open to this method; its ``starts`` belong to all images of the batch.
 
         Returns
         -------
@@ -62,14 +78,52 @@ class Oracle:
         CellError
             Without a simulated bench.
         """
-        start = Wirtinger(iterations=self.start_iterations).solve(target, bench)
-        return torch.stack([self._refine(image, phase, bench) for image, phase in zip(target, start, strict=True)])
+        own = Wirtinger(iterations=self.start_iterations).solve(target, bench)
+        others = [phase.to(target) for phase in bench.starts]
+        pairs = zip(target, own, strict=True)
+        return torch.stack([self._best(bench.simulation, image, start, others) for image, start in pairs])
 
-    def _refine(self, target: Tensor, start: Tensor, bench: MeteredDisplay) -> Tensor:
-        """One image: target ``(C, h, w)``, start ``(C, H, W)``; the colours do not interact."""
-        simulation = bench.simulation
+    def _best(self, bench: Simulation, target: Tensor, own: Tensor, others: Sequence[Tensor]) -> Tensor:
+        """One image: target ``(C, h, w)``, phases ``(C, H, W)``; the colours do not interact."""
+        best = Best(own)
+        for phase in others:
+            best.update(expected_error(phase, bench, target), phase)
+        for start in (own, best.phase.clone()) if others else (own,):
+            phase = self._descend(start, bench, target)
+            best.update(expected_error(phase, bench, target), phase)
+        return best.phase
 
-        def loss(phase: Tensor) -> Tensor:
-            return intensity_l2(simulation.image(phase), target)
+    def _descend(self, phase: Tensor, bench: Simulation, target: Tensor) -> Tensor:
+        """Rounds at the mean phase gain alone, for half the time, until the error falls no further."""
+        error = partial(squared_error, bench=bench, target=target)
+        before = error(phase).detach()
+        for _ in range(self.rounds):
+            phase = adam(phase, by_autograd(error), self.iterations, self.step, decay=True)
+            after = error(phase).detach()
+            if bool((after > before * 10 ** (-self.tolerance / 10)).all()):
+                break
+            before = after
+        return phase
 
-        return adam(start, by_autograd(loss), self.iterations, self.step, decay=True)
+
+@torch.no_grad()
+def expected_error(phase: Tensor, bench: Simulation, target: Tensor) -> Tensor:
+    """`squared_error` as flicker has it in the mean."""
+    return torch.stack([squared_error(phase, bench, target, gain) for gain in bench.gains]).mean(0)
+
+
+def squared_error(phase: Tensor, bench: Simulation, target: Tensor, gain: float = 1.0) -> Tensor:
+    """Expected mean squared error ``(C,)`` of the scored capture of a phase ``(C, H, W)`` [rad], differentiable.
+
+    A capture is matched by least squares and clipped (``metrics.match``). With the mean I of a pixel and its variance
+    v, the factor is s = sum(I T) / sum(I^2 + v); noise adds s^2 v where the clipped picture follows it, which for a
+    pixel m = s I from 0 or 1 is the share of a normal distribution that lies between.
+    """
+    mean, variance = bench.expected(phase, target, gain)
+    power = (mean.square() + variance).sum((-2, -1)).clamp_min(TINY)
+    scale = ((mean * target).sum((-2, -1)).clamp_min(0) / power)[:, None, None]
+    matched, noise = scale * mean, scale.square() * variance
+    with torch.no_grad():
+        width = (2 * noise).sqrt().clamp_min(math.sqrt(TINY))
+        share = (torch.erf(matched / width) + torch.erf((1 - matched) / width)) / 2
+    return ((matched.clamp(0, 1) - target).square() + share * noise).mean((-2, -1))

@@ -225,6 +225,33 @@ class Simulation(Protocol):
         """Intensity ``(C, h, w)`` for a phase ``(C, H, W)`` [rad], differentiable; incident light is 1."""
         ...
 
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """Phase gains of a frame, equal in weight, whose mean stands for that over flicker."""
+        ...
+
+    def expected(self, phase: Tensor, target: Tensor, gain: float = 1.0) -> tuple[Tensor, Tensor]:
+        """Mean and variance of what is scored, over the noise of the camera; differentiable in the phase.
+
+        Unlike ``image``, it has all that a capture goes through: the sensor's pixels, their response and noise, and the
+        interpolation that rectifies it.
+
+        Parameters
+        ----------
+        phase
+            ``(C, H, W)`` [rad].
+        target
+            ``(C, h, w)`` linear light in [0, 1], which the capture is exposed for.
+        gain
+            Of the phase in this frame.
+
+        Returns
+        -------
+        mean, variance
+            Each ``(C, h, w)``, in the unit of ``RectifiedCapture.image`` and in its square.
+        """
+        ...
+
 
 class Display(Protocol):
     """Anything that shows a phase and gives back a capture: a simulated bench, a real one, a trained network."""

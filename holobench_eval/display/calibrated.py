@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,6 +25,7 @@ from .api import (
     white_irradiance,
 )
 from .metered import MethodHandles
+from .resampling import Resampling
 from .simulated.pipeline import BenchSession, SimulatedBench
 from .simulated.stages.relay import sample, sampling_grid
 
@@ -38,16 +40,38 @@ class RegisteredSimulation:
         The bench.
     grids
         Per channel, where each pixel of the region lies on the panel's image, as ``sample`` takes it.
+    resamplings
+        Per channel, how frames of the sensor are rectified.
+    response
+        Of the sensor's pixels, on the device of the bench.
     """
 
     bench: SimulatedBench
     grids: tuple[Tensor, ...]
+    resamplings: tuple[Resampling, ...]
+    response: Tensor
 
     def image(self, phase: Tensor) -> Tensor:
         """Intensity ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; incident light is 1."""
         samples = self.bench.image_samples
         images = [self.bench.integrated(phase[channel], channel) for channel in range(phase.shape[0])]
         return torch.stack([sample(image, grid, samples) for image, grid in zip(images, self.grids, strict=False)])
+
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """See ``Simulation``: the two points of Gauss-Hermite quadrature over flicker, or 1 without it."""
+        rms = self.bench.profile.flicker.rms
+        return (1 - rms, 1 + rms) if rms else (1.0,)
+
+    def expected(self, phase: Tensor, target: Tensor, gain: float = 1.0) -> tuple[Tensor, Tensor]:
+        """See ``Simulation``; the capture is exposed for the target alone."""
+        bench, white, seen = self.bench, white_irradiance(target, self.bench.spec), []
+        for channel, resampling in enumerate(self.resamplings[: len(phase)]):
+            light = sample(bench.integrated(phase[channel], channel, gain), bench.fine_grid, 1) / white[channel]
+            mean, variance = bench.profile.sensor.expected(light, self.response)
+            seen.append((resampling(mean), resampling.noise_gain * resampling(variance)))
+        means, variances = zip(*seen, strict=True)
+        return torch.stack(means), torch.stack(variances)
 
 
 @dataclass(frozen=True)
@@ -89,12 +113,14 @@ class CalibratedBench(MethodHandles):
     def simulation(self) -> RegisteredSimulation:
         """The bench as the registered camera sees it, without noise."""
         points = self.bench.points.numpy()
-        grids = []
+        grids, resamplings = [], []
         for warp in self.registration.warps:
             x, y = warp.coordinates()
             seen = cv2.remap(points, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
             grids.append(sampling_grid(torch.from_numpy(seen), self.spec.shape).to(self.bench.device))
-        return RegisteredSimulation(self.bench, tuple(grids))
+            resamplings.append(Resampling(*(torch.from_numpy(at).to(self.bench.device) for at in (x, y))))
+        response = self.bench.response.to(self.bench.device)
+        return RegisteredSimulation(self.bench, tuple(grids), tuple(resamplings), response)
 
     def _mean_capture(self, target: Tensor) -> Tensor:
         """Mean capture ``(C, Hs, Ws)`` of the holograms of the grid."""

@@ -35,6 +35,8 @@ class MeteredDisplay:
         Captures that may be taken, None for no limit.
     learned
         What the method's ``prepare`` returned, None for a method that was not trained.
+    starts
+        Phases ``(C, H, W)`` [rad] of other methods for this target, for a privileged method to start from.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class MeteredDisplay:
         method: object = None,
         budget: int | None = None,
         learned: Mapping[str, Any] | None = None,
+        starts: Sequence[Tensor] = (),
     ) -> None:
         self._display = display
         self._label = label
@@ -55,6 +58,7 @@ class MeteredDisplay:
         self._privileged = bool(getattr(method, "privileged", False))
         self._budget = budget
         self._learned = learned
+        self._starts = tuple(starts)
         self._captures = 0
         self._kept: Tensor | None = None
         self._over = ""
@@ -107,6 +111,13 @@ class MeteredDisplay:
         if not self._privileged:
             raise CellError(f"{self._label}: only a method that declares privileged = True may see the simulated bench")
         return self._display.simulation
+
+    @property
+    def starts(self) -> tuple[Tensor, ...]:
+        """Phases ``(C, H, W)`` [rad] of other methods for this target, for privileged methods that follow them alone."""
+        if not self._privileged:
+            raise CellError(f"{self._label}: only a method that declares privileged = True may see other holograms")
+        return self._starts
 
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on study seed, target, repeat and ``names``."""
@@ -192,6 +203,7 @@ class MethodHandles:
         repeat: int,
         budget: int | None = None,
         learned: Mapping[str, Any] | None = None,
+        starts: Sequence[Tensor] = (),
     ) -> MeteredDisplay:
         """The handle that a method gets to solve a target.
 
@@ -209,5 +221,7 @@ class MethodHandles:
             Captures that may be taken, None for no limit.
         learned
             What the method's ``prepare`` returned.
+        starts
+            See ``MeteredDisplay``.
         """
-        return MeteredDisplay(self, label, target, (self.seed, item, repeat), method, budget, learned)
+        return MeteredDisplay(self, label, target, (self.seed, item, repeat), method, budget, learned, starts)

@@ -180,6 +180,7 @@ def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
             ],
             "noise": [cell.seed, cell.repeat],
             "learned": [cell.measure, *cell.prepared],
+            **({"starts": list(cell.starts)} if cell.starts else {}),
             "measure": cell.measure,
             "machine": [cpu_model(), platform.machine(), threads, workers, *([gpu] if gpu else [])],
             "versions": [_torch(), __version__, HARNESS],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -43,7 +43,8 @@ class Cell:
     prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the
     most that the display allows while the target is solved (None: no limit); change: kind and value of what has changed
     on the display since methods were prepared for it (empty: nothing); session: name of the series of photographs that
-    stands for the display (empty: none does).
+    stands for the display (empty: none does); starts: ids of the cells of other methods whose phases the method starts
+    from (empty: it follows nobody).
     """
 
     method: str
@@ -70,16 +71,17 @@ class Cell:
     captures: int | None = None
     change: Mapping[str, Any] = field(default_factory=dict)
     session: str = ""
+    starts: tuple[str, ...] = ()
 
     def description(self) -> dict[str, Any]:
-        """The cell as plain JSON values, without ``captures`` if there is no limit, and without an empty ``change`` or
-        ``session``."""
+        """The cell as plain JSON values, without ``captures`` if there is no limit, and without an empty ``change``,
+        ``session`` or ``starts``."""
         plain: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
-        plain |= {name: list(plain[name]) for name in ("panel", "metrics", "prepared")}
+        plain |= {name: list(plain[name]) for name in ("panel", "metrics", "prepared", "starts")}
         plain |= {name: dict(plain[name]) for name in ("params", "dataset_params", "holograms", "change")}
         if self.captures is None:
             del plain["captures"]
-        for name in ("change", "session"):
+        for name in ("change", "session", "starts"):
             if not plain[name]:
                 del plain[name]
         return plain
@@ -95,13 +97,15 @@ class Task:
     """Cells that share a solution: a method solves a target once, and the phase is shown on each of the displays.
 
     conditions: the display of each cell; the method solves on the first. A floor task has no
-    solution and one display, which gives the size of the scored region. preparation: what the method learns first.
+    solution and one display, which gives the size of the scored region. preparation: what the method learns first;
+    is_start: whether another task starts from its phase, which is then kept.
     """
 
     label: str
     cells: tuple[Cell, ...]
     conditions: tuple[Condition, ...]
     preparation: Preparation | None = None
+    is_start: bool = False
 
     @property
     def is_floor(self) -> bool:
@@ -170,7 +174,7 @@ def plan(study: Study) -> Plan:
             display for source in entry.profiles for display in changed(study, source, displays_by_source[source])
         ]
         tasks += ground.solutions(entry, entry_displays, targets)
-    grid = Plan(tuple(tasks))
+    grid = Plan(tuple(following(tasks, study.folder)))
     check_unseen(grid.preparations(), targets)
     return grid
 
@@ -320,6 +324,43 @@ def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[tuple[Cond
             display
         )
     return [tuple(group) for group in groups.values()]
+
+
+def following(tasks: Sequence[Task], folder: Path) -> Iterator[Task]:
+    """The same tasks, with the ``starts`` of methods that follow others (``follows = True``): the cells of all others
+    for the same target on the same display in the same repeat, sorted, so that their order in the config is no matter.
+
+    folder: of the config.
+    """
+
+    def follows(task: Task) -> bool:
+        return not task.is_floor and bool(
+            getattr(plugins.find("methods", task.cells[0].method, folder), "follows", False)
+        )
+
+    followers = [follows(task) for task in tasks]
+    if not any(followers):
+        yield from tasks
+        return
+    others: dict[tuple[str, str, int], list[str]] = {}
+    for task, late in zip(tasks, followers, strict=True):
+        for cell in () if late or task.is_floor else task.cells:
+            others.setdefault((cell.target, cell.condition, cell.repeat), []).append(cell.id)
+
+    def starts(cell: Cell) -> tuple[str, ...]:
+        return tuple(sorted(others.get((cell.target, cell.condition, cell.repeat), ())))
+
+    late_tasks = {
+        index: replace(task, cells=tuple(replace(cell, starts=starts(cell)) for cell in task.cells))
+        for index, (task, late) in enumerate(zip(tasks, followers, strict=True))
+        if late
+    }
+    wanted = {identity for task in late_tasks.values() for cell in task.cells for identity in cell.starts}
+    for index, task in enumerate(tasks):
+        if index in late_tasks:
+            yield late_tasks[index]
+        else:
+            yield replace(task, is_start=not wanted.isdisjoint(cell.id for cell in task.cells))
 
 
 def check_unseen(preparations: Mapping[str, Preparation], targets: list[tuple[str, str]]) -> None:

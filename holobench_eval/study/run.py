@@ -24,6 +24,7 @@ from .executors.clusters import Address
 from .executors.local import Local
 from .executors.remaining import Remaining
 from .plan import Cell, Plan, Task
+from .scoring import starts
 from .scoring.cell import work
 from .scoring.job import Job, Setting
 from .store import Record, Store
@@ -139,6 +140,7 @@ def run(
             forget(plan, store, Artifacts(artifacts))
         timed = cost.timed(study, plan)
         missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed, timed))
+        missing = starts.affected(plan, missing, store)
         if missing:
             refuse_unscored(study)
         refuse_unavailable(plan, missing, study.folder)
@@ -181,7 +183,7 @@ def _compute(
     untrained = _untrained(plan, missing, setting)
     if untrained:
         watch.training([(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained])
-    unlearned = {preparation.id for preparation in untrained}
+    unready = {preparation.id for preparation in untrained} | missing
     trainings = [
         TrainingJob(preparation, setting.artifacts, setting.threads, setting.device) for preparation in untrained
     ]
@@ -192,17 +194,18 @@ def _compute(
     known = _known(jobs) if isinstance(executor, Serial | Local) else {}  # else other machines compute
     remaining = Remaining(((job.task.label, job.alone) for job in jobs), known, executor.workers)
     watch.expects(remaining.seconds)
-    steps = queue(trainings, jobs, unlearned, at_work, expected, drawings)
+    steps = queue(trainings, jobs, unready, at_work, expected, drawings)
     watched = _watched(steps, at_work, remaining, watch)
     results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, watched)
     for job, result in results:
         taken = time.monotonic() - at_work.pop(id(job))
         if isinstance(job, TrainingJob):
             reason = result if isinstance(result, str) else artifacts.fail(job.preparation, _error(result))
-            unlearned.discard(job.preparation.id)
+            unready.discard(job.preparation.id)
             watch.trained(job.preparation.name, reason)
         elif isinstance(job, Job):
             remaining.ends(id(job))
+            unready -= job.wanted
             records = result if isinstance(result, list) else _lost(job, _error(result), store)
             _refuse_unseen(records, store)
             if not single:  # of several workers none should begin its longest job at the end
@@ -299,29 +302,31 @@ def step(job: Step) -> Result:
 def queue(
     trainings: Iterable[TrainingJob],
     jobs: Iterable[Job],
-    unlearned: set[str],
+    unready: set[str],
     at_work: Collection[object],
     expected: Mapping[str, float],
     drawings: Iterable[Drawing] = (),
 ) -> Iterator[Step | None]:
     """Trainings first, since they take longest; then drawings and jobs, the longest first, a job as soon as it needs
-    nothing of ``unlearned``; at the end, each by itself, the jobs that run alone.
+    nothing of ``unready``; at the end, each by itself, the jobs that run alone, those that start from others last.
 
-    unlearned: ids of the preparations still to be trained; at_work: the steps that an executor took; expected: seconds
+    unready: ids of the preparations still to be trained and of the cells still to be computed; at_work: the steps that an executor took; expected: seconds
     that a job takes by its label; a job of another label may take longer than all others. The caller changes all three
     as results come. None: all remaining jobs wait for a step that is at work.
     """
     yield from trainings
     alone, groups = list[Job](), dict[tuple[str, frozenset[str]], deque[Step]]()
-    for job in jobs:
-        if job.alone:
+    late = set[str]()  # cells of jobs that run alone
+    for job in sorted(jobs, key=_follows):
+        if job.alone or not late.isdisjoint(_needs(job)):
             alone.append(job)
+            late |= job.wanted
         else:
             groups.setdefault((job.task.label, _needs(job)), deque()).append(job)
     if drawings:
         groups[DRAWING, frozenset()] = deque(drawings)
     while groups:
-        ready = [group for group in groups if unlearned.isdisjoint(group[1])]
+        ready = [group for group in groups if unready.isdisjoint(group[1])]
         if not ready:
             yield None
             continue
@@ -336,7 +341,11 @@ def queue(
 
 
 def _needs(job: Job) -> frozenset[str]:
-    return frozenset(identity for cell, _ in job.cells for identity in cell.prepared)
+    return frozenset(identity for cell, _ in job.cells for identity in (*cell.prepared, *cell.starts))
+
+
+def _follows(job: Job) -> bool:
+    return any(cell.starts for cell, _ in job.cells)
 
 
 def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> None:

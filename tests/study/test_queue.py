@@ -12,6 +12,7 @@ from holobench_eval.study.run import DRAWING, DRAWING_SECONDS, queue
 @dataclass(frozen=True)
 class FakeCell:
     prepared: tuple[str, ...]
+    starts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,11 @@ class FakeJob:
     name: str
     needs: tuple[str, ...] = ()
     alone: bool = False
+    starts: tuple[str, ...] = ()
+
+    @property
+    def wanted(self) -> frozenset[str]:
+        return frozenset({self.name})
 
     @property
     def task(self) -> SimpleNamespace:
@@ -26,7 +32,7 @@ class FakeJob:
 
     @property
     def cells(self) -> list[tuple[FakeCell, None]]:
-        return [(FakeCell(self.needs), None)]
+        return [(FakeCell(self.needs, self.starts), None)]
 
 
 JOBS: Any = [FakeJob("a", ("one",)), FakeJob("b"), FakeJob("c", ("two",)), FakeJob("d", ("one", "two"))]
@@ -88,3 +94,19 @@ def test_a_drawing_comes_before_the_jobs_that_are_shorter() -> None:
     drawing: Any = "drawing"
     steps = queue([], jobs, set(), [], {"long": 5.0, "short": 1.0, DRAWING: DRAWING_SECONDS}, [drawing])
     assert list(steps) == [jobs[0], drawing, jobs[1]]
+
+
+def test_a_job_that_starts_from_others_waits_for_them() -> None:
+    jobs: Any = [FakeJob("oracle", starts=("a", "b")), FakeJob("a"), FakeJob("b")]
+    unready = {"a", "b", "oracle"}
+    steps = queue([], jobs, unready, [], {})
+    assert [next(steps) for _ in range(3)] == [jobs[1], jobs[2], None]
+    unready -= {"a"}
+    assert next(steps) is None
+    unready -= {"b"}
+    assert list(steps) == [jobs[0]]
+
+
+def test_a_job_that_starts_from_one_that_runs_alone_comes_after_it() -> None:
+    jobs: Any = [FakeJob("oracle", starts=("a",)), FakeJob("a", alone=True), FakeJob("b")]
+    assert list(queue([], jobs, {"a", "oracle"}, [], {})) == [jobs[2], jobs[1], jobs[0]]

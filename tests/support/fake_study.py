@@ -128,8 +128,9 @@ class FakeBench:
         repeat: int,
         budget: int | None = None,
         learned: Any = None,
+        starts: Any = (),
     ) -> MeteredDisplay:
-        return MeteredDisplay(cast(CalibratedBench, self), label, target, (item, repeat), method, budget, learned)
+        return MeteredDisplay(cast(CalibratedBench, self), label, target, (item, repeat), method, budget, learned, starts)
 
     def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
         shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000

@@ -20,6 +20,7 @@ from ..artifacts import Artifact
 from ..displays import Condition
 from ..plan import Cell
 from ..store import Record
+from . import starts
 from .job import Job, Measured
 from .pictures import write_capture, write_phase, write_thumbnail
 from .solution import Solution, kept, solution
@@ -61,6 +62,8 @@ def captured(
     )
     refuse_saturated(capture)
     keep_pictures(job, cell, capture.image, target, solved.phase)
+    if job.task.is_start:
+        starts.keep(job.store, cell.id, solved.phase)
     scores = scored(job, cell, capture.image, target) | _second_scores(bench, capture, target)
     return Record(
         cell=cell.description(),

@@ -18,6 +18,7 @@ from .. import cost
 from ..artifacts import Artifact, read_tensors
 from ..cost import Cost
 from ..displays import Condition
+from . import starts
 from .job import Job
 
 FOLDER = "solutions"
@@ -54,6 +55,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         repeat=first.repeat,
         budget=first.captures,
         learned=moved(learned.state, job.device) if learned else None,
+        starts=starts.of(job.store, first),
     )
     watch = cost.start(job.device)
     phase, stopped = _within_budget(method, solve, handle)

@@ -115,6 +115,18 @@ class Sensor(Stage):
         count_rows(*planes, electrons, ambient, numbers, counted.numpy())
         return counted
 
+    def expected(self, light: Tensor, response: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and variance of what ``expose`` gives above the dark level, differentiable; the unit is that of ``light``
+        ``(Hs, Ws)``: a white pixel, which fills the well to 1 / headroom."""
+        white = self.full_well / self.headroom  # electrons
+        charge = response * white * (light + self.ambient)
+        bent = charge - self.nonlinearity / self.full_well * charge.square() if self.noise else charge
+        mean = bent.clamp(max=self.full_well) / white
+        if not self.noise:
+            return mean, torch.zeros_like(mean)
+        rounding = 1 / (12 * self.counts_per_electron**2)
+        return mean, (charge.clamp_min(0) + self.read_noise**2 + rounding) / white**2
+
 
 def box_filter(image: Tensor, width: float) -> Tensor:
     """Mean over a square of ``width`` samples around each sample of ``(..., H, W)``; the sensor's pixel area."""

@@ -1,0 +1,65 @@
+"""Phases of finished cells, kept for the methods that start from them, and what has to be computed again with them."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ...core.errors import CellError
+from ...core.io import write_atomically
+from ..plan import Cell, Plan
+from ..store import Store
+
+FOLDER = "starts"
+LEVELS = 2**16  # to a turn: steps of 0.1 mrad, a 256th of the finest that a panel of 8 bits shows
+
+
+def path(store: Store, identity: str) -> Path:
+    """The file with the phase of a cell."""
+    return store.output / FOLDER / f"{identity}.npy"
+
+
+def keep(store: Store, identity: str, phase: Tensor) -> None:
+    """Write the phase ``(C, H, W)`` [rad] of a cell, before its record."""
+    buffer = io.BytesIO()
+    levels = (phase.double() / math.tau * LEVELS).round().remainder(LEVELS)
+    np.save(buffer, levels.numpy().astype(np.uint16))
+    write_atomically(path(store, identity), buffer.getvalue())
+
+
+def of(store: Store, cell: Cell) -> list[Tensor]:
+    """The phases ``(C, H, W)`` [rad] that a cell starts from, those of its ``starts`` that have a score.
+
+    CellError for a phase that is not there.
+    """
+    done = (identity for identity in cell.starts if (record := store.read(identity)) and record.state == "done")
+    return [_read(path(store, identity)) for identity in done]
+
+
+def _read(file: Path) -> Tensor:
+    try:
+        levels = np.load(file)
+    except (OSError, ValueError) as error:
+        raise CellError(f"the phase in {file} cannot be read ({error}); delete the file and run again") from error
+    return torch.from_numpy(levels.astype(np.float32) * np.float32(math.tau / LEVELS))
+
+
+def affected(plan: Plan, missing: frozenset[str], store: Store) -> frozenset[str]:
+    """The cells to compute, by id, where those of ``missing`` have to be.
+
+    A cell that starts from a missing one is computed again, since that one may have failed before; its record is removed
+    at once, so that a run that is killed does not take it for new. A start whose phase was not kept is computed again.
+    """
+    followers = [cell for cell in plan.cells if cell.starts]
+    late = {cell.id for cell in followers if not missing.isdisjoint((cell.id, *cell.starts))}
+    for identity in late:
+        store.path(identity).unlink(missing_ok=True)
+    states = store.states(plan.cells) if late else {}
+    wanted = {identity for cell in followers if cell.id in late for identity in cell.starts}
+    unkept = {identity for identity in wanted if states[identity] == "done" and not path(store, identity).exists()}
+    return missing | late | unkept
