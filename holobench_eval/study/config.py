@@ -65,9 +65,9 @@ def load_study(path: Path | str) -> Study:
         near = suggest(str(study.reported.beside), study.display.sources)
         message = f"'{study.reported.beside}' is not in display.profiles; {near}"
         raise document.error(("reported", "beside"), message)
-    if study.baseline and study.baseline not in study.labels:
-        message = f"no method has the label '{study.baseline}'; {suggest(study.baseline, study.labels)}"
-        raise document.error(("baseline",), message)
+    for key, label in (("baseline", study.baseline), ("second_baseline", study.second_baseline)):
+        if label and label not in study.labels:
+            raise document.error((key,), f"no method has the label '{label}'; {suggest(label, study.labels)}")
     return replace(study, baseline=study.baseline or study.labels[0])
 
 
@@ -209,10 +209,15 @@ def _check_twins(study: Study, document: Document) -> None:
     """Refuse two labels for the same cell: a measurement would be printed twice."""
     for index, entry in enumerate(study.methods):
         for other in study.methods[:index]:
-            same = (entry.name, entry.params, entry.captures) == (other.name, other.params, other.captures)
+            same = _measured(study, entry) == _measured(study, other)
             if same and set(entry.profiles) & set(other.profiles):
                 message = f"methods[{index}] has the method, parameters and display of '{other.label}'; remove one"
                 raise document.error(("methods", index), message)
+
+
+def _measured(study: Study, entry: MethodEntry) -> tuple[object, ...]:
+    """What sets the cells of an entry apart from those of others on the same display."""
+    return entry.name, entry.params, entry.captures, entry.exposure or study.display.exposure
 
 
 def sweep_of(study: Study, document: Document, index: int) -> Sweep:
@@ -223,7 +228,8 @@ def sweep_of(study: Study, document: Document, index: int) -> Sweep:
     if sweep.condition not in KINDS:
         near = suggest(sweep.condition, KINDS)
         raise document.error((*where, "condition"), f"unknown condition '{sweep.condition}'; {near}")
-    if sweep.condition == "laser_power" and study.display.exposure == "matched":
+    exposures = {entry.exposure or study.display.exposure for entry in study.methods}
+    if sweep.condition == "laser_power" and "matched" in exposures:
         raise document.error(where, "exposure: matched undoes laser_power; leave one of the two out")
     countable = KINDS[sweep.condition].counted
     if bool(sweep.values) == (sweep.count is not None) or (sweep.count is not None and not countable):

@@ -12,6 +12,7 @@ from annotated_types import Interval, MinLen
 
 from ..core import plugins
 from ..core.errors import UserError
+from ..display.api import Exposure
 
 LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
@@ -41,7 +42,7 @@ class DisplayGrid:
     learned: Learned | None = None
     bench: Text | None = None
     panel: tuple[PanelSide, PanelSide] | None = None
-    exposure: Literal["equal", "matched"] = "equal"
+    exposure: Exposure = "equal"
     session: Path | None = field(default=None, metadata={"key": False})
 
     @property
@@ -105,7 +106,8 @@ class MethodEntry:
 
     name: registered name or ``path/to/file.py:Class``; label: its name in tables; params: every parameter of
     the method, defaults filled in; profiles: the displays it is shown on, a subset of the study's; captures: the most
-    that the display allows a method with a camera for one target (None: no limit).
+    that the display allows a method with a camera for one target (None: no limit); exposure: of its scored captures
+    (None: that of the study's displays).
     """
 
     name: Text
@@ -113,6 +115,7 @@ class MethodEntry:
     params: Mapping[str, Any] = field(default_factory=dict)
     profiles: tuple[str, ...] = ()
     captures: Annotated[int, Interval(ge=1)] | None = None
+    exposure: Exposure | None = None
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,8 @@ class Study:
     repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
     whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
     changes of the displays at test time; baseline: label that paired tests compare against (the first method when the
-    config names none); headline: the column the report leads with.
+    config names none); second_baseline: label of another one, such as the strongest open-loop row, that differences
+    are also given to; headline: the column the report leads with.
     file, text: the config file as the user named it, and what is in it.
     """
 
@@ -173,6 +177,7 @@ class Study:
     timing: Literal["shared", "alone"] = "shared"
     protocol: Protocol = Protocol()
     baseline: str = ""
+    second_baseline: str = ""
     headline: Text = "psnr_linear"
     save: Save = Save()
     reported: Reported | None = None

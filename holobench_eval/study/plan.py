@@ -11,6 +11,7 @@ from typing import Any, Literal
 from ..core import plugins
 from ..core.errors import UserError
 from ..core.hashing import digest
+from ..display.api import Exposure
 from ..metrics import catalogue
 from .definition import MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
@@ -64,7 +65,7 @@ class Cell:
     protocol: str
     harness_sha256: str
     metrics: tuple[str, ...]
-    exposure: Literal["equal", "matched"]
+    exposure: Exposure
     measure: Literal["picture", "prediction", "focus"] = "picture"
     holograms: Mapping[str, Any] = field(default_factory=dict)
     prepared: tuple[str, ...] = ()
@@ -205,8 +206,10 @@ class _Ground:
         maker: Maker,
         prepared: tuple[str, ...] = (),
         captures: int | None = None,
+        exposure: Exposure | None = None,
     ) -> Cell:
-        """A cell; ``target``: name and digest; ``maker``: the method that makes the picture."""
+        """A cell; ``target``: name and digest; ``maker``: the method that makes the picture; exposure: None for the
+        study's."""
         study = self.study
         method, version, params = maker
         holograms = study.holograms
@@ -229,7 +232,7 @@ class _Ground:
             protocol=study.protocol.version,
             harness_sha256=HARNESS,
             metrics=self.metrics,
-            exposure=study.display.exposure,
+            exposure=exposure or study.display.exposure,
             measure=study.measure,
             holograms=probe if study.measure == "prediction" else {},
             prepared=prepared,
@@ -255,6 +258,7 @@ class _Ground:
                         maker,
                         _ids(own, display.learned),
                         entry.captures,
+                        entry.exposure,
                     )
                     for target, display in showing
                 )

@@ -63,8 +63,8 @@ def export(
         raise UserError(f"{folder}: not empty; give a new folder, or go on there with holoeval session import {folder}")
     study = load_study(config)
     chosen = _on_one_display(study, bench, display)
-    if fixed_exposure and chosen.display.exposure == "matched":
-        raise UserError(f"{config}: display.exposure: matched sets exposures one by one; not with --fixed-exposure")
+    if fixed_exposure and "matched" in {chosen.display.exposure, *(entry.exposure for entry in chosen.methods)}:
+        raise UserError(f"{config}: exposure: matched sets exposures one by one; not with --fixed-exposure")
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / STUDY, chosen.text.encode())
     named = study.display.bench

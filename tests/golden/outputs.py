@@ -225,7 +225,8 @@ def _trained(method: Any, spec: DisplaySpec) -> dict[str, Tensor]:
     (target,) = pictures(spec, first=20)
     handle = solving_bench(method, target, spec, learned)
     phase = method.solve(target[None], handle)
-    return {**found, **_of_phase(phase), "prediction": method.predict(phase, handle)}
+    predicted = {"prediction": method.predict(phase, handle)} if hasattr(method, "predict") else {}
+    return {**found, **_of_phase(phase), **predicted}
 
 
 def _leaves(path: str, value: Any) -> Iterator[tuple[str, Tensor]]:

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core import seeds
-from holobench_eval.display.api import DisplaySpec, Region
+from holobench_eval.display.api import DisplaySpec, Region, white_irradiance
 
 
 @pytest.fixture(autouse=True, scope="package")
@@ -32,6 +32,14 @@ class BentSimulation:
         ]
         return self.spec.region.crop(torch.stack(fields).abs().square())
 
+    @property
+    def gains(self) -> tuple[float, ...]:
+        return (1.0,)
+
+    def expected(self, phase: Tensor, target: Tensor, gain: float = 1.0) -> tuple[Tensor, Tensor]:
+        mean = self.image(gain * phase) / white_irradiance(target, self.spec)[:, None, None]
+        return mean, torch.zeros_like(mean)
+
 
 @dataclass
 class FakeBench:
@@ -39,6 +47,7 @@ class FakeBench:
 
     spec: DisplaySpec
     cell: str = "cell"
+    starts: tuple[Tensor, ...] = ()
 
     def generator(self, *names: object) -> torch.Generator:
         return seeds.generator(self.cell, *names)

@@ -77,6 +77,17 @@ class Toy:
 @dataclass(frozen=True)
 class Seeing(Toy):
     camera: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class Following(Toy):
+    """Its own phase, or that of another method with the largest mean; the fake display likes it best."""
+
+    privileged: ClassVar[bool] = True
+    follows: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        return max(super().solve(target, bench), *(start[None] for start in bench.starts), key=lambda phase: phase.mean())
 '''
 
 CONFIG = """\

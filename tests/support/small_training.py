@@ -30,6 +30,7 @@ QUICK: dict[str, dict[str, Any]] = {
     **{key: {"iterations": 6} for key in ("gerchberg_saxton", "hio")},
     **dict.fromkeys(("wirtinger", "sgd", "multi_plane"), _EARLY),
     "odak_sgd": {"iterations": 1},
+    "wirtinger_gamma": {"images": 1, "of": _EARLY},
     "torchoptics_adam": {"iterations": 6},
     "oracle": {"iterations": 4, "start_iterations": 40},
     "online_camera": {"captures": 24, "start": _START},

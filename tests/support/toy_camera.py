@@ -54,6 +54,16 @@ class ToyDisplay:
         ]
         return self.spec.region.crop(torch.stack(fields)).abs().square()
 
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """No flicker."""
+        return (1.0,)
+
+    def expected(self, phase: Tensor, target: Tensor, gain: float = 1.0) -> tuple[Tensor, Tensor]:
+        """See ``Simulation``; the noise is beside a white pixel's light."""
+        mean = self.image(gain * phase) / white_irradiance(target, self.spec)[:, None, None]
+        return mean, torch.full_like(mean, self.noise**2)
+
     def session(self, names: tuple[object, ...], target: Tensor) -> ToyDisplay:
         return replace(self, names=names, noise=self.noise * white_irradiance(target, self.spec)[:, None, None])
 

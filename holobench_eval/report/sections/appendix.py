@@ -7,7 +7,7 @@ from typing import Any
 
 from ..data.results import Results
 from ..data.statistics import RESAMPLES
-from ..data.text import FILES
+from ..data.text import FILES, words
 from ..markdown import Markdown, bullets, code, code_block, heading, properties
 from ..section import Blocks, Figures, Report, Section
 from .alignment import agreement
@@ -97,8 +97,10 @@ def _exposure(results: Results) -> str:
     if results.layout.measure == FILES:
         return "Unknown. The intensity match removes its effect on brightness, not its effect on noise."
     known = EXPOSURES if results.layout.measure != "prediction" else EXPOSURES_PREDICTED
-    policies = sorted(set(results.frame["exposure"]) - {""})
-    return " ".join(known.get(policy, policy) for policy in policies) or "Not recorded."
+    rows = results.frame.groupby("exposure")["method"].unique()
+    policies = sorted(set(rows.index) - {""})
+    named = "" if len(policies) < 2 else f" This is the exposure of {words(sorted(rows.get('matched', ())))}."
+    return " ".join(known.get(policy, policy) for policy in policies) + named or "Not recorded."
 
 
 def _saturation(results: Results) -> str:

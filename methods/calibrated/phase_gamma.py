@@ -1,0 +1,158 @@
+"""A gamma on the phase of open-loop holograms, found with captures of the display.
+
+Chakravarthula et al. 2020, Section 7: "holograms for other methods needed an extra gamma correction to the phase
+patterns, before displaying on the hardware, for improved performance on our aged SLM with inaccurate look-up-tables,
+aiming for best hand-tuned display outputs". The search below stands in the place of the hand.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+from torch.nn import functional
+
+from ...display.metered import MeteredDisplay
+from ...display.training import TrainingBench
+from ...optics.phase import TAU, wrap
+from ..common import matched
+from ..double_phase import DoublePhase
+from ..wirtinger import Wirtinger
+
+COARSE = tuple(2 ** (step / 4) for step in range(-4, 5))  # 0.5 to 2, and 1 among them
+FINE = tuple(2 ** (step / 12) for step in (-2, -1, 1, 2))  # times the best: steps of 6 %
+
+
+@dataclass(frozen=True)
+class PhaseGamma(ABC):
+    """An open-loop method whose phase, wrapped to [0, 2 pi), is shown as 2 pi (phase / 2 pi)^gamma.
+
+    There is one gamma for all colours of a display, as the paper says of no more. It is the one whose captures of
+    training images, of all `COARSE` and then of all `FINE` around the best of them, have the least squared error: with
+    the default, 39 captures.
+
+    Parameters
+    ----------
+    images : int
+        The first training images, that are captured.
+    """
+
+    images: Annotated[int, Interval(ge=1, le=100)] = 3
+
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+    trains: ClassVar[bool] = True
+
+    of: ClassVar[Any]  # the open-loop method: a parameter in every subclass
+
+    def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
+        """Find the gamma.
+
+        Parameters
+        ----------
+        bench : TrainingBench
+            The display, the training images, and a memory that survives a kill.
+
+        Returns
+        -------
+        mapping
+            ``gamma``.
+
+        Raises
+        ------
+        BudgetError
+            When no capture is left.
+        """
+        phases = [self.of.solve(image.target[None], bench)[0] for image in bench.images[: self.images]]
+        coarse = self._errors(bench, 1, phases, COARSE)
+        best = min(coarse, key=coarse.__getitem__)
+        errors = coarse | self._errors(bench, 2, phases, [best * factor for factor in FINE])
+        return {"gamma": min(errors, key=errors.__getitem__)}
+
+    def _errors(
+        self, bench: TrainingBench, search: int, phases: Sequence[Tensor], gammas: Sequence[float]
+    ) -> dict[float, float]:
+        """Mean squared error of the captures at each gamma, every search kept as a whole."""
+
+        def capture() -> dict[str, list[float]]:
+            shots = [
+                [(curved(phase, gamma), image, ("gamma", f"{gamma:.6f}")) for image, phase in zip(bench.images, phases)]
+                for gamma in gammas
+            ]
+            bench.announce((phase, image, names) for group in shots for phase, image, names in group)
+            errors = []
+            for step, (gamma, group) in enumerate(zip(gammas, shots, strict=True)):
+                found = [
+                    float(functional.mse_loss(matched(bench.photograph(phase, image, *names), image.target), image.target))
+                    for phase, image, names in group
+                ]
+                errors.append(math.fsum(found) / len(found))
+                bench.log(round=search, step=step, gamma=gamma, error=errors[-1])
+            return {"errors": errors}
+
+        return dict(zip(gammas, bench.kept(f"search {search}", capture)["errors"], strict=True))
+
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
+        """Phases of the open-loop method, with the display's gamma.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : MeteredDisplay
+            Nominal optics in SI units, and what `prepare` returned.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            Where the method was not trained.
+        """
+        return curved(self.of.solve(target, bench), bench.learned["gamma"])
+
+
+def curved(phase: Tensor, gamma: float) -> Tensor:
+    """A phase [rad], wrapped to [0, 2 pi), as 2 pi (phase / 2 pi)^gamma.
+
+    Examples
+    --------
+    >>> curved(torch.tensor([0.0, math.pi, 3 * math.pi]), 2.0) / math.pi
+    tensor([0.0000, 0.5000, 0.5000])
+    """
+    return TAU * (wrap(phase) / TAU) ** gamma
+
+
+@dataclass(frozen=True)
+class WirtingerGamma(PhaseGamma):
+    """`PhaseGamma` of Wirtinger holography.
+
+    Parameters
+    ----------
+    of : Wirtinger
+        The open-loop method.
+    """
+
+    of: Wirtinger = Wirtinger()
+
+
+@dataclass(frozen=True)
+class DoublePhaseGamma(PhaseGamma):
+    """`PhaseGamma` of double phase encoding.
+
+    Parameters
+    ----------
+    of : DoublePhase
+        The open-loop method.
+    """
+
+    of: DoublePhase = DoublePhase()

@@ -1,0 +1,148 @@
+"""A method that follows the others of its study, as the oracle does: its plan, its starts, and what is computed again."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from holobench_eval.report import build_report
+from holobench_eval.study import run as running
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Local, Serial
+from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.scoring import starts
+from holobench_eval.study.store import Store
+from tests.study.test_executors import compute, untimed
+from tests.study.test_kill_and_resume import start, wait_for, wait_for_solves
+from tests.study.test_run import add_other_profile
+from tests.support.fake_study import fake_work, solves, write_config
+
+POOR, GOOD = ('{{name: "plugins.py:Toy", label: {}, params: {{value: {}}}}}'.format(*row) for row in (("poor", 1), ("good", 5)))
+FOLLOWING = '{name: "plugins.py:Following", label: oracle}'
+FAILING = '{name: "plugins.py:Toy", label: good, params: {value: 5, fail: "no light"}}'
+
+
+def planned(config: Path) -> Plan:
+    return plan(load_study(config))
+
+
+def cells(grid: Plan, label: str) -> list[Cell]:
+    return [cell for name, cell in grid.labelled() if name == label]
+
+
+def score(records: list[dict[str, Any]], label: str, target: str) -> float:
+    (record,) = (one for one in records if (one["label"], one["cell"]["target"]) == (label, target))
+    return float(record["scores"]["psnr_linear"])
+
+
+def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repeat(tmp_path: Path) -> None:
+    add_other_profile(tmp_path)
+    config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), profiles="ideal, other.yaml", count=2)
+    config.write_text(f"{config.read_text()}repeats: 2\n")
+    grid = planned(config)
+    by_id = {cell.id: cell for cell in grid.cells}
+    for cell in cells(grid, "oracle"):
+        others = [by_id[identity] for identity in cell.starts]
+        assert {(one.target, one.condition, one.repeat) for one in others} == {(cell.target, cell.condition, cell.repeat)}
+        assert sorted(one.params["value"] for one in others) == [1, 5]
+    assert [task.is_start for task in grid.tasks if not task.is_floor and task.label != "oracle"] == [True] * 8
+
+
+def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_knows_nothing_of_it(tmp_path: Path) -> None:
+    both = planned(write_config(tmp_path, (POOR, GOOD, FOLLOWING)))
+    turned = planned(write_config(tmp_path, (FOLLOWING, GOOD, POOR)))
+    fewer = planned(write_config(tmp_path, (POOR, FOLLOWING)))
+    without = planned(write_config(tmp_path, (POOR, GOOD)))
+    assert {cell.id for cell in both.cells} == {cell.id for cell in turned.cells}
+    assert {cell.id for cell in cells(both, "oracle")}.isdisjoint(cell.id for cell in cells(fewer, "oracle"))
+    assert {cell.id for cell in without.cells} < {cell.id for cell in both.cells}
+    assert not any(task.is_start for task in without.tasks)
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_the_better_phase_of_another_method_is_picked_up(tmp_path: Path) -> None:
+    records = compute(write_config(tmp_path, (FOLLOWING, POOR, GOOD)), tmp_path / "out", Serial())
+    for target in ("gray 0", "gray 1", "gray 2"):
+        assert score(records, "oracle", target) == pytest.approx(score(records, "good", target), abs=1e-3)
+        assert score(records, "oracle", target) > score(records, "poor", target) + 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("timing", ["shared", "alone"])
+def test_several_workers_give_what_one_process_gives(
+    tmp_path: Path, timing: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = write_config(tmp_path, (FOLLOWING, POOR, GOOD))
+    config.write_text(f"{config.read_text()}timing: {timing}\n")
+    serial = compute(config, tmp_path / "serial", Serial())
+    monkeypatch.setattr(running, "step", fake_work)
+    assert untimed(compute(config, tmp_path / "local", Local(3))) == untimed(serial)
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_again(tmp_path: Path) -> None:
+    config = write_config(tmp_path, (FOLLOWING, POOR, FAILING))
+    first = compute(config, tmp_path / "out", Serial())
+    assert [one["label"] for one in first if one["state"] == "failed"] == ["good"]
+    assert score(first, "oracle", "gray 1") == pytest.approx(score(first, "poor", "gray 1"), abs=2e-3)
+    assert score(first, "oracle", "gray 0") > score(first, "poor", "gray 0") + 0.01
+    before = len(solves(tmp_path))
+    compute(config, tmp_path / "out", Serial())
+    assert len(solves(tmp_path)) == before
+    compute(config, tmp_path / "out", Serial(), retry_failed=True)
+    assert [line.split()[0] for line in solves(tmp_path)[before:]] == ["Toy", "Following"]
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_start_whose_phase_was_not_kept_is_solved_again_for_a_follower_and_gives_the_same_record(tmp_path: Path) -> None:
+    alone = compute(write_config(tmp_path, (POOR, GOOD)), tmp_path / "out", Serial())
+    together = compute(write_config(tmp_path, (POOR, GOOD, FOLLOWING)), tmp_path / "out", Serial())
+    assert len(solves(tmp_path)) == 6 + 9
+    assert [one for one in together if one["label"] != "oracle"] == alone
+    compute(write_config(tmp_path, (POOR, GOOD, FOLLOWING)), tmp_path / "out", Serial())
+    assert len(solves(tmp_path)) == 6 + 9
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_is_computed(tmp_path: Path) -> None:
+    config, store = write_config(tmp_path, (POOR, FOLLOWING), count=2), Store(tmp_path / "out")
+    compute(config, tmp_path / "out", Serial())
+    grid = planned(config)
+    first, follower = cells(grid, "poor")[0], cells(grid, "oracle")[0]
+    store.path(first.id).unlink()
+    missing = frozenset(cell.id for cell in store.missing(grid.cells))
+    assert starts.affected(grid, missing, store) == {first.id, follower.id}
+    assert not store.path(follower.id).exists()
+
+
+def test_a_kept_phase_is_the_one_that_was_shown_to_a_tenth_of_a_milliradian(tmp_path: Path) -> None:
+    store, phase = Store(tmp_path), torch.linspace(-9, 9, 2 * 5 * 7).view(2, 5, 7)
+    starts.keep(store, "cell", phase)
+    kept = starts._read(starts.path(store, "cell"))
+    assert float((torch.exp(1j * kept) - torch.exp(1j * phase)).abs().max()) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_physics")
+def test_a_run_that_was_killed_before_the_followers_gives_the_bytes_of_one_that_was_not(tmp_path: Path) -> None:
+    methods = tuple(row.replace("value:", "pause: 0.3, value:") for row in (POOR, GOOD)) + (FOLLOWING,)
+    config, output = write_config(tmp_path, methods), tmp_path / "out"
+    for solved in (3, 7):
+        killed = start(config, output)
+        wait_for_solves(tmp_path, solved, killed)
+        killed.kill()
+        assert wait_for(killed)[0] == -signal.SIGKILL
+    code, _, err = wait_for(start(config, output))
+    assert (code, err) == (0, "")
+    study = load_study(config)
+    watch, artifacts = Lines(lambda line: None), tmp_path / "artifacts"
+    whole = running.run(study, plan(study), tmp_path / "whole", Serial(), watch, threads=1, artifacts=artifacts)
+    build_report(study, whole.records, tmp_path / "whole", whole.provenance)
+    for name in ("table.csv", "records.csv"):
+        assert (output / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
