@@ -50,7 +50,7 @@ class Oracle:
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 40
     step: Annotated[float, Interval(gt=0, le=10)] = 0.06
     start_iterations: Annotated[int, Interval(ge=1, le=100_000)] = 5
-    tolerance: Annotated[float, Interval(gt=0, le=10)] = 0.1
+    tolerance: Annotated[float, Interval(gt=0, le=10)] = 0.2
     rounds: Annotated[int, Interval(ge=1, le=1000)] = 10
 
     version: ClassVar[int] = 3

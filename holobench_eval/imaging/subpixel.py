@@ -10,6 +10,7 @@ from .grid import FiducialGrid
 from .warp import Array, Frame, Warp, quadratic_surface, quadratic_terms
 
 SAMPLE_BLUR = 0.5  # region pixels: gathers the light between the samples, without rounding the edges away
+GROUND_BLUR = 0.8  # of the spacing: wide enough to average speckle, narrow enough to follow scattered light
 KNEE = 0.2  # of a circle's light: brighter light counts as simply bright, which tames the speckle inside a circle
 FURTHEST_CIRCLE = 2.0  # region pixels that a linearised fit may move a circle
 
@@ -17,13 +18,13 @@ FURTHEST_CIRCLE = 2.0  # region pixels that a linearised fit may move a circle
 def even_picture(frame: Frame, warp: Warp, grid: FiducialGrid) -> Frame:
     """The grid in region coordinates ``(h, w)``, circles near 1 / (1 + KNEE) and dark ground near 0.
 
-    The dark level is taken off and the illumination, a quadratic in the logarithm of the circles' light (exact for a
-    Gaussian beam), is divided out. Otherwise every circle is pulled towards the bright side.
+    The light of the dark ground, a smooth surface where light is scattered, is taken off, and the illumination, a
+    quadratic in the logarithm of the circles' light (exact for a Gaussian beam), is divided out. Otherwise every circle
+    is pulled towards the bright side.
     """
     smooth = cv2.GaussianBlur(frame, (0, 0), SAMPLE_BLUR * warp.scale())
     picture = warp.sample(np.asarray(smooth))
-    target = grid.image.numpy()
-    picture = picture - np.median(picture[target == 0])
+    picture = picture - _ground(picture, grid)
     light = np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.5 * grid.radius))
     columns, rows = np.round(grid.centres).astype(int).T
     circles = light[rows, columns].astype(np.float64)
@@ -31,6 +32,13 @@ def even_picture(frame: Frame, warp: Warp, grid: FiducialGrid) -> Frame:
     fit = np.linalg.lstsq(quadratic_terms(grid.centres, grid.shape), circles, rcond=None)[0]
     beam = np.exp(quadratic_surface(fit, grid.shape))
     return compress(np.asarray(picture / beam, dtype=np.float32))
+
+
+def _ground(picture: Frame, grid: FiducialGrid) -> Frame:
+    """Light between the circles, ``(h, w)``: the local mean over the dark pixels of the grid."""
+    dark = (grid.image.numpy() == 0).astype(np.float32)
+    light, share = (cv2.GaussianBlur(each, (0, 0), GROUND_BLUR * grid.spacing) for each in (picture * dark, dark))
+    return np.asarray(light / share)
 
 
 def compress(light: Frame) -> Frame:

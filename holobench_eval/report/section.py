@@ -12,6 +12,7 @@ import pandas as pd
 
 from .charts.thumbnails import Thumbnails
 from .data.layout import Layout
+from .data.marks import marked
 from .data.ranks import Ranks, ranks
 from .data.results import Results
 from .data.sweeps import Sweep, sweeps
@@ -33,7 +34,7 @@ def column(heading: str, key: str) -> Column:
 def method_rows(results: Results, condition: str, columns: Sequence[Column]) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of a display's table, a row for every method."""
     rows = [
-        [results.layout.marked(name), *(cell(results.row(name, condition)) for _, cell in columns)]
+        [marked(results, name, condition), *(cell(results.row(name, condition)) for _, cell in columns)]
         for name in results.methods(condition)
     ]
     return ["method", *(heading for heading, _ in columns)], rows

@@ -16,10 +16,10 @@ from ...display.api import DisplaySpec
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
-from ..learned.fidelity import matched_psnr
+from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
 from ..learned.retrieval import SquaredErrorRetrieval, check_region, retrieve
-from ..learned.samples import Sample, Schedule, Steps, captured
+from ..learned.samples import Sample, Schedule, Steps
 from ..wirtinger import Wirtinger
 from .approximator import ModelApproximator
 from .patterns import pattern_samples
@@ -57,12 +57,8 @@ class ThroughModel(ABC):
         does not get out of.
     seed : int
         Of the model's first weights, where it has any.
-
-    Notes
-    -----
-    Not in the paper: in the end, the holograms of the held-out images by `retrieval` through the model and by
-    ``NOMINAL`` are captured. Where the latter's captures are closer to the targets, ``nominal`` is kept as 1 and
-    `solve` gives them: of a display that is as the nominal model says, a calibration learns noise.
+    fallback : bool
+        Solve by plain Wirtinger holography where the loop made the captures of held-out images worse, see `fallback`.
     """
 
     training: Schedule = Schedule()
@@ -70,13 +66,12 @@ class ThroughModel(ABC):
     search: SearchRetrieval = SearchRetrieval()
     start: Wirtinger = Wirtinger(iterations=5)
     seed: int = 0
+    fallback: bool = False
 
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
-    version: ClassVar[int] = 2
-
-    NOMINAL: ClassVar[Wirtinger] = Wirtinger()
+    version: ClassVar[int] = 3
 
     @abstractmethod
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
@@ -93,7 +88,7 @@ class ThroughModel(ABC):
         Returns
         -------
         mapping
-            What `solve` and `predict` need: the parameters of the model, and whether it is of no use (``nominal``).
+            What `solve` and `predict` need: the parameters of the model, and whether Wirtinger holography was better.
 
         Raises
         ------
@@ -104,28 +99,15 @@ class ThroughModel(ABC):
         approximator = self.approximator(bench.spec).to(bench.device)
         start, search = partial(hologram, self.start, bench=bench), partial(retrieve, settings=self.search)
         train(bench, approximator, start, search, self.training, self._earlier(bench))
-        return {**approximator.learned(), "nominal": int(self._is_nominal(bench, approximator))}
+
+        def solve(image: TrainingImage) -> Tensor:
+            return retrieve(approximator.image(bench.light(image)), image.target, start(image), self.retrieval)
+
+        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve)}
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
         """Samples that every round learns from, beside its own."""
         return ()
-
-    def _is_nominal(self, bench: TrainingBench, approximator: ModelApproximator) -> bool:
-        """Whether, on the held-out images, plain Wirtinger holography is captured closer to the targets."""
-
-        def corrected(image: TrainingImage) -> Tensor:
-            start = hologram(self.start, image, bench)
-            return retrieve(approximator.image(bench.light(image)), image.target, start, self.retrieval)
-
-        def quality(name: str, phases: Sequence[Tensor]) -> list[float]:
-            """PSNR [dB] of every held-out image."""
-            keys = [f"{name} {image.item}" for image in bench.held_out]
-            samples = captured(bench, keys, phases, bench.held_out, name)
-            return [matched_psnr(sample.capture, sample.target) for sample in samples]
-
-        learned = quality("learned", [corrected(image) for image in bench.held_out])
-        nominal = quality("nominal", [hologram(self.NOMINAL, image, bench) for image in bench.held_out])
-        return sum(ours - plain for ours, plain in zip(learned, nominal, strict=True)) < 0
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phases of least squared error in the captures that the model predicts.
@@ -149,8 +131,8 @@ class ThroughModel(ABC):
         UserError
             Where what was learned belongs to another model.
         """
-        if bench.learned["nominal"]:
-            return self.NOMINAL.solve(target, bench)
+        if bench.learned["fell_back"]:
+            return WIRTINGER.solve(target, bench)
         display = frozen(self.approximator(bench.spec), bench).image(bench.light)
         start = self.start.solve(target, bench)
         pairs = zip(target, start, strict=True)

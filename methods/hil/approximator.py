@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import torch
@@ -13,7 +13,7 @@ from ..common import matched, unit_field
 from ..learned.retrieval import Image, Verdict
 from ..learned.samples import Sample
 from ..learned.weights import refuse_other_weights
-from .approximator_loss import ApproximatorLoss
+from .approximator_loss import PUBLISHED_RATES, ApproximatorLoss, LearningRates
 from .critic import Critic
 from .networks import Network
 from .trainer import trainer
@@ -36,12 +36,15 @@ class NetworkApproximator:
         Of the first weights.
     of_amplitude : bool
         Not in the paper: the network maps amplitudes, the square roots of both intensities.
+    rates : LearningRates
+        Of Adam.
 
     Attributes
     ----------
-    gain : Tensor
-        Not in the paper: ``(C,)``, the unit in which captures are learned, such that the pictures of the first round
-        are as bright as their targets; a camera would be exposed so.
+    gain, ideal_gain : Tensor
+        Not in the paper: ``(C,)``, the units of captures and of ideal intensities, such that both are as bright as
+        their targets in the first round; a camera would be exposed so. The identity, where training starts, then is of
+        the right brightness.
     """
 
     def __init__(
@@ -52,18 +55,19 @@ class NetworkApproximator:
         with_critic: bool,
         seed: int,
         of_amplitude: bool = False,
+        rates: LearningRates = PUBLISHED_RATES,
     ) -> None:
         channels = len(spec.wavelengths)
         self.spec = spec
-        self.trainer = trainer(network, loss, channels, channels, seed)
-        self.gain = torch.ones(channels)
+        self.trainer = trainer(network, loss, channels, channels, seed, rates)
+        self.gain = self.ideal_gain = torch.ones(channels)
         self.of_amplitude = of_amplitude
         self.critic = Critic(channels, network, seed) if with_critic else None
 
     def to(self, device: torch.device) -> Self:
         """Itself, before the first step, on a device; its weights were drawn on the CPU, the same for all devices."""
         self.trainer.to(device)
-        self.gain = self.gain.to(device)
+        self.gain, self.ideal_gain = self.gain.to(device), self.ideal_gain.to(device)
         if self.critic is not None:
             self.critic.to(device)
         return self
@@ -73,29 +77,33 @@ class NetworkApproximator:
         """The adversarial loss of Eq. 22, where there is a critic."""
         return None if self.critic is None else self.critic.verdict
 
+    @torch.no_grad()
     def expose(self, samples: Sequence[Sample]) -> None:
-        """Set the gain from the first captures."""
-        overlap = torch.stack([(sample.capture * sample.target).sum((-2, -1)) for sample in samples]).sum(0)
-        power = torch.stack([sample.capture.square().sum((-2, -1)) for sample in samples]).sum(0)
-        self.gain = overlap / power.clamp_min(1e-12)
+        """Set the gains from the first captures."""
+        self.gain = _exposure((sample.capture, sample.target) for sample in samples)
+        self.ideal_gain = _exposure((self._intensity(sample.phase, sample.light), sample.target) for sample in samples)
 
     def ideal(self, phase: Tensor, light: Tensor) -> Tensor:
-        """|P(exp(i phase))|^2 in the region, ``(1, C, h, w)``, in the unit of the target."""
+        """|P(exp(i phase))|^2 in the region, ``(1, C, h, w)``, as bright as the targets were in the first round."""
+        return (self.ideal_gain.view(-1, 1, 1) * self._intensity(phase, light))[None]
+
+    def _intensity(self, phase: Tensor, light: Tensor) -> Tensor:
         channels = []
         for channel, panel in enumerate(phase):
             model = self.spec.propagator(channel, device=panel.device)
             field = self.spec.region.crop(model.forward(unit_field(panel)))
             channels.append((field.real.square() + field.imag.square()) / light[channel])
-        return torch.stack(channels)[None]
+        return torch.stack(channels)
 
     def _encoded(self, intensity: Tensor) -> Tensor:
         return intensity.clamp_min(1e-12).sqrt() if self.of_amplitude else intensity
 
     def step(self, sample: Sample, progress: float) -> dict[str, float]:
-        """One step on a capture of the trainer (Eq. 20), and of the critic (Eq. 22); their rates are constant."""
+        """One step on a capture of the trainer (Eq. 20), and of the critic (Eq. 22), whose rate is constant."""
         with torch.no_grad():
             ideal = self._encoded(self.ideal(sample.phase, sample.light))
-        losses = self.trainer.step(ideal, self._encoded((self.gain.view(-1, 1, 1) * sample.capture)[None]))
+            capture = self._encoded((self.gain.view(-1, 1, 1) * sample.capture)[None])
+        losses = self.trainer.step(ideal, capture, progress)
         if self.critic is not None:
             with torch.no_grad():
                 predicted = self.trainer.generator(ideal)[0]
@@ -115,18 +123,18 @@ class NetworkApproximator:
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
         critic = None if self.critic is None else self.critic.state_dict()
-        return {"trainer": self.trainer.state_dict(), "gain": self.gain, "judge": critic}
+        return {"trainer": self.trainer.state_dict(), "gains": self._gains(), "judge": critic}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on from a state."""
         self.trainer.load_state_dict(state["trainer"])
-        self.gain = state["gain"].to(self.gain.device)
+        self._set_gains(state["gains"])
         if self.critic is not None:
             self.critic.load_state_dict(state["judge"])
 
     def learned(self) -> dict[str, Any]:
         """What phase retrieval needs, and which features the perceptual loss compared."""
-        weights: dict[str, Any] = {"generator": self.trainer.generator.state_dict(), "gain": self.gain}
+        weights: dict[str, Any] = {"generator": self.trainer.generator.state_dict(), "gains": self._gains()}
         weights["perceptual"] = None if self.trainer.perceptual is None else self.trainer.perceptual.name
         if self.critic is not None:
             weights["judge"] = self.critic.network.state_dict()
@@ -136,6 +144,19 @@ class NetworkApproximator:
         """UserError for the weights of another network."""
         with refuse_other_weights():
             self.trainer.generator.load_state_dict(weights["generator"])
-            self.gain = weights["gain"].to(self.gain.device)
+            self._set_gains(weights["gains"])
             if self.critic is not None:
                 self.critic.network.load_state_dict(weights["judge"])
+
+    def _gains(self) -> Tensor:
+        return torch.stack([self.gain, self.ideal_gain])
+
+    def _set_gains(self, gains: Tensor) -> None:
+        self.gain, self.ideal_gain = gains.to(self.gain.device)
+
+
+def _exposure(pairs: Iterable[tuple[Tensor, Tensor]]) -> Tensor:
+    """One factor a colour, ``(C,)``, that makes images ``(C, h, w)`` as bright as their targets, by least squares."""
+    products = [torch.stack([image * target, image.square()]).sum((-2, -1)) for image, target in pairs]
+    overlap, power = torch.stack(products).sum(0)
+    return overlap / power.clamp_min(1e-12)

@@ -6,9 +6,10 @@ Chakravarthula et al. 2020, Sections 4.3.1 and 5.2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import torch
+from annotated_types import Interval
 from torch import Tensor
 from torch.nn import functional
 
@@ -21,6 +22,28 @@ Gan = Literal["cross_entropy", "least_squares"]
 
 LEARNING_RATE = 2e-4
 BETAS = (0.5, 0.999)
+
+Rate = Annotated[float, Interval(gt=0, le=1)]
+
+
+@dataclass(frozen=True)
+class LearningRates:
+    """Adam's rates, by default those of Section 5.2.
+
+    Parameters
+    ----------
+    generator, discriminator : float
+        The first rate in every round.
+    decay : bool
+        Not in the paper: the generator's rate falls to zero along half a cosine in every round.
+    """
+
+    generator: Rate = LEARNING_RATE
+    discriminator: Rate = LEARNING_RATE
+    decay: bool = False
+
+
+PUBLISHED_RATES = LearningRates()
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """The networks that the paper compares its approximator with (Chakravarthula et al. 2020, Section 6.1, Table 1).
 
-All take any image size: they pad with zeros and crop as the proposed generator does.
+All give what they add to the ideal intensity, as the proposed generator does (`networks.FromIdentity`), and take any
+image size: they pad with zeros and crop as it does.
 """
 
 from __future__ import annotations
@@ -14,8 +15,7 @@ from torch.nn import functional
 from ...imaging.shifts import mirrored
 from .generator import Generator, crop_to, instance_norm, pad_to_multiple
 
-# Networks that end in a tanh work on [-1, 1]; intensities of [0, 2] are moved there, which leaves room for captures
-# brighter than the target's white.
+# Networks that end in a tanh work on [-1, 1]; intensities of [0, 2] are moved there.
 MIDDLE = 1.0
 
 
@@ -49,7 +49,7 @@ class UNet(nn.Module):
         self.last = nn.Conv2d(width, outputs, 1)
 
     def forward(self, ideal: Tensor) -> Tensor:
-        """Predicted capture ``(B, outputs, h, w)`` of an ideal intensity ``(B, inputs, h, w)``."""
+        """A change ``(B, outputs, h, w)`` of an ideal intensity ``(B, inputs, h, w)``."""
         x = pad_to_multiple(ideal, 2**self.levels).contiguous(memory_format=torch.channels_last)
         taken = []
         for level, encode in enumerate(self.encoder):
@@ -92,8 +92,8 @@ class Pix2Pix(nn.Module):
         )
 
     def forward(self, ideal: Tensor) -> Tensor:
-        """Predicted capture ``(B, outputs, h, w)`` in [0, 2] of an ideal intensity ``(B, inputs, h, w)``."""
-        return MIDDLE + torch.tanh(self.generator(ideal - MIDDLE))
+        """A change ``(B, outputs, h, w)`` in [-1, 1] of an ideal intensity ``(B, inputs, h, w)``."""
+        return torch.tanh(self.generator(ideal - MIDDLE))
 
 
 class Pix2PixHD(nn.Module):
@@ -118,11 +118,11 @@ class Pix2PixHD(nn.Module):
         self.layers = nn.Sequential(*layers, Mirrored(3), nn.Conv2d(width, outputs, 7), nn.Tanh())
 
     def forward(self, ideal: Tensor) -> Tensor:
-        """Predicted capture ``(B, outputs, h, w)`` in [0, 2] of an ideal intensity ``(B, inputs, h, w)``."""
+        """A change ``(B, outputs, h, w)`` in [-1, 1] of an ideal intensity ``(B, inputs, h, w)``."""
         # two pixels at the lowest resolution can still be mirrored and normalised
         x = pad_to_multiple(ideal - MIDDLE, 2**self.levels, smallest=2 ** (self.levels + 1))
         x = self.layers(x.contiguous(memory_format=torch.channels_last))
-        return crop_to(MIDDLE + x, *ideal.shape[-2:])
+        return crop_to(x, *ideal.shape[-2:])
 
 
 class Mirrored(nn.Module):

@@ -48,7 +48,7 @@ class Dropout(nn.Dropout):
 
 
 class Generator(nn.Module):
-    """Ideal intensity to predicted capture, linear light ``(B, inputs, h, w)`` to ``(B, outputs, h, w)``, any h and w.
+    """Ideal intensity to its change, linear light ``(B, inputs, h, w)`` to ``(B, outputs, h, w)``, any h and w.
 
     levels: stride-2 convolutions of ``kernel`` px (5 in the paper, 4 in Pix2Pix), and as many transposed ones of
     4 px. width: filters of the first level, doubled from level to level up to eight times as many.
@@ -63,8 +63,8 @@ class Generator(nn.Module):
     what is skipped goes through the decoder's ReLU.
 
     The innermost encoding layer is never normalised, as Isola et al. correct in their errata: of a single pixel nothing
-    would be left. What the paper leaves open: the image is the plain output of the last convolution, with no bound such
-    as Pix2Pix's tanh, since a capture has none either; and that convolution has 3 x 3 px.
+    would be left. What the paper leaves open: the last convolution has 3 x 3 px, its output is the change of the ideal
+    intensity without a bound such as Pix2Pix's tanh, and their sum is bounded below by zero (`networks.FromIdentity`).
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class Generator(nn.Module):
         self.last = nn.Conv2d(last, outputs, 3, padding=1) if full_resolution_stage else None
 
     def forward(self, ideal: Tensor) -> Tensor:
-        """Predicted capture ``(B, outputs, h, w)`` of an ideal intensity ``(B, inputs, h, w)``."""
+        """A change ``(B, outputs, h, w)`` of an ideal intensity ``(B, inputs, h, w)``."""
         x = pad_to_multiple(ideal, 2**self.levels).contiguous(memory_format=torch.channels_last)
         taken = []
         for encode in self.encoder:

@@ -9,24 +9,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import torch
-from annotated_types import Interval
 from torch import Tensor
 
 from ...display.api import DisplaySpec
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
+from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
 from ..learned.retrieval import Image, PhaseRetrieval, check_region, retrieve
 from ..learned.samples import Schedule
+from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
-from .approximator_loss import ApproximatorLoss
+from .approximator_loss import ApproximatorLoss, LearningRates
 from .networks import Network
-from .offset import best_offset
-from .start import SmoothStart
 
 
 @dataclass(frozen=True)
@@ -45,34 +44,35 @@ class HIL:
         Algorithm 1.
     retrieval : PhaseRetrieval
         Eq. 22.
-    start : SmoothStart
-        Wirtinger holography, where Algorithm 1 and every retrieval begin. Not in the paper: it is stopped early, see
-        `SmoothStart`. Of the tolerances 0.2, 0.1, 0.04 and 0.02 the default was best on captures of dead leaves, and
-        within 0.3 dB of the best on darkened ones (their cube).
-    offsets : int
-        Not in the paper: constant phases that are tried on the display for the start, evenly over 2 pi, with captures
-        of the first training images; the one of the least error is kept. An ideal image does not depend on it, and so
-        nor does the network's input, but unmodulated light interferes with the image.
+    start : Wirtinger
+        Wirtinger holography, where Algorithm 1 and every retrieval begin.
+    rates : LearningRates
+        Of Adam, while the approximator learns. Those of the paper are for its 40000 steps.
     seed : int
         Of the weights, besides the study's.
+    fallback : bool
+        Not in the paper: solve by plain Wirtinger holography where the loop made the captures of held-out images worse,
+        see `fallback`.
     """
 
     network: Network = Network()
     loss: ApproximatorLoss | None = None
     training: Schedule = Schedule()
     retrieval: PhaseRetrieval = PhaseRetrieval()
-    start: SmoothStart = SmoothStart(tolerance=0.1)
-    offsets: Annotated[int, Interval(ge=1, le=64)] = 8
+    start: Wirtinger = Wirtinger()
+    rates: LearningRates = LearningRates(generator=1e-3, discriminator=5e-5, decay=True)
     seed: int = 0
+    fallback: bool = False
 
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
-    version: ClassVar[int] = 3
+    version: ClassVar[int] = 4
 
     def approximator(self, spec: DisplaySpec) -> NetworkApproximator:
         """D, untrained."""
-        return NetworkApproximator(spec, self.network, self.loss, self.retrieval.adversarial > 0, self.seed)
+        with_critic = self.retrieval.adversarial > 0
+        return NetworkApproximator(spec, self.network, self.loss, with_critic, self.seed, rates=self.rates)
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Train the approximator on captures of the display (Algorithm 1).
@@ -85,7 +85,8 @@ class HIL:
         Returns
         -------
         mapping
-            What `solve` and `predict` need: the weights of D and of the critic, and the constant phase [rad].
+            What `solve` and `predict` need: the weights of D and of the critic, and whether Wirtinger holography was
+            better.
 
         Raises
         ------
@@ -96,13 +97,13 @@ class HIL:
         """
         check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec).to(bench.device)
-        offset = best_offset(bench, self.start, self.offsets)
+        start, minimise = partial(hologram, self.start, bench=bench), partial(self._retrieve, approximator)
+        train(bench, approximator, start, minimise, self.training)
 
-        def start(image: TrainingImage) -> Tensor:
-            return hologram(self.start, image, bench) + offset
+        def solve(image: TrainingImage) -> Tensor:
+            return minimise(approximator.image(bench.light(image)), image.target, start(image))
 
-        train(bench, approximator, start, partial(self._retrieve, approximator), self.training)
-        return {**approximator.learned(), "offset": offset}
+        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve)}
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phases of least loss (Eq. 22) in the captures that the approximator predicts.
@@ -126,9 +127,11 @@ class HIL:
         UserError
             Where what was learned are the weights of another network.
         """
+        if bench.learned["fell_back"]:
+            return WIRTINGER.solve(target, bench)
         approximator = frozen(self.approximator(bench.spec), bench)
         display = approximator.image(bench.light)
-        start = self.start.solve(target, bench) + bench.learned["offset"]
+        start = self.start.solve(target, bench)
         pairs = zip(target, start, strict=True)
         return torch.stack([self._retrieve(approximator, display, *pair) for pair in pairs])
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
 from annotated_types import Interval
-from torch import nn
+from torch import Tensor, nn
 
 from ...core.errors import UserError
-from ..learned.weights import draw_weights
+from ..learned.weights import draw_weights, start_at_zero
 from .baselines import Identity, Pix2Pix, Pix2PixHD, UNet
 from .discriminator import MultiScaleDiscriminator, PatchDiscriminator
 from .generator import Generator
@@ -21,6 +21,23 @@ PIX2PIX_DEVIATION = 0.02  # of the first weights (Isola et al., appendix)
 HALVED = ("unet", "pix2pixhd")  # have half the filters, Section 6.1
 PUBLISHED_HALVINGS = 4  # of the resolution in these two
 SWITCHES = ("dropout", "full_resolution_stage", "plain_ends", "skip_after_activation")  # of the generator
+
+
+class FromIdentity(nn.Module):
+    """An image and what a network adds to it: nothing at first, since Algorithm 1 begins with D = Id.
+
+    Light is not negative: what falls below zero is zero. The gradient is passed on there as if it were not cut, so that
+    neither the training nor a retrieval loses a pixel that was predicted black; the paper names no last activation.
+    """
+
+    def __init__(self, network: nn.Module) -> None:
+        super().__init__()
+        self.network = start_at_zero(network)
+
+    def forward(self, ideal: Tensor) -> Tensor:
+        """``(B, C, h, w)`` linear light to the same."""
+        light: Tensor = ideal + self.network(ideal)
+        return light + (light.clamp_min(0) - light).detach()
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,15 @@ from torch import Tensor
 
 from ...display.api import DisplaySpec
 from ...display.metered import MeteredDisplay
-from ...display.training import TrainingBench
+from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
+from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
 from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
+from .approximator_loss import LearningRates
 from .networks import Network
 
 
@@ -41,34 +43,49 @@ class HILNH3D:
         Retrieval for the squared error of amplitude.
     start : Wirtinger
         Where every retrieval begins.
+    rates : LearningRates
+        Of Adam, while the network learns.
     seed : int
         Of the weights, besides the study's.
+    fallback : bool
+        Solve by plain Wirtinger holography where the loop made the captures of held-out images worse, see `fallback`.
     """
 
     network: Network = Network(name="unet")
     training: Schedule = Schedule(rounds=1)
     retrieval: SquaredErrorRetrieval = SquaredErrorRetrieval()
     start: Wirtinger = Wirtinger(iterations=50)
+    rates: LearningRates = LearningRates(generator=1e-3, decay=True)
     seed: int = 0
+    fallback: bool = False
 
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
-    version: ClassVar[int] = 2
+    version: ClassVar[int] = 3
 
     def approximator(self, spec: DisplaySpec) -> NetworkApproximator:
         """The network, untrained."""
-        return NetworkApproximator(spec, self.network, None, with_critic=False, seed=self.seed, of_amplitude=True)
+        return NetworkApproximator(
+            spec, self.network, None, with_critic=False, seed=self.seed, of_amplitude=True, rates=self.rates
+        )
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Train the network on captures of the display; parameters, result and errors as in `HIL.prepare`."""
         check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec).to(bench.device)
-        train(bench, approximator, partial(hologram, self.start, bench=bench), self._retrieve, self.training)
-        return approximator.learned()
+        start = partial(hologram, self.start, bench=bench)
+        train(bench, approximator, start, self._retrieve, self.training)
+
+        def solve(image: TrainingImage) -> Tensor:
+            return self._retrieve(approximator.image(bench.light(image)), image.target, start(image))
+
+        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve)}
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]; errors as in `HIL.solve`."""
+        if bench.learned["fell_back"]:
+            return WIRTINGER.solve(target, bench)
         display = frozen(self.approximator(bench.spec), bench).image(bench.light)
         start = self.start.solve(target, bench)
         return torch.stack([self._retrieve(display, *pair) for pair in zip(target, start, strict=True)])

@@ -50,7 +50,7 @@ class HILPlus(Diagnosed, ThroughModel):
 
     network: Network | None = None
 
-    version: ClassVar[int] = 4
+    version: ClassVar[int] = 5
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """The display model, untrained, with a network if there is one; UserError for a network with dropout."""

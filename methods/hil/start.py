@@ -1,4 +1,4 @@
-"""Wirtinger holography stopped while its phase is still smooth: where learned phase retrieval starts."""
+"""Wirtinger holography stopped while its phase is still smooth: where ``hil_tuned`` starts."""
 
 from __future__ import annotations
 
@@ -30,9 +30,12 @@ class SmoothStart(Wirtinger):
     ----------
     tolerance : float
         Squared error of the intensity over the target's squared intensity; 0: all iterations are made.
+    constant : float
+        Phase [rad] that is added in the end.
     """
 
     tolerance: Annotated[float, Interval(ge=0, le=1)] = 0.0
+    constant: float = 0.0
 
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
@@ -46,7 +49,7 @@ class SmoothStart(Wirtinger):
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]; each image has its own last iteration."""
         solve = super().solve
-        return torch.cat([solve(image[None], bench) for image in target])
+        return torch.cat([solve(image[None], bench) for image in target]) + self.constant
 
     def _done(self, loss: Tensor) -> bool:
         return self.tolerance > 0 and bool((loss <= self.tolerance).all())

@@ -16,17 +16,19 @@ from torch.nn import functional
 
 from ...core import seeds
 from ...core.errors import UserError
+from ..descent import cosine_decay
 from ..learned.weights import load_moments, seeded
 from .approximator_loss import (
     BETAS,
-    LEARNING_RATE,
+    PUBLISHED_RATES,
     ApproximatorLoss,
+    LearningRates,
     adversarial_loss,
     discriminator_loss,
     feature_matching_loss,
     published_loss,
 )
-from .networks import Discriminator, Network
+from .networks import Discriminator, FromIdentity, Network
 from .perceptual import perceptual_loss
 
 
@@ -37,9 +39,14 @@ class Trainer:
     """
 
     def __init__(
-        self, generator: nn.Module, discriminator: Discriminator | None, loss: ApproximatorLoss, noise: Tensor
+        self,
+        generator: nn.Module,
+        discriminator: Discriminator | None,
+        loss: ApproximatorLoss,
+        rates: LearningRates,
+        noise: Tensor,
     ) -> None:
-        self.generator, self.discriminator, self.loss = generator, discriminator, loss
+        self.generator, self.discriminator, self.loss, self.rates = generator, discriminator, loss, rates
         self.perceptual = perceptual_loss() if loss.perceptual else None
         self._noise = noise
         self._optimisers = self._fresh_optimisers()
@@ -54,17 +61,22 @@ class Trainer:
 
     def _fresh_optimisers(self) -> dict[str, torch.optim.Adam]:
         return {
-            name: torch.optim.Adam(module.parameters(), lr=LEARNING_RATE, betas=BETAS, fused=True)
+            name: torch.optim.Adam(module.parameters(), lr=getattr(self.rates, name), betas=BETAS, fused=True)
             for name, module in (("generator", self.generator), ("discriminator", self.discriminator))
             if module is not None and any(True for _ in module.parameters())
         }
 
-    def step(self, ideal: Tensor, capture: Tensor) -> dict[str, float]:
+    def step(self, ideal: Tensor, capture: Tensor, progress: float = 0.0) -> dict[str, float]:
         """One step of the discriminator, then one of the generator, on intensities ``(B, C, h, w)``; the losses before.
+
+        progress: the share of the round's steps before this one.
 
         Keys: "l1", "l2", "perceptual", "adversarial", "feature_matching" without their weights (0 where the weight is,
         but for l1), "total" with them, "discriminator". Raises ValueError for images that do not belong together.
         """
+        if self.rates.decay and "generator" in self._optimisers:
+            for group in self._optimisers["generator"].param_groups:
+                group["lr"] = cosine_decay(self.rates.generator, progress)
         self.generator.train().requires_grad_(True)
         with self._own_noise():
             predicted = self.generator(ideal)
@@ -158,7 +170,14 @@ class Trainer:
             raise UserError(f"the saved training does not fit: {reason}; remove it to train anew") from error
 
 
-def trainer(network: Network, loss: ApproximatorLoss | None, inputs: int, outputs: int, seed: int) -> Trainer:
+def trainer(
+    network: Network,
+    loss: ApproximatorLoss | None,
+    inputs: int,
+    outputs: int,
+    seed: int,
+    rates: LearningRates = PUBLISHED_RATES,
+) -> Trainer:
     """A fresh trainer for intensities with so many channels; ``loss`` None takes the published one.
 
     Raises UserError where the loss needs a discriminator and the network has none.
@@ -166,7 +185,9 @@ def trainer(network: Network, loss: ApproximatorLoss | None, inputs: int, output
     loss = published_loss(network) if loss is None else loss
     with seeded("aberration approximator", seed):
         generator = network.generator(inputs, outputs)
+        if network.name != "identity":
+            generator = FromIdentity(generator)
         discriminator = network.discriminator(outputs, inputs) if loss.needs_discriminator else None
     if loss.needs_discriminator and discriminator is None:
         raise UserError(f"loss: network '{network.name}' has no discriminator; set 'adversarial' to 0")
-    return Trainer(generator, discriminator, loss, seeds.generator("dropout", seed).get_state())
+    return Trainer(generator, discriminator, loss, rates, seeds.generator("dropout", seed).get_state())

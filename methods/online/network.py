@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
-from torch import Tensor, nn
+from torch import Tensor
 
 from ...display.metered import MeteredDisplay
 from ...metrics.base import gaussian_blur
@@ -21,24 +21,10 @@ from ..hil.approximator_loss import ApproximatorLoss
 from ..hil.networks import Network
 from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
 from ..learned.samples import Sample
-from ..learned.weights import start_at_zero
 from .start import LEAST_SHARE, Camera, CameraStart, allowed
 
 # Width [px] of the Gaussian that what the network misses of the captures is filtered with.
 SMOOTHING = 0.7
-
-
-class FromIdentity(nn.Module):
-    """An image and what a network adds to it: nothing at first, since Algorithm 1 begins with D = Id."""
-
-    def __init__(self, network: nn.Module) -> None:
-        super().__init__()
-        self.network = start_at_zero(network)
-
-    def forward(self, ideal: Tensor) -> Tensor:
-        """``(B, C, h, w)`` linear light to the same."""
-        added: Tensor = self.network(ideal)
-        return ideal + added
 
 
 @dataclass(frozen=True)
@@ -92,6 +78,7 @@ class OnlineCameraNetwork:
 
     camera: ClassVar[bool] = True
     privileged: ClassVar[bool] = False
+    version: ClassVar[int] = 2
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phases of least captured error.
@@ -141,8 +128,6 @@ class OnlineCameraNetwork:
         """An approximator that has seen nothing; D = Id."""
         seed = int(torch.randint(2**31, (), generator=draw))
         approximator = NetworkApproximator(bench.spec, self.network, self.loss, with_critic=False, seed=seed)
-        if self.network.name != "identity":
-            approximator.trainer.generator = FromIdentity(approximator.trainer.generator)
         return approximator.to(bench.device)
 
     def _noise(self, phase: Tensor, draw: torch.Generator) -> Tensor:

@@ -1,22 +1,20 @@
+"""The command prints what was fitted, what it gives and what was wanted."""
+
+from __future__ import annotations
+
 import pytest
 
-from holobench_eval.commands import calibrate as command
-from holobench_eval.commands.calibrate import UNMODULATED_RANGE, fit
-from holobench_eval.core import plugins
-from holobench_eval.display import load_profile
+from holobench_eval.commands.calibrate import calibrate
+from holobench_eval.study.calibration.fitting import Fitting
 
 
-def test_the_fit_comes_as_near_as_two_parameters_allow_and_is_printed(monkeypatch, capsys):
-    build = plugins.build
-    two = {"datasets": {"count": 2}, "methods": {}}
-    monkeypatch.setattr(plugins, "build", lambda kind, name, params: build(kind, name, two[kind] | params))
-    monkeypatch.setattr(command, "PUBLISHED", {"double_phase": 12.0, "wirtinger": 14.0})
-    found = fit(load_profile("leto-mild"), (128, 128), 0)
-    assert UNMODULATED_RANGE[0] <= found.fraction <= UNMODULATED_RANGE[1]
-    assert found.psnr["wirtinger"] == pytest.approx(14.0, abs=1.5)
-
-    monkeypatch.setattr(command, "fit", lambda *_: found)
-    command.calibrate("leto-mild")
+def test_figures_and_values_are_printed_beside_what_was_wanted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Fitting, "fit", lambda _: ({"stray_light.share": 0.512}, 25.04))
+    monkeypatch.setattr(Fitting, "captured", lambda _, values: {"double_phase": 15.3, "wirtinger": 17.5})
+    calibrate("leto-2020")
     out = capsys.readouterr().out
-    assert f"zero_order: {{fraction: {found.fraction}, phase: {found.phase}}}" in out
-    assert "wanted 14.00" in out
+    assert "double_phase   15.30 dB   wanted 15.24" in out
+    assert "network        25.04 dB   wanted 25.10" in out
+    assert "stray_light.share: 0.512" in out

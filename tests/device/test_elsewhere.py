@@ -18,10 +18,10 @@ from holobench_eval.display import CalibratedBench, load_profile
 from holobench_eval.display.learned import LearnedBench
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.training import TrainingBench, TrainingImage
-from holobench_eval.methods.calibrated.method import ThroughModel
 from holobench_eval.methods.fiducials import fiducial_phases
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.networks import Network
+from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
@@ -162,7 +162,8 @@ def test_iterations_to_be_recorded_run_where_their_target_is(ideal: CalibratedBe
 
 
 TRAINED: dict[str, dict[str, Any]] = {
-    "hil": STEPS | {"network": SMALL | {"dropout": True}, "training": SHORT, "offsets": 2},
+    "hil": STEPS | {"network": SMALL | {"dropout": True}, "training": SHORT, "fallback": True},
+    "hil_tuned": STEPS | {"network": SMALL, "training": SHORT, "offsets": 2},
     "hil_nh3d": STEPS | {"network": {"name": "unet", "levels": 2, "width": 4}, "training": SHORT | {"rounds": 1}},
     "hil_plus": STEPS | {"network": SMALL, "training": SHORT, "search": {"iterations": 1}},
     "parametric_model": STEPS | {"training": SHORT, "patterns": 1, "search": {"iterations": 1}},
@@ -193,7 +194,7 @@ class Memory:
 def test_a_method_learns_resumes_and_solves_where_its_images_are(
     ideal: CalibratedBench, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ThroughModel, "NOMINAL", Wirtinger(iterations=1))
+    monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=1))
     method, memory = plugins.build("methods", name, TRAINED[name], Path()), Memory()
     with Elsewhere():
         images = [TrainingImage(f"image {number}", picture(ideal)) for number in range(2)]

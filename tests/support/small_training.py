@@ -26,6 +26,12 @@ _START = {"converged": {"iterations": 20, "offset": "none"}, "early": _EARLY}
 ROUNDS = {"rounds": 2, "refine_images": 1, "steps": 5, "refine_steps": 3}
 _SMALL = {"levels": 2, "width": 4}
 _CALIBRATED = {"training": ROUNDS, "search": {"iterations": 2}, "retrieval": {"iterations": 3}, "start": _EARLY}
+_HIL = {
+    "network": _SMALL,
+    "training": ROUNDS,
+    # a network of so few steps hides the phase, whose gradient would be rounding
+    "retrieval": {"iterations": 0, "perceptual": 0, "ms_ssim": 0},
+}
 QUICK: dict[str, dict[str, Any]] = {
     **{key: {"iterations": 6} for key in ("gerchberg_saxton", "hio")},
     **dict.fromkeys(("wirtinger", "sgd", "multi_plane"), _EARLY),
@@ -35,14 +41,8 @@ QUICK: dict[str, dict[str, Any]] = {
     "oracle": {"iterations": 4, "start_iterations": 40},
     "online_camera": {"captures": 24, "start": _START},
     "online_camera_network": {"captures": 24, "start": _START, "steps": 3, "network": _SMALL},
-    "hil": {
-        "network": _SMALL,
-        "training": ROUNDS,
-        # a network of so few steps hides the phase, whose gradient would be rounding
-        "retrieval": {"iterations": 0, "perceptual": 0, "ms_ssim": 0},
-        "offsets": 2,
-        "start": {"offset": "none"},
-    },
+    "hil": {**_HIL, "start": _EARLY},
+    "hil_tuned": {**_HIL, "offsets": 2, "start": {"offset": "none"}},
     "hil_nh3d": {
         "network": {**_SMALL, "name": "unet"},
         "training": ROUNDS,

@@ -169,15 +169,7 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     UserError
         There is no such profile, or its file has a fault, with file:line:column.
     """
-    if name.endswith((".yaml", ".yml")):
-        candidates = [Path(name)] if folder is None else [folder / name, Path(name)]
-        path = next((path for path in candidates if path.is_file()), None)
-        if path is None:
-            raise UserError(f"profile '{name}': no such file: {candidates[0]}")
-    elif name in names():
-        path = Path(str(files(__package__) / "profiles" / f"{name}.yaml"))
-    else:
-        raise UserError(f"unknown profile '{name}'; {suggest(name, names())}, or a path to a .yaml file")
+    path = profile_file(name, folder)
     document = load(path)
     profile = typed(document, Profile)
     if profile.lut.table and len(profile.lut.table) != 2**profile.panel.bits:
@@ -189,3 +181,16 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
         message = f"there are {spectra} measured spectra; the panel has {colours} wavelengths"
         raise document.error(("spectrum", "measured"), message)
     return replace(profile, digest=hashlib.sha256(document.text.encode()).hexdigest())
+
+
+def profile_file(name: str, folder: Path | None = None) -> Path:
+    """The file of a profile; arguments and errors as of ``load_profile``."""
+    if name.endswith((".yaml", ".yml")):
+        candidates = [Path(name)] if folder is None else [folder / name, Path(name)]
+        path = next((path for path in candidates if path.is_file()), None)
+        if path is None:
+            raise UserError(f"profile '{name}': no such file: {candidates[0]}")
+        return path
+    if name not in names():
+        raise UserError(f"unknown profile '{name}'; {suggest(name, names())}, or a path to a .yaml file")
+    return Path(str(files(__package__) / "profiles" / f"{name}.yaml"))

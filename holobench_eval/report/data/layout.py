@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ...core import plugins
 from ...display.simulated.changes import draws
@@ -61,7 +62,8 @@ class Layout:
     holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
     stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
     that is a trained network (None: benches).
-    trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained).
+    trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained);
+    identities: labels of those whose network is the ideal image itself, which has nothing to learn.
     camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
     of others. real: whether the display exists. metrics: names of those the study wants (None: all).
     """
@@ -83,6 +85,7 @@ class Layout:
     learned_display: str | None = None
     trained: frozenset[str] = frozenset()
     training: TrainingSet | None = None
+    identities: frozenset[str] = frozenset()
     camera: frozenset[str] = frozenset()
     sweeps: tuple[Swept, ...] = ()
     planes: Mapping[str, tuple[str, float]] = field(default_factory=dict)
@@ -176,6 +179,7 @@ def layout_of(study: Study) -> Layout:
         holograms=f"{probe.name} ({plain(probe.params)})" if study.measure == "prediction" else "",
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,
+        identities=frozenset(entry.label for entry in study.methods if _network(entry.params) == "identity"),
         training=_training_set(study) if trained or study.display.learned else None,
         camera=labels_with("camera"),
         sweeps=tuple(_sweeps(study, conditions)),
@@ -183,6 +187,12 @@ def layout_of(study: Study) -> Layout:
         real=study.display.real,
         stacked=labels_with("planes") if study.measure == "focus" else frozenset(),
     )
+
+
+def _network(params: Mapping[str, Any]) -> str:
+    """The name of a method's network, empty where it has none."""
+    network = params.get("network")
+    return str(network["name"]) if isinstance(network, Mapping) and "name" in network else ""
 
 
 def _sweeps(study: Study, conditions: Mapping[str, Condition]) -> Iterator[Swept]:

@@ -28,6 +28,8 @@ LEARNED_COLUMN = "learned_sha256"
 TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)  # of studies that train a method
 MEMORY_COLUMN = "memory_mib"  # of studies that measured the memory of a solution
 STOPPED_COLUMN = "stopped"  # of studies in which the display stopped a method
+FELL_BACK_COLUMN = "fell_back"  # of studies in which a trained method fell back to Wirtinger holography
+NOTE_COLUMNS = (STOPPED_COLUMN, FELL_BACK_COLUMN)
 # Reports of earlier versions lack these two, and the columns that are computed from them. Alone: 1 where nothing else
 # was at work beside a solution, else 0.
 ALONE_COLUMN = "timed_alone"
@@ -37,7 +39,7 @@ IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol"
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
 _REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
-_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, ALONE_COLUMN, STOPPED_COLUMN, CATEGORY_COLUMN}
+_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, ALONE_COLUMN, *NOTE_COLUMNS, CATEGORY_COLUMN}
 DONE = "done"
 
 
@@ -60,6 +62,7 @@ def _row(record: Mapping[str, Any], identity: str, layout: Layout) -> dict[str, 
         "state": record["state"],
         "reason": _one_line(record.get("reason", "")),
         STOPPED_COLUMN: _one_line(record.get("stopped", "")),
+        FELL_BACK_COLUMN: "yes" if (record.get("learned") or {}).get("fell_back") else "",
         CATEGORY_COLUMN: "" if cell["condition"] == REFERENCE else layout.category(record["label"]),
         "cell": identity,
         **{key: cell.get(key, "") for key in IDENTITY_COLUMNS[1:]},
@@ -105,8 +108,8 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
     known = [column for column in (MEMORY_COLUMN, ALONE_COLUMN) if frame[column].notna().any()]
     measured = [*MEASURED_COLUMNS, *known]
     training = TRAINING_COLUMNS if layout.trained else ()
-    stopped = [STOPPED_COLUMN] if frame[STOPPED_COLUMN].any() else []
-    order = [*columns, *scores, *measured, *training, *stopped, CATEGORY_COLUMN, *IDENTITY_COLUMNS]
+    notes = [column for column in NOTE_COLUMNS if frame[column].any()]
+    order = [*columns, *scores, *measured, *training, *notes, CATEGORY_COLUMN, *IDENTITY_COLUMNS]
     frame = frame.reindex(columns=order)
     return _sorted(frame, layout)
 
@@ -228,7 +231,7 @@ def read_records(text: str) -> pd.DataFrame:
         raise UserError(
             f"records.csv lacks the columns {', '.join(sorted(lacking))}; it was written by another version"
         )
-    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, STOPPED_COLUMN, CATEGORY_COLUMN}
+    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, *NOTE_COLUMNS, CATEGORY_COLUMN}
     for column in frame.columns:
         if column not in text_columns:
             try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..data.marks import marked
 from ..data.results import Results
 from ..data.statistics import Array, bootstrap_mean
 from ..data.text import number, words
@@ -40,7 +41,7 @@ def by_plane(results: Results, condition: str) -> Markdown:
         seconds = float(results.row(name, condition)["seconds"])
         rows.append(
             [
-                results.layout.marked(name),
+                marked(results, name, condition),
                 "all planes" if stacked else "one plane",
                 *map(score.estimate, estimates),
                 score.number(float(np.mean(values))),

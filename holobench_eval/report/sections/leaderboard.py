@@ -10,6 +10,7 @@ import numpy as np
 
 from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
 from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
+from ..data.marks import marked
 from ..data.results import Results
 from ..data.tables import DONE, MEMORY_COLUMN, total_captures
 from ..data.text import number, words
@@ -56,7 +57,7 @@ def leaderboard(results: Results, condition: str) -> Markdown | None:
             [
                 results.layout.category(name),
                 "–" if np.isnan(row["rank"]) else f"{row['rank']:.0f}",
-                results.layout.marked(name),
+                marked(results, name, condition),
                 f"{row['n']:.0f} of {len(results.targets)}",
                 results.headline.in_row(row),
                 *([_percent(closed[name])] if gap else []),

@@ -115,7 +115,10 @@ def refuse_saturated(capture: RectifiedCapture) -> None:
 
 def account(learned: Artifact | None) -> dict[str, Any] | None:
     """The entries of a record about the training of its method."""
-    return None if learned is None else {key: learned.provenance[key] for key in ("sha256", "captures", "seconds")}
+    if learned is None:
+        return None
+    spent = {key: learned.provenance[key] for key in ("sha256", "captures", "seconds")}
+    return {**spent, "fell_back": True} if learned.state.get("fell_back") else spent
 
 
 def keep_pictures(job: Job, cell: Cell, image: Tensor, wanted: Tensor, phase: Tensor) -> None:

@@ -3,7 +3,7 @@ and plain Wirtinger holography on a display that has nothing to correct."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, cast
 
@@ -21,6 +21,7 @@ from holobench_eval.methods.calibrated.hybrid import HybridModel
 from holobench_eval.methods.calibrated.kernel import LearnedKernel
 from holobench_eval.methods.calibrated.method import Calibrated, LargeSteps, SearchRetrieval
 from holobench_eval.methods.calibrated.parametric import ParametricModel
+from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.retrieval import Image
 from holobench_eval.methods.learned.samples import Schedule
 from holobench_eval.methods.wirtinger import Wirtinger
@@ -59,17 +60,9 @@ def train(method: Calibrated, seed: int = 3) -> Mapping[str, Any]:
     return through_a_file(dict(method.prepare(training_bench(SPEC, Memory(), images=2, seed=seed))))
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _quick_way_back() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Calibrated, "NOMINAL", Wirtinger(iterations=2))
-        yield
-
-
 @pytest.fixture(scope="module")
 def learned() -> dict[str, Mapping[str, Any]]:
-    """As trained, but for the way back: so few steps teach nothing that would be kept."""
-    return {name: {**train(method), "nominal": 0} for name, method in METHODS.items()}
+    return {name: train(method) for name, method in METHODS.items()}
 
 
 @names
@@ -202,6 +195,7 @@ LEARNS: dict[str, Any] = {
     "retrieval": LargeSteps(iterations=60),
     "search": SearchRetrieval(iterations=5),
     "patterns": 4,
+    "fallback": True,
 }
 
 
@@ -211,22 +205,19 @@ def calibrated_on(display: BentDisplay, method: Calibrated) -> Mapping[str, Any]
 
 
 @pytest.mark.parametrize("method", [ParametricModel(**LEARNS), LearnedKernel(**LEARNS)])
-def test_a_display_without_faults_is_left_to_wirtinger_holography(
-    method: Calibrated, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Calibrated, "NOMINAL", Wirtinger())
+def test_a_display_without_faults_is_left_to_wirtinger_holography_where_the_switch_is_on(method: Calibrated) -> None:
+    assert calibrated_on(PlainDisplay(ONE), replace(method, fallback=False))["fell_back"] == 0
     learned = calibrated_on(PlainDisplay(ONE), method)
-    assert learned["nominal"] == 1
+    assert learned["fell_back"] == 1
     target = pictures(ONE, first=30)
     bench = solving_bench(method, target[0], ONE, learned)
     assert torch.equal(method.solve(target, bench), Wirtinger().solve(target, bench))
 
 
-def test_a_display_with_faults_is_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Calibrated, "NOMINAL", Wirtinger())
+def test_a_display_with_faults_is_corrected() -> None:
     method = ParametricModel(**LEARNS | {"training": Schedule(1, steps=120)})
     learned = calibrated_on(BentDisplay(ONE), method)
-    assert learned["nominal"] == 0
+    assert learned["fell_back"] == 0
     (target,) = pictures(ONE, first=30)
     bench, display = solving_bench(method, target, ONE, learned), BentDisplay(ONE)
     errors = []
@@ -237,12 +228,13 @@ def test_a_display_with_faults_is_corrected(monkeypatch: pytest.MonkeyPatch) -> 
     assert errors[0] < errors[1] / 5
 
 
-def test_the_way_back_is_taken_by_the_mean_over_the_held_out_images(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fallback_is_taken_by_the_mean_over_the_held_out_images(monkeypatch: pytest.MonkeyPatch) -> None:
     scores = iter([20.0, 25.0, 21.0, 23.0, 20.0, 21.0, 22.0, 20.0])
-    monkeypatch.setattr(shared, "matched_psnr", lambda shown, target: next(scores))
+    monkeypatch.setattr(fallback, "matched_psnr", lambda shown, target: next(scores))
+    method = replace(METHODS["parametric_model"], fallback=True)
     for expected in (0, 1):
         bench = training_bench(SPEC, Memory(), images=2, held_out=2)
-        assert METHODS["parametric_model"].prepare(bench)["nominal"] == expected
+        assert method.prepare(bench)["fell_back"] == expected
 
 
 @names

@@ -16,6 +16,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.methods.hil import perceptual
 from holobench_eval.methods.hil.approximator_loss import (
     ApproximatorLoss,
+    LearningRates,
     adversarial_loss,
     feature_matching_loss,
     published_loss,
@@ -159,10 +160,31 @@ def test_an_unconditional_discriminator_ignores_the_ideal_image() -> None:
 def test_each_optimiser_moves_its_own_network_by_at_most_the_published_rate() -> None:
     training = small()
     before = weights(training)
+
+    def moved() -> list[float]:
+        return [float((a - b).abs().max()) for a, b in zip(weights(training), before, strict=True)]
+
     training.step(*pair())
-    moved = [float((a - b).abs().max()) for a, b in zip(weights(training), before, strict=True)]
-    assert min(moved) > 0
-    assert max(moved) == pytest.approx(2e-4, rel=0.01)  # Adam's first step
+    assert max(moved()) == pytest.approx(2e-4, rel=0.01)  # Adam's first step
+    training.step(*pair())  # the generator's other layers follow the last one, which is zero at first
+    assert min(moved()) > 0
+
+
+def test_the_generators_rate_falls_along_half_a_cosine_and_the_discriminators_stays() -> None:
+    rates = LearningRates(generator=1e-3, decay=True)
+    training = trainer(Network(levels=2, width=4), None, 3, 3, 0, rates)
+
+    def step(progress: float) -> list[float]:
+        before = weights(training)
+        training.step(*pair(), progress)
+        moved = [float((a - b).abs().max()) for a, b in zip(weights(training), before, strict=True)]
+        split = len(list(training.generator.parameters()))
+        return [max(moved[:split]), max(moved[split:])]
+
+    assert step(0.0) == pytest.approx([1e-3, 2e-4], rel=0.01)
+    generator, discriminator = step(1.0)
+    assert generator == 0
+    assert discriminator > 1e-4
 
 
 def test_the_generators_step_leaves_no_gradient_in_the_discriminator() -> None:

@@ -77,14 +77,14 @@ def test_pix2pixhd_has_nine_residual_blocks_at_a_sixteenth_of_the_size() -> None
 
 
 @pytest.mark.parametrize("name", ["pix2pix", "pix2pixhd"])
-def test_a_tanh_keeps_the_prediction_between_zero_and_two(name: str) -> None:
+def test_a_tanh_keeps_the_change_between_minus_one_and_one(name: str) -> None:
     torch.manual_seed(0)
     module = SMALL[name]()
     for parameter in module.parameters():
         parameter.data *= 30
-    predicted = module(picture()).detach()
-    assert 0 <= float(predicted.min()) < 0.1
-    assert 1.9 < float(predicted.max()) <= 2
+    change = module(picture()).detach()
+    assert -1 <= float(change.min()) < -0.9
+    assert 0.9 < float(change.max()) <= 1
 
 
 def test_pix2pix_is_a_function_of_its_input_once_it_is_trained() -> None:

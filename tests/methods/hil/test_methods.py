@@ -19,8 +19,11 @@ from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.hil.tuned import HILTuned
+from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval
 from holobench_eval.methods.learned.samples import Schedule
+from holobench_eval.methods.wirtinger import Wirtinger
 from tests.support.small_training import (
     Memory,
     pictures,
@@ -39,7 +42,8 @@ SHORT: dict[str, Any] = {
 PLAIN = PhaseRetrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0)
 SMALL = Network(levels=2, width=4)
 METHODS: dict[str, Any] = {
-    "hil": HIL(SMALL, ApproximatorLoss(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), offsets=2, **SHORT),
+    "hil": HIL(SMALL, ApproximatorLoss(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), **SHORT),
+    "hil_tuned": HILTuned(SMALL, ApproximatorLoss(l1=1.0, perceptual=0.0), retrieval=PLAIN, offsets=2, **SHORT),
     "hil_nh3d": HILNH3D(Network("unet", levels=2, width=4), retrieval=PLAIN, **SHORT),
     "hil_plus": HILPlus(network=SMALL, retrieval=PLAIN, **SHORT),
 }
@@ -54,13 +58,7 @@ def train(method: Any, seed: int = 3) -> Mapping[str, Any]:
 
 @pytest.fixture(scope="module")
 def learned() -> dict[str, Mapping[str, Any]]:
-    return {name: taught(method) for name, method in METHODS.items()}
-
-
-def taught(method: Any, **given: Any) -> dict[str, Any]:
-    """What a training gives, without the way back of ``hil_plus``, which a display that is nearly ideal would take."""
-    found = dict(train(method, **given))
-    return {**found, "nominal": 0} if "nominal" in found else found
+    return {name: train(method) for name, method in METHODS.items()}
 
 
 @names
@@ -107,7 +105,7 @@ def test_retrieval_moves_the_phase(name: str, learned: dict[str, Mapping[str, An
 def test_a_prediction_is_what_retrieval_saw(
     name: str, learned: dict[str, Mapping[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = importlib.import_module(type(METHODS[name]).solve.__module__)
+    module = importlib.import_module((HIL if name == "hil_tuned" else type(METHODS[name])).solve.__module__)
     retrieve, seen = module.retrieve, []
 
     def watched(display: Image, target: Tensor, start: Tensor, *settings: Any) -> Tensor:
@@ -129,9 +127,9 @@ def test_a_prediction_is_what_retrieval_saw(
 @names
 def test_training_is_decided_by_the_seeds_alone(name: str, learned: dict[str, Mapping[str, Any]]) -> None:
     torch.manual_seed(8)
-    assert same(taught(METHODS[name]), learned[name])
-    assert not same(taught(replace(METHODS[name], seed=1)), learned[name])
-    assert not same(taught(METHODS[name], seed=4), learned[name])
+    assert same(train(METHODS[name]), learned[name])
+    assert not same(train(replace(METHODS[name], seed=1)), learned[name])
+    assert not same(train(METHODS[name], seed=4), learned[name])
 
 
 @names
@@ -160,7 +158,8 @@ def test_a_trained_method_says_so_and_has_neither_camera_nor_privilege(name: str
     ("name", "params", "word"),
     [
         ("hil", {"network": {"name": "unett"}}, "network"),
-        ("hil", {"offsets": 0}, "offsets"),
+        ("hil_tuned", {"offsets": 0}, "offsets"),
+        ("hil", {"rates": {"generator": 0}}, "generator"),
         ("hil", {"training": {"rounds": 0}}, "rounds"),
         ("hil", {"retrieval": {"l2": -1}}, "l2"),
         ("hil_plus", {"with_network": True}, "with_network"),
@@ -182,7 +181,7 @@ def test_a_method_keeps_its_own_defaults_for_parameters_that_are_not_given() -> 
 def test_the_constant_phase_is_the_one_whose_captures_are_closest(learned: dict[str, Mapping[str, Any]]) -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory, images=2)
-    method = replace(METHODS["hil"], offsets=4, training=Schedule(1, steps=1))
+    method = replace(METHODS["hil_tuned"], offsets=4, training=Schedule(1, steps=1))
     offset = method.prepare(bench)["offset"]
     kept = memory.load("offset")
     assert kept is not None
@@ -195,6 +194,33 @@ def test_the_constant_phase_is_the_one_whose_captures_are_closest(learned: dict[
 
 def test_one_constant_phase_needs_no_capture() -> None:
     bench = training_bench(SPEC, Memory(), images=2)
-    method = replace(METHODS["hil"], offsets=1, training=Schedule(1, steps=1))
+    method = replace(METHODS["hil_tuned"], offsets=1, training=Schedule(1, steps=1))
     assert method.prepare(bench)["offset"] == 0
     assert bench.captures == 2 + 1
+
+
+def test_hil_starts_at_plain_wirtinger_holography_and_takes_no_capture_beside_those_of_its_rounds() -> None:
+    """As published; the baseline runs Wirtinger holography to convergence, and so does hil."""
+    assert plugins.build("methods", "hil", {}).start == plugins.build("methods", "wirtinger", {})
+    bench = training_bench(SPEC, Memory(), images=2)
+    learned = replace(METHODS["hil"], training=Schedule(1, steps=1)).prepare(bench)
+    assert bench.captures == 2 + 1
+    assert "offset" not in learned
+
+
+@names
+def test_the_fallback_is_taken_where_wirtinger_holograms_are_captured_closer_and_counts_its_captures(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    method = replace(METHODS[name], fallback=True, retrieval=replace(METHODS[name].retrieval, iterations=0))
+    worse = replace(method, start=SmoothStart(iterations=1))  # nothing of a picture yet
+    (target,) = pictures(SPEC, first=20)
+    benches = [training_bench(SPEC, Memory(), images=2) for _ in range(2)]
+    off = dict(replace(worse, fallback=False).prepare(benches[0]))
+    on = dict(worse.prepare(benches[1]))
+    assert (off["fell_back"], on["fell_back"]) == (0, 1)
+    assert benches[1].captures == benches[0].captures + 2  # one held-out image by either
+    phase = worse.solve(target[None], solving_bench(worse, target, SPEC, on))
+    assert torch.equal(phase, Wirtinger().solve(target[None], solving_bench(worse, target, SPEC, on)))
+    monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=1))
+    assert not method.prepare(training_bench(SPEC, Memory(), images=2))["fell_back"]

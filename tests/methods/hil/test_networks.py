@@ -8,13 +8,14 @@ from typing import Any
 import pytest
 import torch
 from pydantic import TypeAdapter, ValidationError
-from torch import nn
+from torch import Tensor, nn
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.methods.hil.baselines import Identity, Pix2PixHD, UNet
 from holobench_eval.methods.hil.discriminator import MultiScaleDiscriminator, PatchDiscriminator
 from holobench_eval.methods.hil.generator import Generator
-from holobench_eval.methods.hil.networks import Network
+from holobench_eval.methods.hil.networks import FromIdentity, Network
+from tests.support.toy_camera import picture
 
 NAMES = ("proposed", "unet", "pix2pix", "pix2pixhd", "identity")
 
@@ -124,3 +125,41 @@ def test_weights_lie_channels_last() -> None:
     assert all(
         value.is_contiguous(memory_format=torch.channels_last) for value in generator.parameters() if value.ndim == 4
     )
+
+
+class Constant(nn.Module):
+    """A network that gives one value everywhere."""
+
+    def __init__(self, value: float) -> None:
+        super().__init__()
+        self.last = nn.Conv2d(1, 1, 1)
+        self.value = value
+
+    def forward(self, ideal: Tensor) -> Tensor:
+        return self.last(ideal) + self.value
+
+
+def test_a_fresh_network_is_the_identity_and_learns() -> None:
+    image = picture()[None]
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        network = FromIdentity(Network(levels=2, width=4).generator(2, 2))
+    assert torch.equal(network(image), image)
+    optimiser = torch.optim.Adam(network.parameters(), lr=1e-2)
+    losses = []
+    for _ in range(60):
+        losses.append((network(image) - (1 - image)).abs().mean())
+        optimiser.zero_grad()
+        losses[-1].backward()
+        optimiser.step()
+    assert losses[-1] < 0.5 * losses[0]
+
+
+def test_a_prediction_is_never_negative_and_has_a_gradient_where_it_is_cut() -> None:
+    ideal = torch.linspace(0, 1, 16).reshape(1, 1, 4, 4).requires_grad_()
+    light = FromIdentity(Constant(-0.5))(ideal)
+    assert torch.equal(light, (ideal - 0.5).clamp_min(0))
+    assert float((light == 0).float().mean()) == 0.5
+    light.sum().backward()
+    assert ideal.grad is not None
+    assert torch.equal(ideal.grad, torch.ones_like(ideal))

@@ -78,4 +78,4 @@ def test_tolerance_zero_is_wirtinger_holography(bench: MeteredDisplay) -> None:
 @pytest.mark.parametrize("other", [{"optimiser": "lbfgs"}, {"loss": "amplitude_l2"}])
 def test_a_tolerance_that_would_not_be_heeded_is_refused(other: dict[str, str]) -> None:
     with pytest.raises(UserError, match="set it to 0"):
-        plugins.build("methods", "hil", {"start": {"tolerance": 0.1, **other}})
+        plugins.build("methods", "hil_tuned", {"start": {"tolerance": 0.1, **other}})

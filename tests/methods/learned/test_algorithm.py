@@ -18,6 +18,7 @@ from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.hil.tuned import HILTuned
 from holobench_eval.methods.learned import checkpoint
 from holobench_eval.methods.learned.algorithm import train
 from holobench_eval.methods.learned.checkpoint import Checkpoint
@@ -338,7 +339,8 @@ SHORT: dict[str, Any] = {
 }
 JUDGED = PhaseRetrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.1)
 METHODS: dict[str, Any] = {
-    "hil": HIL(**{**SHORT, "retrieval": JUDGED}, loss=ApproximatorLoss(perceptual=0.0), offsets=2),
+    "hil": HIL(**{**SHORT, "retrieval": JUDGED}, loss=ApproximatorLoss(perceptual=0.0), fallback=True),
+    "hil_tuned": HILTuned(**SHORT, offsets=2),
     "hil_nh3d": HILNH3D(**{**SHORT, "network": Network("unet", levels=2, width=4)}),
     "hil_plus": HILPlus(**SHORT),
 }

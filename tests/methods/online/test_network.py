@@ -3,7 +3,7 @@ import torch
 
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.learned.samples import Sample
-from holobench_eval.methods.online.network import FromIdentity, OnlineCameraNetwork, ShortRetrieval, corrected
+from holobench_eval.methods.online.network import OnlineCameraNetwork, ShortRetrieval, corrected
 from holobench_eval.methods.online.start import CameraStart
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.testing.contract import check_method
@@ -55,22 +55,6 @@ def test_a_display_that_ends_the_captures_has_a_hologram_as_good_as_the_nominal_
     with pytest.raises(Exception, match="plug pulled"):
         method.solve(target[None], plug)
     assert (display.error(plug.kept, target) <= display.error(nominal(display, target), target)).all()
-
-
-def test_a_fresh_network_is_the_identity_and_learns():
-    image, wanted = picture()[None], 1 - picture()[None]
-    with torch.random.fork_rng():
-        torch.manual_seed(0)
-        network = FromIdentity(TINY.generator(2, 2))
-    assert torch.equal(network(image), image)
-    optimiser = torch.optim.Adam(network.parameters(), lr=1e-2)
-    losses = []
-    for _ in range(60):
-        losses.append((network(image) - wanted).abs().mean())
-        optimiser.zero_grad()
-        losses[-1].backward()
-        optimiser.step()
-    assert losses[-1] < 0.5 * losses[0]
 
 
 def test_what_the_prediction_misses_of_the_captures_is_added_to_it():

@@ -1,0 +1,61 @@
+"""What ``holoeval calibrate`` fits of a profile and to what: a YAML file in this folder, named after the profile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+
+from annotated_types import MinLen
+
+from ...core.errors import UserError, suggest
+from ...core.schema import typed
+from ...core.yaml_source import load
+from ..definition import Targets
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """How well a network predicts captures from their ideal intensity.
+
+    psnr: mean [dB]; parameter: the free one that decides it; study: a study with the measure ``prediction`` and one
+    method, without display and targets, which are those of the calibration.
+    """
+
+    psnr: float
+    parameter: str
+    study: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What is fitted and to what.
+
+    panel: rows and columns [px]; seed: of patterns and noise; targets: the images; figures: PSNR [dB] of captures in
+    linear light, by method; free: the range of every free parameter, ``stage.key`` of the profile.
+    """
+
+    panel: tuple[int, int]
+    seed: int
+    targets: Targets
+    figures: Annotated[Mapping[str, float], MinLen(1)]
+    free: Annotated[Mapping[str, tuple[float, float]], MinLen(1)]
+    prediction: Prediction | None = None
+
+
+def names() -> list[str]:
+    """Profiles that have a calibration."""
+    return sorted(entry.name.removesuffix(".yaml") for entry in _folder().iterdir() if entry.name.endswith(".yaml"))
+
+
+def load_calibration(profile: str) -> Calibration:
+    """The calibration of a profile. UserError: it has none."""
+    if profile not in names():
+        raise UserError(f"profile '{profile}' is not fitted to anything; {suggest(profile, names())}")
+    return typed(load(_folder() / f"{profile}.yaml"), Calibration)
+
+
+def _folder() -> Path:
+    return Path(str(files(__package__)))

@@ -1,0 +1,193 @@
+"""The fit of a profile's free parameters to published figures; what other methods then score is a prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from statistics import fmean
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import torch
+import yaml
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from torch import Tensor
+
+from ...core import plugins
+from ...core.errors import UserError
+from ...core.io import write_png
+from ...core.yaml_source import load
+from ...display import CalibratedBench, Profile
+from ...display.simulated.pipeline import SimulatedBench
+from ...display.simulated.profile import profile_file
+from ...metrics import match, score
+from ...optics import srgb_encode
+from ..config import load_study
+from ..executors import Serial
+from ..opening import open_bench
+from ..plan import plan
+from ..run import Watch, run
+from . import Calibration
+
+Values = Mapping[str, float]
+
+EVALUATIONS = 10  # of the figures, at most, beside those for slopes
+STEP = 0.03  # for slopes, in units of a parameter's range and its place in it
+TRAININGS, NEAR = 4, 0.25  # of the network, at most; error of its figure [dB] that is small enough
+
+
+def with_values(profile: Profile, values: Values) -> Profile:
+    """A profile with other values of some parameters. UserError: it has no such parameter."""
+    for name, value in values.items():
+        stage, _, key = name.partition(".")
+        if not hasattr(getattr(profile, stage, None), key):
+            raise UserError(f"profile '{profile.name}' has no parameter '{name}'")
+        profile = replace(profile, **{stage: replace(getattr(profile, stage), **{key: value})})
+    return profile
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """The fit of one profile that comes with the package. watch: of trainings; tell: called with a line a trial."""
+
+    profile: Profile
+    calibration: Calibration
+    watch: Watch
+    tell: Callable[[str], object]
+
+    def fit(self) -> tuple[dict[str, float], float | None]:
+        """Values of all free parameters, three digits after the point, and the PSNR [dB] of the network with them."""
+        wanted = self.calibration.prediction
+        if wanted is None:
+            return self._fit_figures({}), None
+        low, high = self.calibration.free[wanted.parameter]
+        trials: list[tuple[float, float, dict[str, float]]] = []  # value, error of the prediction, all values
+        value = float(np.clip(self._own(wanted.parameter), low, high))
+        for _ in range(TRAININGS):
+            values = self._fit_figures({wanted.parameter: round(value, 3)})
+            error = self.predicted(values) - wanted.psnr
+            self.tell(f"{_listed(values)}: network {error + wanted.psnr:.2f} dB")
+            trials.append((value, error, values))
+            if abs(error) < NEAR:
+                break
+            if len(trials) == 1:
+                value += (high - low) / 10 * (1 if error < 0 else -1)
+            else:
+                (a, at_a, _), (b, at_b, _) = sorted(trials, key=lambda trial: abs(trial[1]))[:2]
+                value = b if at_a == at_b else a - at_a * (b - a) / (at_b - at_a)
+            value = float(np.clip(value, low, high))
+        _, error, values = min(trials, key=lambda trial: abs(trial[1]))
+        return values, wanted.psnr + error
+
+    def captured(self, values: Values) -> dict[str, float]:
+        """Mean PSNR [dB] of real captures of each method, registered, with these values."""
+        bench = open_bench(with_values(self.profile, values), self.calibration.panel, self.calibration.seed)
+
+        def psnr(phase: Tensor, item: str) -> float:
+            image = bench.photograph(phase, self._targets[item], item, 0).image
+            return score(image, self._targets[item], metrics=("psnr",))["psnr_linear"]
+
+        return {
+            name: fmean(psnr(phase, item) for item, phase in phases.items()) for name, phases in self._holograms.items()
+        }
+
+    def predicted(self, values: Values) -> float:
+        """Mean PSNR [dB] of the network's predictions of captures with these values."""
+        wanted = self.calibration.prediction
+        assert wanted is not None
+        candidate = load(profile_file(self.profile.name)).data
+        for name, value in values.items():
+            stage, _, key = name.partition(".")
+            candidate[stage] = {**candidate.get(stage, {}), key: value}
+        with TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "targets").mkdir()
+            for item, target in self._targets.items():  # as pictures, since no study scores images for training
+                write_png(folder / "targets" / f"{item}.png", (255 * srgb_encode(target)).round(), 8)
+            document = {
+                "display": {"profiles": ["candidate.yaml"], "panel": list(self.calibration.panel)},
+                "targets": {"dataset": "folder", "params": {"path": str(folder / "targets")}},
+                **wanted.study,
+            }
+            _write_yaml(folder / "candidate.yaml", candidate)
+            _write_yaml(folder / "study.yaml", document)
+            study = load_study(folder / "study.yaml")
+            one = plan(study)
+            threads = torch.get_num_threads()
+            outcome = run(study, one, folder / "output", Serial(), self.watch, threads, folder / "artifacts")
+        records = [record for record in outcome.records if record["label"] == study.labels[0]]
+        for record in records:
+            if record["state"] != "done":
+                raise UserError(f"the network's study failed: {record['reason']}")
+        return fmean(record["scores"]["psnr_linear"] for record in records)
+
+    def _fit_figures(self, fixed: Values) -> dict[str, float]:
+        """Values of all free parameters that bring the captures nearest to their figures, some of them fixed."""
+        ranges = {name: ends for name, ends in self.calibration.free.items() if name not in fixed}
+
+        def values(places: NDArray[np.float64]) -> dict[str, float]:
+            ends = zip(ranges.items(), places, strict=True)
+            return {
+                **{name: round(float(low + (at - 1) * (high - low)), 3) for (name, (low, high)), at in ends},
+                **fixed,
+            }
+
+        def errors(places: NDArray[np.float64]) -> list[float]:
+            psnr = self._quick(values(places))
+            self.tell(f"{_listed(values(places))}: " + ", ".join(f"{name} {is_:.2f} dB" for name, is_ in psnr.items()))
+            return [psnr[name] - published for name, published in self.calibration.figures.items()]
+
+        own = [np.clip(1 + (self._own(name) - low) / (high - low), 1.05, 1.95) for name, (low, high) in ranges.items()]
+        found = least_squares(errors, own, bounds=(1.0, 2.0), diff_step=STEP, xtol=1e-2, max_nfev=EVALUATIONS)
+        return values(found.x)
+
+    def _own(self, name: str) -> float:
+        stage, _, key = name.partition(".")
+        return float(getattr(getattr(self.profile, stage), key))
+
+    def _quick(self, values: Values) -> dict[str, float]:
+        """Mean PSNR [dB] of each method without camera and registration, for the search."""
+        bench = SimulatedBench(with_values(self.profile, values).scaled(self.calibration.panel))
+
+        def psnr(phase: Tensor, target: Tensor) -> float:
+            image = match(bench.spec.region.crop(bench.image(phase)), target)[0]
+            return float(-10 * torch.log10((image - target).square().mean()))
+
+        with torch.no_grad():
+            return {
+                name: fmean(psnr(phase, self._targets[item]) for item, phase in phases.items())
+                for name, phases in self._holograms.items()
+            }
+
+    @cached_property
+    def _targets(self) -> dict[str, Tensor]:
+        given, shape = self.calibration.targets, self.profile.spec(self.calibration.panel).region.shape
+        dataset = plugins.build("datasets", given.dataset, given.params)
+        return {item: dataset.load(item, shape) for item in dataset.items()}
+
+    @cached_property
+    def _holograms(self) -> dict[str, dict[str, Tensor]]:
+        """Phases by method and image, solved once: no method knows the parameters that are fitted."""
+        bench = open_bench(self.profile, self.calibration.panel, self.calibration.seed)
+        return {
+            name: {item: _solved(name, bench, target, item) for item, target in self._targets.items()}
+            for name in self.calibration.figures
+        }
+
+
+def _solved(name: str, bench: CalibratedBench, target: Tensor, item: str) -> Tensor:
+    method = plugins.build("methods", name, {})
+    phase: Tensor = method.solve(target[None], bench.for_method(method, name, target, item, 0))[0]
+    return phase
+
+
+def _listed(values: Values) -> str:
+    return ", ".join(f"{name} {value:.3f}" for name, value in values.items())
+
+
+def _write_yaml(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(yaml.safe_dump(dict(content), sort_keys=False), encoding="utf-8")

@@ -1,0 +1,106 @@
+"""A profile's free parameters are fitted to published figures, within the ranges of their sources."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.display import load_profile
+from holobench_eval.study.calibration import Calibration, Prediction, load_calibration, names
+from holobench_eval.study.calibration.fitting import NEAR, TRAININGS, Fitting, with_values
+from holobench_eval.study.definition import Targets
+from holobench_eval.study.progress import Lines
+
+FREE = {"zero_order.fraction": (0.05, 0.35), "zero_order.phase": (-3.1, 3.1)}
+SMALL = Calibration(
+    (128, 128), 0, Targets("photographs", {"count": 2}), {"double_phase": 12.0, "wirtinger": 14.0}, FREE
+)
+
+
+def fitting(calibration: Calibration, lines: list[str] | None = None) -> Fitting:
+    return Fitting(
+        load_profile("leto-mild"), calibration, Lines(lambda line: None), ([] if lines is None else lines).append
+    )
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_shipped_profile_lies_within_the_ranges_of_its_calibration(name: str) -> None:
+    profile, calibration = load_profile(name), load_calibration(name)
+    for parameter, (low, high) in calibration.free.items():
+        stage, key = parameter.split(".")
+        assert low < getattr(getattr(profile, stage), key) < high
+    if calibration.prediction is not None:
+        assert calibration.prediction.parameter in calibration.free
+
+
+def test_the_fit_comes_as_near_as_two_parameters_allow_and_tells_its_trials() -> None:
+    lines: list[str] = []
+    fit = fitting(SMALL, lines)
+    values, network = fit.fit()
+    assert network is None
+    assert all(low <= values[name] <= high for name, (low, high) in FREE.items())
+    assert fit.captured(values)["wirtinger"] == pytest.approx(14.0, abs=1.5)
+    assert lines[0].startswith("zero_order.fraction 0.")
+    assert "wirtinger" in lines[0]
+
+
+def test_a_fit_of_one_parameter_finds_it_from_captures_that_were_made_with_it() -> None:
+    free = {"crosstalk.width": (0.1, 0.6)}
+    fit = fitting(replace(SMALL, free=free))
+    figures = fit._quick({"crosstalk.width": 0.4})
+    again = fitting(replace(SMALL, free=free, figures=figures))
+    assert again.fit()[0]["crosstalk.width"] == pytest.approx(0.4, abs=0.01)
+
+
+def test_the_parameter_of_a_prediction_is_found_in_few_trainings(monkeypatch: pytest.MonkeyPatch) -> None:
+    free = {"stray_light.share": (0.05, 0.7), "crosstalk.width": (0.1, 0.6)}
+    calibration = replace(SMALL, free=free, prediction=Prediction(25.0, "stray_light.share", {}))
+    asked: list[float] = []
+
+    def predicted(_: Fitting, values: Mapping[str, float]) -> float:
+        asked.append(values["stray_light.share"])
+        return 18 + 15 * values["stray_light.share"] ** 1.2
+
+    monkeypatch.setattr(Fitting, "predicted", predicted)
+    monkeypatch.setattr(Fitting, "_fit_figures", lambda _, fixed: {"crosstalk.width": 0.3, **fixed})
+    found, psnr = fitting(calibration).fit()
+    assert psnr == 18 + 15 * found["stray_light.share"] ** 1.2
+    assert abs(psnr - 25.0) < NEAR
+    assert len(asked) <= TRAININGS
+
+
+def test_a_network_is_trained_on_the_candidate_and_scored_on_its_captures() -> None:
+    study = {
+        "title": "small",
+        "measure": "prediction",
+        "holograms": {"name": "wirtinger", "params": {"iterations": 2}},
+        "training": {"dataset": "dead_leaves", "params": {"count": 2, "seed": 2}, "held_out": 1},
+        "methods": [
+            {
+                "name": "hil",
+                "params": {
+                    "start": {"iterations": 2},
+                    "offsets": 1,
+                    "training": {"rounds": 1, "steps": 1},
+                    "retrieval": {"iterations": 0, "ms_ssim": 0.0},
+                    "network": {"name": "identity"},
+                },
+            }
+        ],
+    }
+    calibration = replace(SMALL, prediction=Prediction(25.0, "stray_light.share", study))
+    clear, hazy = (fitting(calibration).predicted({"stray_light.share": share}) for share in (0.0, 0.6))
+    assert clear > hazy + 0.5
+
+
+def test_a_parameter_that_no_profile_has_is_refused() -> None:
+    with pytest.raises(UserError, match=r"has no parameter 'crosstalk.reach'"):
+        with_values(load_profile("ideal"), {"crosstalk.reach": 1.0})
+
+
+def test_a_profile_that_is_fitted_to_nothing_is_refused() -> None:
+    with pytest.raises(UserError, match="'ideal' is not fitted to anything"):
+        load_calibration("ideal")
