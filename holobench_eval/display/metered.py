@@ -114,7 +114,7 @@ class MeteredDisplay:
 
     @property
     def starts(self) -> tuple[Tensor, ...]:
-        """Phases ``(C, H, W)`` [rad] of other methods for this target, for privileged methods that follow them alone."""
+        """Phases ``(C, H, W)`` [rad] of other methods for this target; for a privileged method to start from."""
         if not self._privileged:
             raise CellError(f"{self._label}: only a method that declares privileged = True may see other holograms")
         return self._starts

@@ -55,10 +55,16 @@ class Resampling:
 
 
 def _weights(at: Tensor) -> Tensor:
-    """Weights ``(4, ...)`` of the pixels around places: Keys, IEEE Trans. ASSP 29(6), 1153 (1981), Eq. 4 with a = -3/4."""
+    """Weights ``(4, ...)`` of the pixels around places; Keys, IEEE Trans. ASSP 29(6), 1153 (1981), Eq. 4."""
     fraction = at - at.floor()
-    far, near = (CUBIC * (((d - 5) * d + 8) * d - 4) for d in (1 + fraction, 2 - fraction)), (
-        ((CUBIC + 2) * d - (CUBIC + 3)) * d * d + 1 for d in (fraction, 1 - fraction)
-    )
-    (before, after), (left, right) = far, near
-    return torch.stack([before, left, right, after])
+    return torch.stack([_far(1 + fraction), _near(fraction), _near(1 - fraction), _far(2 - fraction)])
+
+
+def _near(distance: Tensor) -> Tensor:
+    """The weight of a pixel at most one away."""
+    return ((CUBIC + 2) * distance - (CUBIC + 3)) * distance**2 + 1
+
+
+def _far(distance: Tensor) -> Tensor:
+    """The weight of a pixel one to two away."""
+    return CUBIC * (((distance - 5) * distance + 8) * distance - 4)

@@ -310,9 +310,9 @@ def queue(
     """Trainings first, since they take longest; then drawings and jobs, the longest first, a job as soon as it needs
     nothing of ``unready``; at the end, each by itself, the jobs that run alone, those that start from others last.
 
-    unready: ids of the preparations still to be trained and of the cells still to be computed; at_work: the steps that an executor took; expected: seconds
-    that a job takes by its label; a job of another label may take longer than all others. The caller changes all three
-    as results come. None: all remaining jobs wait for a step that is at work.
+    unready: ids of the preparations still to be trained and of the cells still to be computed; at_work: the steps that
+    an executor took; expected: seconds that a job takes by its label; a job of another label may take longer than all
+    others. The caller changes all three as results come. None: all remaining jobs wait for a step that is at work.
     """
     yield from trainings
     alone, groups = list[Job](), dict[tuple[str, frozenset[str]], deque[Step]]()

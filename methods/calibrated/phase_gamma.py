@@ -7,7 +7,6 @@ aiming for best hand-tuned display outputs". The search below stands in the plac
 
 from __future__ import annotations
 
-import math
 from abc import ABC
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -80,19 +79,20 @@ class PhaseGamma(ABC):
     ) -> dict[float, float]:
         """Mean squared error of the captures at each gamma, every search kept as a whole."""
 
+        pairs = list(zip(bench.images, phases, strict=False))
+
         def capture() -> dict[str, list[float]]:
             shots = [
-                [(curved(phase, gamma), image, ("gamma", f"{gamma:.6f}")) for image, phase in zip(bench.images, phases)]
-                for gamma in gammas
+                [(curved(phase, gamma), image, ("gamma", f"{gamma:.6f}")) for image, phase in pairs] for gamma in gammas
             ]
-            bench.announce((phase, image, names) for group in shots for phase, image, names in group)
+            bench.announce(shot for group in shots for shot in group)
             errors = []
             for step, (gamma, group) in enumerate(zip(gammas, shots, strict=True)):
-                found = [
-                    float(functional.mse_loss(matched(bench.photograph(phase, image, *names), image.target), image.target))
-                    for phase, image, names in group
+                images = [
+                    matched(bench.photograph(phase, image, *names), image.target) for phase, image, names in group
                 ]
-                errors.append(math.fsum(found) / len(found))
+                losses = map(functional.mse_loss, images, (image.target for _, image, _ in group))
+                errors.append(float(torch.stack(list(losses)).mean()))
                 bench.log(round=search, step=step, gamma=gamma, error=errors[-1])
             return {"errors": errors}
 

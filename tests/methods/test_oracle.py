@@ -103,7 +103,9 @@ def test_two_gains_stand_for_all_of_flicker(shown):
     draws = torch.randn(50, generator=torch.Generator().manual_seed(4)).tolist()
     with torch.no_grad():
         errors = [
-            squared_error(phase, bench, target, 1 + sign * profile.flicker.rms * draw) for draw in draws for sign in (1, -1)
+            squared_error(phase, bench, target, 1 + sign * profile.flicker.rms * draw)
+            for draw in draws
+            for sign in (1, -1)
         ]
     scale = torch.tensor(draws).square().mean()  # of the drawn numbers, whose variance is not 1
     at_rest = squared_error(phase, bench, target).mean()

@@ -1,4 +1,4 @@
-"""A method that follows the others of its study, as the oracle does: its plan, its starts, and what is computed again."""
+"""A method that follows the others of its study: its plan, its starts, and what is computed again."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ from tests.study.test_kill_and_resume import start, wait_for, wait_for_solves
 from tests.study.test_run import add_other_profile
 from tests.support.fake_study import fake_work, solves, write_config
 
-POOR, GOOD = ('{{name: "plugins.py:Toy", label: {}, params: {{value: {}}}}}'.format(*row) for row in (("poor", 1), ("good", 5)))
+POOR, GOOD = (
+    '{{name: "plugins.py:Toy", label: {}, params: {{value: {}}}}}'.format(*row) for row in (("poor", 1), ("good", 5))
+)
 FOLLOWING = '{name: "plugins.py:Following", label: oracle}'
 FAILING = '{name: "plugins.py:Toy", label: good, params: {value: 5, fail: "no light"}}'
 
@@ -48,7 +50,9 @@ def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repea
     by_id = {cell.id: cell for cell in grid.cells}
     for cell in cells(grid, "oracle"):
         others = [by_id[identity] for identity in cell.starts]
-        assert {(one.target, one.condition, one.repeat) for one in others} == {(cell.target, cell.condition, cell.repeat)}
+        assert {(one.target, one.condition, one.repeat) for one in others} == {
+            (cell.target, cell.condition, cell.repeat)
+        }
         assert sorted(one.params["value"] for one in others) == [1, 5]
     assert [task.is_start for task in grid.tasks if not task.is_floor and task.label != "oracle"] == [True] * 8
 
@@ -100,7 +104,9 @@ def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_ag
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_start_whose_phase_was_not_kept_is_solved_again_for_a_follower_and_gives_the_same_record(tmp_path: Path) -> None:
+def test_a_start_whose_phase_was_not_kept_is_solved_again_for_a_follower_and_gives_the_same_record(
+    tmp_path: Path,
+) -> None:
     alone = compute(write_config(tmp_path, (POOR, GOOD)), tmp_path / "out", Serial())
     together = compute(write_config(tmp_path, (POOR, GOOD, FOLLOWING)), tmp_path / "out", Serial())
     assert len(solves(tmp_path)) == 6 + 9
@@ -131,7 +137,7 @@ def test_a_kept_phase_is_the_one_that_was_shown_to_a_tenth_of_a_milliradian(tmp_
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
 def test_a_run_that_was_killed_before_the_followers_gives_the_bytes_of_one_that_was_not(tmp_path: Path) -> None:
-    methods = tuple(row.replace("value:", "pause: 0.3, value:") for row in (POOR, GOOD)) + (FOLLOWING,)
+    methods = (*(row.replace("value:", "pause: 0.3, value:") for row in (POOR, GOOD)), FOLLOWING)
     config, output = write_config(tmp_path, methods), tmp_path / "out"
     for solved in (3, 7):
         killed = start(config, output)

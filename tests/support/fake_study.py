@@ -87,7 +87,8 @@ class Following(Toy):
     follows: ClassVar[bool] = True
 
     def solve(self, target, bench):
-        return max(super().solve(target, bench), *(start[None] for start in bench.starts), key=lambda phase: phase.mean())
+        phases = super().solve(target, bench), *(start[None] for start in bench.starts)
+        return max(phases, key=lambda phase: phase.mean())
 '''
 
 CONFIG = """\
@@ -141,7 +142,9 @@ class FakeBench:
         learned: Any = None,
         starts: Any = (),
     ) -> MeteredDisplay:
-        return MeteredDisplay(cast(CalibratedBench, self), label, target, (item, repeat), method, budget, learned, starts)
+        return MeteredDisplay(
+            cast(CalibratedBench, self), label, target, (item, repeat), method, budget, learned, starts
+        )
 
     def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
         shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000

@@ -52,8 +52,9 @@ def _read(file: Path) -> Tensor:
 def affected(plan: Plan, missing: frozenset[str], store: Store) -> frozenset[str]:
     """The cells to compute, by id, where those of ``missing`` have to be.
 
-    A cell that starts from a missing one is computed again, since that one may have failed before; its record is removed
-    at once, so that a run that is killed does not take it for new. A start whose phase was not kept is computed again.
+    A cell that starts from a missing one is computed again, since that one may have failed before; its record is
+    removed at once, so that a run that is killed does not take it for new. A start whose phase was not kept is computed
+    again.
     """
     followers = [cell for cell in plan.cells if cell.starts]
     late = {cell.id for cell in followers if not missing.isdisjoint((cell.id, *cell.starts))}

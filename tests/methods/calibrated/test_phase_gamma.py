@@ -33,7 +33,9 @@ class LutDisplay(BentDisplay):
     def capture(self, phase: Tensor) -> Capture:
         self.fate.meets("photograph")
         shown = curved(phase, self.exponent)
-        fields = [self.spec.propagator(c).forward(torch.polar(torch.ones_like(one), one)) for c, one in enumerate(shown)]
+        fields = [
+            self.spec.propagator(c).forward(torch.polar(torch.ones_like(one), one)) for c, one in enumerate(shown)
+        ]
         frame = self.spec.region.crop(torch.stack(fields)).abs().square()
         return Capture(frame, dark=0.0, white=math.inf, gain=(1.0,) * len(frame))
 

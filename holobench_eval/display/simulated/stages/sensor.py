@@ -116,8 +116,10 @@ class Sensor(Stage):
         return counted
 
     def expected(self, light: Tensor, response: Tensor) -> tuple[Tensor, Tensor]:
-        """Mean and variance of what ``expose`` gives above the dark level, differentiable; the unit is that of ``light``
-        ``(Hs, Ws)``: a white pixel, which fills the well to 1 / headroom."""
+        """Mean and variance of what ``expose`` gives above the dark level, differentiable.
+
+        The unit is that of ``light`` ``(Hs, Ws)``: a white pixel, which fills the well to 1 / headroom.
+        """
         white = self.full_well / self.headroom  # electrons
         charge = response * white * (light + self.ambient)
         bent = charge - self.nonlinearity / self.full_well * charge.square() if self.noise else charge
