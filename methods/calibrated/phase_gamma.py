@@ -7,10 +7,10 @@ aiming for best hand-tuned display outputs". The search below stands in the plac
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Protocol
 
 import torch
 from annotated_types import Interval
@@ -20,12 +20,20 @@ from torch.nn import functional
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
 from ...optics.phase import TAU, wrap
-from ..common import matched
+from ..common import Bench, matched
 from ..double_phase import DoublePhase
 from ..wirtinger import Wirtinger
 
 COARSE = tuple(2 ** (step / 4) for step in range(-4, 5))  # 0.5 to 2, and 1 among them
 FINE = tuple(2 ** (step / 12) for step in (-2, -1, 1, 2))  # times the best: steps of 6 %
+
+
+class OpenLoop(Protocol):
+    """A method that knows the nominal optics alone."""
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,10 @@ class PhaseGamma(ABC):
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
 
-    of: ClassVar[Any]  # the open-loop method: a parameter in every subclass
+    @property
+    @abstractmethod
+    def of(self) -> OpenLoop:
+        """The open-loop method: a parameter of every subclass."""
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Find the gamma.
