@@ -13,7 +13,7 @@ from ..data.categories import OFFLINE, ONLINE
 from ..data.results import Results
 from ..data.statistics import Estimate
 from ..data.sweeps import SMALL, Sweep
-from ..data.text import words
+from ..data.text import percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
 
@@ -157,11 +157,7 @@ def _stated_range(sweep: Sweep) -> list[str]:
 def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
     lines = []
     for label in sweep.methods:
-        parts = [
-            f"{value}: {100 * share.mean:.0f} %"
-            f"{'' if np.isnan(share.low) else f' [{100 * share.low:.0f}, {100 * share.high:.0f}]'}"
-            for value, share in sweep.recovered(label, remedy).items()
-        ]
+        parts = [f"{value}: {percent(share)} %" for value, share in sweep.recovered(label, remedy).items()]
         if parts:
             lines.append(f"Share of the loss that {remedy.swept.kind} recovers for {label}: {'; '.join(parts)}.")
     return lines
