@@ -22,9 +22,10 @@ def _paired_tests(report: Report, _: Figures) -> Blocks:
         return
     yield (
         f"Differences to the baseline {report.layout.baseline}, target by target, repeats averaged first: "
-        f"{results.headline.axis}{report.layout.text.axis}. Two-sided sign-flip max-t test over clusters of targets; "
-        f"each p is adjusted for all {sum(np.isfinite(test.p) for test in tests)} tests of this table, in which the "
-        f"oracle has none. At p >= {SIGNIFICANCE} a difference is not shown, which does not mean that there is none. "
+        f"{results.headline.axis}{report.layout.text.axis}. Two-sided sign-flip max-t test (step-down) over "
+        f"clusters of targets; each p is adjusted for all {sum(np.isfinite(test.p) for test in tests)} tests of this "
+        "table, in which the oracle has none; intervals are not adjusted. At "
+        f"p >= {SIGNIFICANCE} a difference is not shown, which does not mean that there is none. "
         f"Pairs with a hole are omitted and counted. Fewer than {FEWEST} clusters give no test and no interval."
     )
     yield _tests(results, tests)

@@ -100,7 +100,7 @@ def test_a_ratio_to_what_is_not_shown_to_differ_from_zero_has_no_interval():
 
 
 def counted(differences, clusters):
-    """p values over every sign of every cluster, by the t statistic itself."""
+    """Step-down p values over every sign of every cluster, by the t statistic itself."""
     names = sorted(set(clusters))
     index = np.array([names.index(cluster) for cluster in clusters])
     found = []
@@ -108,7 +108,12 @@ def counted(differences, clusters):
         turned = np.asarray(signs)[index] * differences
         sums = np.stack([turned[:, index == number].sum(1) for number in range(len(names))], axis=1)
         found.append(np.abs(sums.mean(1) / np.maximum(sums.std(1, ddof=1), 1e-15)))
-    return (np.max(found, axis=1)[:, None] >= found[0] * (1 - 1e-9)).mean(0)
+    adjusted, least = {}, 0.0
+    for number in sorted(range(len(differences)), key=lambda number: -found[0][number]):
+        weaker = [other for other in range(len(differences)) if other not in adjusted]
+        largest = np.max(np.array(found)[:, weaker], axis=1)
+        adjusted[number] = least = max(least, np.mean(largest >= found[0][number] * (1 - 1e-9)))
+    return [adjusted[number] for number in range(len(differences))]
 
 
 def test_p_values_equal_a_count_over_all_signs():
