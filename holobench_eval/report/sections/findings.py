@@ -167,17 +167,19 @@ def _significant(results: Results, condition: str) -> list[str]:
         return []
     if not tested:
         return [f"No test against the baseline: fewer than {FEWEST} clusters with complete pairs."]
-    shown = [test.second for test in tested if test.is_shown]
-    rest = [test.second for test in tested if not test.is_shown]
     family = sum(np.isfinite(test.p) for test in results.against_baseline)
-    sentence = (
-        f"Different from the baseline {tested[0].first} at p < {SIGNIFICANCE}, adjusted for all {family} comparisons "
-        f"of the study: {words(shown) if shown else 'none'} ({len(shown)} of {len(tested)})."
-    )
+    verdicts: dict[str, list[str]] = {}
+    for test in tested:
+        better = "better" if results.headline.better(test.estimate.mean, 0.0) else "worse"
+        verdicts.setdefault(better if test.is_shown else "not shown to differ", []).append(test.second)
+    told = "; ".join(f"{verdict}: {words(labels)}" for verdict, labels in sorted(verdicts.items()))
     clusters = max(test.estimate.clusters for test in tested)
-    if (smallest := 2.0 ** (1 - clusters)) >= SIGNIFICANCE:
-        return [f"{sentence} With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown."]
-    return [f"{sentence}{f' A difference is not shown for {words(rest)}.' if rest else ''}"]
+    smallest = 2.0 ** (1 - clusters)
+    caution = f" With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown."
+    return [
+        f"Against the baseline {tested[0].first}, at p < {SIGNIFICANCE} adjusted for all {family} comparisons of the "
+        f"study: {told}.{caution * (smallest >= SIGNIFICANCE)}"
+    ]
 
 
 def _floor(results: Results, condition: str, floor: str) -> list[str]:

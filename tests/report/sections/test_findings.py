@@ -40,7 +40,7 @@ def test_the_best_method_is_named_with_its_margin_interval_and_p():
     assert "new ranks first of 2 methods: PSNR 19.10" in text
     assert "Difference from the baseline old (17.05 dB): +2.05 dB [" in text
     assert "8 of 8 targets, p = 0.008." in text
-    assert "at p < 0.05, adjusted for all 1 comparisons of the study: new (1 of 1)." in text
+    assert "Against the baseline old, at p < 0.05 adjusted for all 1 comparisons of the study: better: new." in text
     assert "not shown" not in text
 
 
@@ -48,6 +48,7 @@ def test_when_the_baseline_wins_the_next_method_is_compared_with_it():
     text = sentences(results_of({"old": psnr(20.0), "mid": psnr(19.0), "low": psnr(15.0)}))["bench"]
     assert "The baseline old ranks first of 3 methods: PSNR 20.05" in text
     assert "mid follows at -1.00 dB [" in text
+    assert "of the study: worse: mid and low." in text
 
 
 def test_a_privileged_method_is_the_oracle_and_never_the_best():
@@ -121,7 +122,7 @@ def test_a_difference_that_may_be_chance_is_not_shown():
     found = results_of({"old": psnr(17.0), "new": {"psnr_linear": 17.2 - NOISE}})
     text = sentences(found)["bench"]
     assert "8 of 8 targets, p = 0.672: not shown." in text
-    assert "A difference is not shown for new." in text
+    assert "of the study: not shown to differ: new." in text
 
 
 def test_a_lead_over_the_second_that_may_be_chance_is_not_shown():
