@@ -179,7 +179,10 @@ def claims(results: Results, sweeps: Sequence[Sweep]) -> str:
     ]
     if not verdicts:
         return ""
-    rule = f"A claim holds here if the mean loss is at most {SMALL:g} dB at every value."
+    rule = (
+        f"A claim holds here if the 95 % interval of the largest mean loss ends at or below {SMALL:g} dB, does not if "
+        "it begins above, and else neither is shown."
+    )
     return f"Chakravarthula et al. 2020 (Section 7.2) support three claims with pictures. {rule} {' '.join(verdicts)}"
 
 
@@ -193,7 +196,7 @@ def _claim(sweep: Sweep, label: str) -> str:
         lacking = "the sweep does not go far enough" if complete else "some points have no score"
         return f'"{claim}" cannot be judged for {label} on {sweep.swept.before} ({sweep.kind.words}): {lacking}.'
     value, loss = worst
-    verdict = "holds" if loss.mean <= SMALL else "does not hold"
+    verdict = "holds" if loss.high <= SMALL else "does not hold" if loss.low > SMALL else "is not shown to hold or fail"
     where = f"{sweep.kind.words}, {value_text(value)} {sweep.kind.unit}".rstrip(" ,")
     sentence = (
         f'"{claim}" {verdict} for {label} on {sweep.swept.before}: its largest loss ({where}) is '

@@ -126,6 +126,17 @@ def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> 
     assert section_sweeps.claims(without, sweeps(without)) == ""
 
 
+def test_a_claim_whose_interval_is_on_both_sides_of_the_bound_is_neither_shown_to_hold_nor_to_fail() -> None:
+    found = records()
+    for record in found:
+        if record["label"] == "HIL" and "drift" in record["cell"]["condition"]:
+            record["scores"]["psnr_linear"] = psnr("HIL", record["cell"]["target"]) - 3.0 * (
+                record["cell"]["target"] > "b"
+            )
+    uneven = Results(records_frame(found, layout()), layout())
+    assert 'three months" is not shown to hold or fail for HIL' in section_sweeps.claims(uneven, sweeps(uneven))
+
+
 def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Results) -> None:
     frame = results.frame.copy()
     hole = (frame["method"] == "HIL") & (frame["condition"] == title("drift", 90.0)) & (frame["target"] == "b")
