@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from importlib.resources import files
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import torch
@@ -21,6 +21,9 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear R, G, B in relative lu
 
 class Dataset(Protocol):
     """A source of targets: a frozen dataclass of its parameters.
+
+    Items that are not independent, such as crops of one photograph, have a cluster: ``cluster(item) -> str``. A dataset
+    without this method says that each item is a cluster of its own. Intervals and tests are over clusters.
 
     A dataset of your own is one file with such a class, named in a config as ``path/to/file.py:Class`` or registered
     as an entry point in the group ``holobench_eval.datasets``.
@@ -213,10 +216,17 @@ def named_digest(*names: object) -> str:
     return hashlib.sha256("\x1f".join(str(name) for name in names).encode()).hexdigest()
 
 
-def shipped(name: str) -> bytes | None:
-    """The contents of a data file inside scikit-image; None where the installed version has it not.
+def shipped(name: str, folder: str = "skimage/data") -> bytes | None:
+    """The contents of a data file inside a package (``folder``: package and folders); None where it has it not.
 
     ``skimage.data`` looks in a cache first and downloads what it does not find.
     """
-    source = files("skimage").joinpath("data", name)
+    package, *parts = folder.split("/")
+    source = files(package).joinpath(*parts, name)
     return source.read_bytes() if source.is_file() else None
+
+
+def clusters_of(dataset: Any) -> dict[str, str]:
+    """The cluster of every item; empty for a dataset that tells of none."""
+    cluster = getattr(dataset, "cluster", None)
+    return {item: str(cluster(item)) for item in dataset.items()} if callable(cluster) else {}

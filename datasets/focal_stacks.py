@@ -100,6 +100,8 @@ class FocalStacks:
         """The scene of an item: items of a scene are one stack."""
         return _title(self._part(item)[0])
 
+    cluster = scene
+
     def plane(self, item: str) -> float:
         """Where the eye focuses [mm], on the full panel."""
         return self._part(item)[1]

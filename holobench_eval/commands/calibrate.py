@@ -13,7 +13,8 @@ def calibrate(profile: ProfileName) -> None:
     from ..study.progress import watching
     from .output import console
 
-    loaded, calibration, screen = load_profile(profile), load_calibration(profile), console()
+    loaded, screen = load_profile(profile), console()
+    calibration = load_calibration(loaded)
     with watching(screen) as watch:
         fitting = Fitting(loaded, calibration, watch, lambda line: screen.print(line, highlight=False, soft_wrap=True))
         values, network = fitting.fit()

@@ -66,5 +66,8 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
         if then != now:
             yield f"profile '{display.name}' was {then}, is now {now}; run the study again"
     again = recompute_table((report / "records.csv").read_text(encoding="utf-8"), layout_of(study))
-    if again != (report / "table.csv").read_text(encoding="utf-8"):
+    table = (report / "table.csv").read_text(encoding="utf-8")
+    if again.partition("\n")[0] != table.partition("\n")[0]:
+        yield "table.csv has the columns of another version; run 'holoeval report' on its config"
+    elif again != table:
         yield "table.csv does not follow from records.csv; run 'holoeval report' on its config"

@@ -44,6 +44,12 @@ def test_a_changed_number_in_a_table_is_found(report: Path) -> None:
     assert ["does not follow from records.csv" in problem for problem in problems(report)] == [True]
 
 
+def test_a_table_of_another_version_is_told_from_a_changed_number(report: Path) -> None:
+    table = report / "table.csv"
+    table.write_text(table.read_text().replace("psnr_linear_median", "psnr_linear_mode"))
+    assert ["columns of another version" in problem for problem in problems(report)] == [True]
+
+
 def test_a_changed_config_is_found(report: Path) -> None:
     config = report.parents[1] / "study.yaml"
     config.write_text(config.read_text() + "# later\n")

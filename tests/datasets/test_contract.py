@@ -9,6 +9,7 @@ from PIL import Image
 
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
+from holobench_eval.datasets.base import clusters_of
 
 SHAPES = [(48, 64), (64, 48), (40, 40)]
 
@@ -54,7 +55,7 @@ def dataset(request, tmp_path) -> Any:
 
 
 def test_every_dataset_is_registered():
-    assert {"photographs", "dead_leaves", "charts", "folder", "focal_stacks"} <= set(plugins.names("datasets"))
+    assert {"photographs", "crops", "dead_leaves", "charts", "folder", "focal_stacks"} <= set(plugins.names("datasets"))
 
 
 def test_parameters_of_a_dataset_in_a_file_are_checked_as_those_of_any_other(tmp_path):
@@ -121,7 +122,13 @@ def test_an_unknown_item_is_one_line(dataset):
         assert "\n" not in str(caught.value)
 
 
+def test_every_item_has_a_cluster_where_any_has(dataset):
+    clusters = clusters_of(dataset)
+    assert list(clusters) == (dataset.items() if clusters else [])
+    assert all(clusters.values())
+
+
 def test_only_generated_images_are_for_training():
     training = {name: plugins.find("datasets", name).training for name in plugins.names("datasets")}
     assert training["dead_leaves"]
-    assert not any(training[name] for name in ("photographs", "charts", "folder", "focal_stacks"))
+    assert not any(training[name] for name in ("photographs", "crops", "charts", "folder", "focal_stacks"))

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, get_args, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 from annotated_types import Interval, MinLen
 
 from ...core.errors import UserError, suggest
 from ...core.schema import typed
-from ...core.yaml_source import load
+from ...core.yaml_source import Document, load
 from ..api import DisplaySpec
 from .stage import Effect, Stage
 from .stages import (
@@ -36,6 +38,7 @@ from .stages import (
 )
 
 SMALLEST_PANEL, LARGEST_PANEL = 64, 8192
+DEEPEST = 4  # profiles in a row that are like one another
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,10 @@ class Profile:
         The stages. ``dust_plane`` has no keys of its own: its parameters are in ``coherent_noise``.
     residual_bound
         Largest registration residual with which a study may run [region px, rms].
+    like
+        A profile, by name or file, whose values hold where this file gives none.
     digest
-        sha256 of the file.
+        sha256 of the file, and of those it is like.
 
     Examples
     --------
@@ -89,6 +94,7 @@ class Profile:
     sensor: Sensor = Sensor()
     drift: Drift = Drift()
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
+    like: str | None = None
     digest: str = field(default="", metadata={"key": False})
 
     @property
@@ -169,9 +175,9 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     UserError
         There is no such profile, or its file has a fault, with file:line:column.
     """
-    path = profile_file(name, folder)
-    document = load(path)
-    profile = typed(document, Profile)
+    documents = _documents(name, folder)
+    document = documents[0]
+    profile = typed(document, Profile, reduce(_over, [each.data for each in reversed(documents)]))
     if profile.lut.table and len(profile.lut.table) != 2**profile.panel.bits:
         levels = 2**profile.panel.bits
         message = f"the table has {len(profile.lut.table)} entries; a panel of {profile.panel.bits} bits has {levels}"
@@ -180,11 +186,36 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     if spectra not in (0, colours):
         message = f"there are {spectra} measured spectra; the panel has {colours} wavelengths"
         raise document.error(("spectrum", "measured"), message)
-    return replace(profile, digest=hashlib.sha256(document.text.encode()).hexdigest())
+    text = "".join(each.text for each in documents)
+    return replace(profile, digest=hashlib.sha256(text.encode()).hexdigest())
 
 
-def profile_file(name: str, folder: Path | None = None) -> Path:
-    """The file of a profile; arguments and errors as of ``load_profile``."""
+def _documents(name: str, folder: Path | None) -> list[Document]:
+    """The file of a profile, that of the profile it is like, and so on. UserError: one of them is not there."""
+    path = _file(name, folder)
+    documents = [load(path)]
+    while (base := documents[-1].data.get("like")) is not None:
+        if len(documents) == DEEPEST:
+            raise documents[0].error(("like",), f"more than {DEEPEST} profiles, each of them like the next")
+        try:
+            path = _file(str(base), path.parent)
+        except UserError as error:
+            raise documents[-1].error(("like",), str(error)) from error
+        documents.append(load(path))
+    return documents
+
+
+def _over(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a profile with those of another in their place, key by key."""
+    nested = {
+        key: _over(base[key], value)
+        for key, value in changes.items()
+        if isinstance(value, Mapping) and isinstance(base.get(key), Mapping)
+    }
+    return {**base, **changes, **nested}
+
+
+def _file(name: str, folder: Path | None = None) -> Path:
     if name.endswith((".yaml", ".yml")):
         candidates = [Path(name)] if folder is None else [folder / name, Path(name)]
         path = next((path for path in candidates if path.is_file()), None)

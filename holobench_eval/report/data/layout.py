@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ...core import plugins
+from ...datasets.base import clusters_of
 from ...display.simulated.changes import draws
 from ...display.simulated.profile import load_profile
 from ...study.definition import Study
@@ -65,7 +66,8 @@ class Layout:
     trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained);
     identities: labels of those whose network is the ideal image itself, which has nothing to learn.
     camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
-    of others. real: whether the display exists. metrics: names of those the study wants (None: all).
+    of others. real: whether the display exists. clusters: of every target, such as the photograph of a crop (empty:
+    each target is its own). metrics: names of those the study wants (None: all).
     """
 
     title: str
@@ -92,6 +94,7 @@ class Layout:
     stacked: frozenset[str] = frozenset()
     metrics: tuple[str, ...] | None = None
     real: bool = False
+    clusters: Mapping[str, str] = field(default_factory=dict)
     values: str = ""
 
     def category(self, label: str) -> str:
@@ -185,6 +188,7 @@ def layout_of(study: Study) -> Layout:
         sweeps=tuple(_sweeps(study, conditions)),
         planes=planes_of(study.dataset, study.targets.dataset) if study.measure == "focus" else {},
         real=study.display.real,
+        clusters=clusters_of(study.dataset),
         stacked=labels_with("planes") if study.measure == "focus" else frozenset(),
     )
 

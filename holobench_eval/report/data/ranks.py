@@ -16,7 +16,7 @@ from ...display.simulated.changes.draws import PARAMETERS
 from .categories import OFFLINE
 from .layout import Swept
 from .results import Results
-from .statistics import FEWEST, SIGNIFICANCE, Array, Estimate, bootstrap_mean, holm
+from .statistics import FEWEST, SIGNIFICANCE, Array, Estimate, mean_interval
 
 # Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take
 # the draws from all others.
@@ -40,7 +40,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Cause:
-    """What a difference goes with: Spearman's rank correlation, and its p value after Holm over all that were tried."""
+    """What a difference goes with: Spearman's rank correlation, and its p value times all that were tried."""
 
     feature: Feature
     correlation: float
@@ -74,7 +74,7 @@ class Pair:
     @property
     def lead(self) -> Estimate:
         """Mean difference over draws."""
-        return bootstrap_mean(self.differences)
+        return mean_interval(self.differences)
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,8 @@ class Ranks:
     @property
     def tau(self) -> Estimate:
         """Their mean, and its interval over draws."""
-        return bootstrap_mean(self.taus)
+        found = mean_interval(self.taus)
+        return replace(found, high=min(found.high, 1.0))  # no correlation is larger
 
     @property
     def unchanged(self) -> int:
@@ -211,7 +212,7 @@ def positions(quality: Array) -> Array:
 def share(count: int, total: int) -> Estimate:
     """A share of ``total`` draws with its 95 % interval (Wilson 1927)."""
     ends = stats.binomtest(count, total).proportion_ci(0.95, method="wilson")
-    return Estimate(count / total, float(ends.low), float(ends.high), total)
+    return Estimate(count / total, float(ends.low), float(ends.high), total, total)
 
 
 def _features(name: str, values: Array) -> list[Feature]:
@@ -225,10 +226,10 @@ def _features(name: str, values: Array) -> list[Feature]:
 def _causes(pairs: Sequence[Pair], features: Sequence[Feature]) -> Mapping[tuple[str, str], Cause]:
     """The strongest significant correlation of each pair that has one; one family of tests over all of them."""
     tried = [(pair, feature, *_spearman(feature.values, pair.differences)) for pair in pairs for feature in features]
-    corrected = holm([p for *_, p in tried])
+    made = sum(not math.isnan(p) for *_, p in tried)
     causes: dict[tuple[str, str], Cause] = {}
-    for (pair, feature, correlation, _), p in zip(tried, corrected, strict=True):
-        names = pair.first, pair.second
+    for pair, feature, correlation, single in tried:
+        names, p = (pair.first, pair.second), single * made  # Bonferroni
         if p < SIGNIFICANCE and (names not in causes or abs(correlation) > abs(causes[names].correlation)):
             causes[names] = Cause(feature, correlation, p)
     return causes

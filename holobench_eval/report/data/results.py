@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ...core.errors import UserError, suggest
 from ...study.plan import FLOORS, REFERENCE
 from .categories import CATEGORIES, OFFLINE, ORACLE
 from .layout import Layout
 from .scores import Score, parse
-from .statistics import Array, Estimate, PairedTest, bootstrap_mean, holm, paired_test
-from .tables import DONE, per_target, score_columns, table_from_records
+from .statistics import Array, Estimate, PairedTest, family_p, mean_interval, ratio_interval
+from .tables import DONE, clusters_in, per_target, score_columns, table_from_records
 
 # Metrics of the main table besides the headline.
 LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd")
@@ -79,6 +79,17 @@ class Results:
         return list(dict.fromkeys([*self.layout.targets, *self.frame["target"]]))
 
     @cached_property
+    def clusters(self) -> NDArray[np.str_]:
+        """``(targets,)`` names: targets of one cluster, such as crops of one photograph, are not independent."""
+        known = clusters_in(self.frame)
+        return np.array([known.get(target, target) for target in self.targets])
+
+    def estimate(self, values: Array) -> Estimate:
+        """Mean of ``(targets,)`` values and its interval over clusters, without the holes."""
+        known = np.isfinite(values)
+        return mean_interval(values[known], self.clusters[known])
+
+    @cached_property
     def conditions(self) -> list[str]:
         """Conditions that have rows, without the reference and without those that are a change of another."""
         aside = {REFERENCE, *self.layout.changed}
@@ -95,7 +106,7 @@ class Results:
         if len(rows) < 2:
             return None
         sign = 1 if self.headline.higher_is_better else -1
-        return bootstrap_mean(sign * (self.values(label, before) - self.values(label, condition)))
+        return self.estimate(sign * (self.values(label, before) - self.values(label, condition)))
 
     def row(self, label: str, condition: str) -> pd.Series:
         """A row of the table."""
@@ -167,20 +178,21 @@ class Results:
             return None
         if not self.is_complete(label, condition):
             return None
-        return bootstrap_mean(self.values(label, condition) - self.values(baseline, condition))
+        return self.estimate(self.values(label, condition) - self.values(baseline, condition))
 
-    def gap_closed(self, label: str, condition: str) -> float:
-        """The share of the gap between baseline and oracle that a method closes; NaN where there is no gap.
+    def gap_closed(self, label: str, condition: str) -> Estimate | None:
+        """The share of the gap between baseline and oracle that a method closes; None where there is no gap.
 
         For PSNR, in dB: (method - baseline) / (oracle - baseline). 0 is the baseline, 1 the oracle.
         """
         oracle = self.oracle(condition)
-        gained = self.gain(label, condition)
         most = self.gain(oracle, condition) if oracle else None
         sign = 1 if self.headline.higher_is_better else -1
-        if gained is None or most is None or sign * most.mean <= 0:
-            return float("nan")
-        return gained.mean / most.mean
+        if self.gain(label, condition) is None or most is None or sign * most.mean <= 0:
+            return None
+        names = (label, str(oracle), str(self.layout.baseline))
+        method, best, baseline = (self.values(name, condition) for name in names)
+        return ratio_interval(method - baseline, best - baseline, self.clusters)
 
     @cached_property
     def floors(self) -> list[str]:
@@ -210,36 +222,29 @@ class Results:
 
     @cached_property
     def against_baseline(self) -> list[PairedTest]:
-        """Every method against the baseline; one family of tests per condition."""
-        baseline = self.layout.baseline
-        return [
-            test
+        """Every method against the baseline on every display: one family of tests, in which the oracle is not."""
+        baseline = str(self.layout.baseline)
+        pairs = [
+            (condition, other)
             for condition in self.conditions
             if baseline in self.methods(condition)
-            for test in self._family(
-                condition, ((str(baseline), other) for other in self.methods(condition) if other != baseline)
-            )
+            for other in self.methods(condition)
+            if other != baseline
         ]
-
-    @cached_property
-    def between_all(self) -> list[PairedTest]:
-        """Every method against every other; one family of tests per condition."""
+        if not pairs:
+            return []
+        differences = np.stack([self.values(other, name) - self.values(baseline, name) for name, other in pairs])
+        tested = np.array([other not in self.layout.privileged for _, other in pairs])
+        p = np.full(len(pairs), np.nan)
+        p[tested] = family_p(differences[tested], self.clusters)
         return [
-            test
-            for condition in self.conditions
-            for test in self._family(condition, itertools.combinations(self.methods(condition), 2))
+            PairedTest(condition, baseline, other, found, self.estimate(found), float(value))
+            for (condition, other), found, value in zip(pairs, differences, p, strict=True)
         ]
 
-    def _family(self, condition: str, pairs: Iterable[tuple[str, str]]) -> list[PairedTest]:
-        tests = [
-            paired_test(condition, first, second, (self.values(first, condition), self.values(second, condition)))
-            for first, second in pairs
-        ]
-        corrected = holm([test.p for test in tests])
-        return [replace(test, p_holm=p) for test, p in zip(tests, corrected, strict=True)]
-
-    def floor_difference(self, label: str, condition: str, floor: str) -> float:
-        """Mean headline difference of a method to a floor row, over the targets that both have."""
-        difference = self.values(label, condition) - self.values(floor, REFERENCE)
-        known = difference[np.isfinite(difference)]
-        return float(known.mean()) if known.size else float("nan")
+    def above_floor(self, label: str, condition: str, floor: str = "floor_constant") -> Estimate | None:
+        """Headline score minus that of a floor row of the same target; None without one, or without a target."""
+        if floor not in self.floors or not self.has_floor(condition):
+            return None
+        found = self.estimate(self.values(label, condition) - self.values(floor, REFERENCE))
+        return found if found.n else None

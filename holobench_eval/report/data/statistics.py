@@ -1,4 +1,8 @@
-"""Intervals and paired tests over targets: what a difference between two methods is worth."""
+"""Intervals and paired tests over clusters of targets: what a difference between two methods is worth.
+
+Targets of one cluster, such as crops of one photograph, are not independent, so that clusters and not targets are what
+is counted. ``docs/statistics.md`` has the coverage of the intervals, and what was tried beside them.
+"""
 
 from __future__ import annotations
 
@@ -12,137 +16,153 @@ from scipy import stats
 
 from ...core.seeds import seed
 
-RESAMPLES = 10_000
 LEVEL = 0.95
 SIGNIFICANCE = 0.05
-# Below this many targets no interval and no test is given: they would look like evidence and be none.
+# Below this many clusters no interval and no test is given: they would look like evidence and be none.
 FEWEST = 3
+MOST_ENUMERATED = 15  # clusters; of more, signs are drawn
+DRAWN = 20_000
 
 Array = NDArray[np.float64]
+Clusters = Sequence[str] | NDArray[np.str_]
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over ``n`` targets with its 95 % interval; ``low`` and ``high`` are NaN below three targets."""
+    """A mean over ``n`` targets in ``clusters`` with its 95 % interval, NaN where there is none."""
 
     mean: float
     low: float
     high: float
     n: int
+    clusters: int
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the interval lies on one side of zero: else a difference is not shown."""
+        return self.low > 0 or self.high < 0
 
 
-@lru_cache(maxsize=8)
-def _resamples(n: int) -> NDArray[np.int64]:
-    """``(RESAMPLES, n)`` indices. They depend on ``n`` only, so methods scored on the same targets share them."""
-    return np.random.default_rng(seed("bootstrap over targets", n)).integers(0, n, size=(RESAMPLES, n))
+def _sums(values: Array, clusters: Clusters | None) -> Array:
+    """Sums over each cluster of ``(..., n)`` values, ``(..., clusters)``; without clusters each value is one."""
+    if clusters is None:
+        return values
+    names, index = np.unique(np.asarray(clusters), return_inverse=True)
+    return values @ np.eye(len(names))[index]
 
 
-@lru_cache(maxsize=64)
-def _tail(n: int) -> float:
-    """Fraction of the resampled means to leave out at either end; see ``bootstrap_mean``."""
-    quantile = stats.t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt(n / (n - 1))
-    return float(stats.norm.cdf(-quantile))
+def mean_interval(values: Sequence[float] | Array, clusters: Clusters | None = None) -> Estimate:
+    """Mean of one value per target and its interval by Student's t over clusters.
 
+    The variance of the mean is that of the clusters' summed residuals (Liang & Zeger, Biometrika 73, 1986) with the
+    factor G / (G - 1) for G clusters, and t has G - 1 degrees of freedom. For clusters of one size that is the t
+    interval of the clusters' means.
 
-def bootstrap_mean(values: Sequence[float] | Array) -> Estimate:
-    """Mean of one value per target and its bootstrap interval.
-
-    Percentile bootstrap with the small-sample expansion of Hesterberg 2015 (The American Statistician 69(4), 371-386):
-    the percentiles are taken at Phi(-+ sqrt(n / (n - 1)) t) with t the Student quantile, since plain percentiles are
-    too narrow for the ten-odd targets of a typical study.
-
-    values: ``(n,)``, finite, repeats already averaged within each target.
+    values: ``(n,)``, repeats already averaged within each target; NaN gives NaN. clusters: the cluster of each.
     """
     sample = np.asarray(values, dtype=np.float64)
     n = sample.size
     if n == 0:
-        return Estimate(np.nan, np.nan, np.nan, 0)
+        return Estimate(np.nan, np.nan, np.nan, 0, 0)
     mean = float(sample.mean())
-    if n < FEWEST or not np.isfinite(sample).all():
-        return Estimate(mean, np.nan, np.nan, n)
-    tail = _tail(n)
-    low, high = np.quantile(sample[_resamples(n)].mean(axis=1), [tail, 1 - tail])
-    return Estimate(mean, float(low), float(high), n)
+    residuals = _sums(sample - mean, clusters)
+    half = _quantile(residuals.size) * np.sqrt(_products(residuals, residuals)) / n
+    return Estimate(mean, float(mean - half), float(mean + half), n, residuals.size)
 
 
-def bootstrap_ratio(numerator: Array, denominator: Array) -> Estimate:
-    """Ratio of two means over the same targets, each ``(n,)``, and its percentile interval over resampled targets, with
-    the expansion of ``bootstrap_mean``."""
-    n = numerator.size
-    ratio = float(numerator.mean() / denominator.mean())
-    if n < FEWEST:
-        return Estimate(ratio, np.nan, np.nan, n)
-    tail = _tail(n)
-    chosen = _resamples(n)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = numerator[chosen].mean(axis=1) / denominator[chosen].mean(axis=1)
-    low, high = np.quantile(ratios, [tail, 1 - tail])
-    return Estimate(ratio, float(low), float(high), n)
+def ratio_interval(numerator: Array, denominator: Array, clusters: Clusters | None = None) -> Estimate:
+    """Ratio of two means over the same targets and its interval (Fieller, J. R. Stat. Soc. B 16, 1954) over clusters.
 
-
-def wilcoxon(differences: Sequence[float] | Array) -> float:
-    """Exact two-sided p value of the Wilcoxon signed-rank test, ties and zeros included.
-
-    Zero differences are dropped (Wilcoxon 1945), ties get mid-ranks, and the distribution of the rank sum over all
-    2^n signs is counted exactly by dynamic programming, so no normal approximation is needed at any n.
-    Returns 1.0 when every difference is zero.
+    It holds every ratio r for which numerator - r denominator is not shown to differ from zero; there is none where the
+    denominator itself is not. numerator, denominator: ``(n,)``.
     """
-    # Ten decimals: equal differences of values kept at six digits must stay tied after a subtraction in binary.
-    sample = np.round(np.asarray(differences, dtype=np.float64), 10)
-    sample = sample[sample != 0]
-    if sample.size == 0:
-        return 1.0
-    doubled_ranks = np.rint(2 * stats.rankdata(np.abs(sample))).astype(int)
-    chance = np.zeros(int(doubled_ranks.sum()) + 1)
-    chance[0] = 1.0
-    for rank in doubled_ranks:
-        shifted = np.zeros_like(chance)
-        shifted[rank:] = chance[: chance.size - rank]
-        chance = (chance + shifted) / 2
-    observed = int(doubled_ranks[sample > 0].sum())
-    tail = min(float(chance[: observed + 1].sum()), float(chance[observed:].sum()))
-    return min(1.0, 2 * tail)
+    above, below, n = float(numerator.mean()), float(denominator.mean()), numerator.size
+    residuals = [_sums(values - mean, clusters) for values, mean in ((numerator, above), (denominator, below))]
+    count = residuals[0].size
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = float(np.divide(above, below))
+        scale = (_quantile(count) / n) ** 2
+    square, cross, zero = (
+        mean - scale * _products(*pair)
+        for mean, pair in (
+            (below**2, (residuals[1], residuals[1])),
+            (above * below, (residuals[0], residuals[1])),
+            (above**2, (residuals[0], residuals[0])),
+        )
+    )
+    if not square > 0:
+        return Estimate(ratio, np.nan, np.nan, n, count)
+    half = np.sqrt(max(cross**2 - square * zero, 0.0))
+    return Estimate(ratio, float((cross - half) / square), float((cross + half) / square), n, count)
 
 
-def holm(p_values: Sequence[float]) -> list[float]:
-    """Holm 1979 step-down correction over one family of tests; NaN (no test made) stays NaN and is not counted."""
-    p = np.asarray(p_values, dtype=np.float64)
-    tested = np.flatnonzero(~np.isnan(p))
-    order = tested[np.argsort(p[tested], kind="stable")]
-    corrected = np.full(p.shape, np.nan)
-    factors = np.arange(order.size, 0, -1)
-    corrected[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * factors))
-    return [float(value) for value in corrected]
+def _quantile(clusters: int) -> float:
+    """Of Student's t; NaN for too few clusters."""
+    return float(stats.t.ppf((1 + LEVEL) / 2, clusters - 1)) if clusters >= FEWEST else np.nan
+
+
+def _products(a: Array, b: Array) -> float:
+    """Sum of products of ``(clusters,)`` residuals, for the degree of freedom that their mean took."""
+    return float(a @ b) * a.size / max(a.size - 1, 1)
+
+
+def family_p(differences: Array, clusters: Clusters | None = None) -> Array:
+    """Two-sided p values of several mean differences, adjusted for all of them: sign-flip max-t over clusters.
+
+    If a comparison makes no difference, the sign of a cluster's differences is a coin's. One coin a cluster turns all
+    comparisons together, which keeps their correlation. Each observed |t| is compared with the largest of its own and
+    of all weaker ones (step-down: Westfall & Young, "Resampling-based multiple testing", 1993, algorithm 2.8).
+    All signs are counted up to ``MOST_ENUMERATED`` clusters; of more, ``DRAWN`` are drawn from a fixed seed.
+
+    differences: ``(comparisons, targets)``, NaN for a hole, which is left out. Returns ``(comparisons,)``; NaN below
+    three clusters.
+    """
+    known = np.isfinite(differences)
+    sums = _sums(np.where(known, differences, 0.0), clusters)
+    # |sum of flipped sums| / norm rises with |t|, since flipping leaves the norm as it is.
+    norms = np.sqrt((sums**2).sum(1, keepdims=True))
+    shares = np.divide(sums, norms, out=np.zeros_like(sums), where=norms > 0)
+    observed = np.abs(shares.sum(1))
+    order = np.argsort(-observed, kind="stable")
+    flipped = np.abs(_signs(sums.shape[1]) @ shares[order].T)
+    largest = np.maximum.accumulate(flipped[:, ::-1], axis=1)[:, ::-1]  # of each comparison and all weaker ones
+    p = np.full(len(differences), np.nan)
+    p[order] = np.maximum.accumulate((largest >= observed[order] - 1e-9).mean(0))
+    return np.where((_sums(known.astype(np.float64), clusters) > 0).sum(1) >= FEWEST, p, np.nan)
+
+
+@lru_cache(maxsize=8)
+def _signs(clusters: int) -> Array:
+    """``(signs, clusters)`` of 1 and -1, the observed ones first. Turning all signs changes no |t|: the first stays."""
+    if clusters <= MOST_ENUMERATED:
+        flipped = np.arange(2 ** max(clusters - 1, 0))[:, None] >> np.arange(clusters) & 1
+    else:
+        flipped = np.random.default_rng(seed("signs of clusters", clusters)).integers(0, 2, size=(DRAWN, clusters))
+        flipped[0] = 0
+    return np.where(flipped, -1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class PairedTest:
-    """One comparison under one condition: ``second`` minus ``first`` over the targets that both have.
+    """One comparison under one condition: ``second`` minus ``first``, target by target.
 
-    complete: targets with both values; targets: all targets of the study. ``p`` and ``p_holm`` are NaN when fewer
-    than three pairs are complete.
+    differences: ``(targets,)``, NaN where one of the two has no score; estimate: their mean; p: adjusted for the
+    family of comparisons, NaN without a test.
     """
 
     condition: str
     first: str
     second: str
-    complete: int
-    targets: int
-    difference: Estimate
+    differences: Array
+    estimate: Estimate
     p: float
-    p_holm: float = float("nan")
 
+    @property
+    def known(self) -> Array:
+        """The differences that there are."""
+        return self.differences[np.isfinite(self.differences)]
 
-def paired_test(condition: str, first: str, second: str, values: tuple[Array, Array]) -> PairedTest:
-    """Compare two methods target by target.
-
-    values: two ``(targets,)`` arrays in the same target order; NaN where a method has no score for a target.
-    Pairs with a hole are left out, and the counts say how many were complete.
-    """
-    reference, other = (np.asarray(value, dtype=np.float64) for value in values)
-    both = np.isfinite(reference) & np.isfinite(other)
-    difference = other[both] - reference[both]
-    p = wilcoxon(difference) if difference.size >= FEWEST else np.nan
-    return PairedTest(
-        condition, first, second, int(both.sum()), int(reference.size), bootstrap_mean(difference), float(p)
-    )
+    @property
+    def is_shown(self) -> bool:
+        """Whether the test shows a difference."""
+        return self.p < SIGNIFICANCE

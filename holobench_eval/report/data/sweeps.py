@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...display.simulated.changes import KINDS, Kind
 from .layout import Swept
 from .results import Results
-from .statistics import Estimate, bootstrap_mean, bootstrap_ratio
+from .statistics import Estimate, mean_interval, ratio_interval
 
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
 # Kinds whose points are other benches: they are asked for rankings and not for losses.
@@ -55,7 +55,7 @@ class Sweep:
 
     def mean(self, label: str, condition: str) -> Estimate:
         """Headline score under a condition."""
-        return bootstrap_mean(self.results.values(label, condition))
+        return mean_interval(self.results.values(label, condition), self.results.clusters)
 
     def loss(self, label: str, condition: str) -> Estimate | None:
         """What the change cost, target by target."""
@@ -92,14 +92,14 @@ class Sweep:
         reach = np.array([away for away, _ in points])
         before = self.results.values(label, self.swept.before)
         after = np.stack([self.results.values(label, condition) for _, condition in points])
-        return bootstrap_mean(self.kind.per * (reach @ (sign * (before - after))) / float(reach @ reach))
+        return self.results.estimate(self.kind.per * (reach @ (sign * (before - after))) / float(reach @ reach))
 
     def gain(self, label: str, condition: str) -> Estimate | None:
         """Headline score above the baseline under the same change, positive where it is better."""
         gained = self.results.gain(label, condition)
         if gained is None or self.results.headline.higher_is_better:
             return gained
-        return Estimate(-gained.mean, -gained.high, -gained.low, gained.n)
+        return replace(gained, mean=-gained.mean, low=-gained.high, high=-gained.low)
 
     def break_even(self, label: str) -> list[float] | None:
         """Where a method that is above the baseline without a change falls to it, on either side of the nominal value,
@@ -148,7 +148,7 @@ class Sweep:
                 if lost is not None and left is not None and lost.mean > SMALL and not lost.low <= 0:
                     before = self.results.values(label, self.swept.before)
                     blurred, cured = (self.results.values(label, name) for name in (condition, same[value]))
-                    shares[str(value)] = bootstrap_ratio(cured - blurred, before - blurred)
+                    shares[str(value)] = ratio_interval(cured - blurred, before - blurred, self.results.clusters)
         return shares
 
 

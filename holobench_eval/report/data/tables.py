@@ -20,7 +20,7 @@ from ...study.plan import FLOORS, REFERENCE
 from .categories import ORACLE
 from .layout import Layout
 from .scores import order_scores, parse
-from .statistics import bootstrap_mean
+from .statistics import mean_interval
 from .text import FILES
 
 TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
@@ -34,13 +34,22 @@ NOTE_COLUMNS = (STOPPED_COLUMN, FELL_BACK_COLUMN)
 # was at work beside a solution, else 0.
 ALONE_COLUMN = "timed_alone"
 CATEGORY_COLUMN = "track"
+CLUSTER_COLUMN = "cluster"  # of studies whose targets come in clusters; else each target is one
 MEASURED_COLUMNS = ("captures", "seconds", "registration_residual_px", "saturated")
 IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol")
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
 _REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
-_NOT_SCORES = _REQUIRED | {*TRAINING_COLUMNS, MEMORY_COLUMN, ALONE_COLUMN, *NOTE_COLUMNS, CATEGORY_COLUMN}
+_NOT_SCORES = _REQUIRED | {
+    *TRAINING_COLUMNS,
+    MEMORY_COLUMN,
+    ALONE_COLUMN,
+    *NOTE_COLUMNS,
+    CATEGORY_COLUMN,
+    CLUSTER_COLUMN,
+}
 DONE = "done"
+MEDIAN = "_median"  # of the headline, after its name
 
 
 def format_number(value: float) -> str:
@@ -59,6 +68,7 @@ def _row(record: Mapping[str, Any], identity: str, layout: Layout) -> dict[str, 
         "name": cell["method"],
         "condition": cell["condition"],
         "target": cell["target"],
+        CLUSTER_COLUMN: layout.clusters.get(cell["target"], cell["target"]),
         "state": record["state"],
         "reason": _one_line(record.get("reason", "")),
         STOPPED_COLUMN: _one_line(record.get("stopped", "")),
@@ -104,7 +114,8 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
     frame = pd.DataFrame(rows)
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(column for column in frame.columns if column not in _NOT_SCORES) or [layout.headline]
-    columns = ["method", "name", "condition", "target", "repeat", "state", "reason"]
+    grouped = [CLUSTER_COLUMN] if layout.clusters else []
+    columns = ["method", "name", "condition", "target", *grouped, "repeat", "state", "reason"]
     known = [column for column in (MEMORY_COLUMN, ALONE_COLUMN) if frame[column].notna().any()]
     measured = [*MEASURED_COLUMNS, *known]
     training = TRAINING_COLUMNS if layout.trained else ()
@@ -145,10 +156,16 @@ def per_target(rows: pd.DataFrame) -> pd.DataFrame:
     return done.groupby("target", sort=False).mean(numeric_only=True)
 
 
-def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
-    """A row per method and condition: means over targets with 95 % bootstrap intervals.
+def clusters_in(frame: pd.DataFrame) -> dict[str, str]:
+    """The cluster of every target of a records frame; empty where each is its own."""
+    return dict(zip(frame["target"], frame[CLUSTER_COLUMN], strict=True)) if CLUSTER_COLUMN in frame else {}
 
-    ``n`` counts targets with at least one done cell and ``failed`` counts cells without a score. A metric that only
+
+def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
+    """A row per method and condition: means over targets with 95 % intervals over their clusters.
+
+    ``n`` counts targets with at least one done cell, ``clusters`` their clusters where targets come in such, and
+    ``failed`` counts cells without a score. The headline has a median over targets, too. A metric that only
     some of the ``n`` targets have is left empty, so that its mean always stands for the ``n`` beside it; figures that
     describe the capture, such as the speckle contrast of flat patches, are means over the targets that have them.
     """
@@ -165,11 +182,16 @@ def _table_row(rows: pd.DataFrame, pair: tuple[str, str], scores: Sequence[str],
     done = rows[rows["state"] == DONE]
     n = done["target"].nunique()
     row: dict[str, Any] = {"method": label, "condition": condition, "n": n, "failed": len(rows) - len(done)}
+    known = clusters_in(done)
+    row |= {"clusters": len(set(known.values()))} if CLUSTER_COLUMN in rows else {}
     means = per_target(rows)
     for score in scores:
-        values = means[score].dropna().to_numpy()
-        estimate = bootstrap_mean(values if values.size == n or not parse(score).domain else [])
+        values = means[score].dropna()
+        if values.size != n and parse(score).domain:
+            values = values[:0]
+        estimate = mean_interval(values.to_numpy(), [known.get(str(target), str(target)) for target in values.index])
         row |= {score: estimate.mean, f"{score}_lo": estimate.low, f"{score}_hi": estimate.high}
+        row |= {f"{score}{MEDIAN}": values.median()} if score == layout.headline else {}
     row |= {"captures": done["captures"].mean(), "seconds": timed(done)["seconds"].mean()}
     if LEARNED_COLUMN in done:
         row |= {key: done[key].mean() for key in TRAINING_COLUMNS if key != LEARNED_COLUMN}
@@ -231,7 +253,7 @@ def read_records(text: str) -> pd.DataFrame:
         raise UserError(
             f"records.csv lacks the columns {', '.join(sorted(lacking))}; it was written by another version"
         )
-    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, *NOTE_COLUMNS, CATEGORY_COLUMN}
+    text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, *NOTE_COLUMNS, CATEGORY_COLUMN, CLUSTER_COLUMN}
     for column in frame.columns:
         if column not in text_columns:
             try:

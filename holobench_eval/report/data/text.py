@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...study.folders import FILES as FILES
+from .statistics import Estimate
 
 
 def plain(values: Mapping[str, Any]) -> str:
@@ -37,6 +38,20 @@ def words(names: list[str]) -> str:
 def number(value: float) -> str:
     """Four significant digits at most, no exponent for everyday sizes; a dash for NaN."""
     return "–" if math.isnan(value) else f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+def sample(estimate: Estimate, total: int) -> str:
+    """``28 of 28 targets in 15 clusters``."""
+    among = f" in {estimate.clusters} clusters" if estimate.clusters != estimate.n else ""
+    return f"{estimate.n} of {total} targets{among}"
+
+
+def percent(estimate: Estimate | None) -> str:
+    """A share in percent with its interval, where there is one; a dash for None."""
+    if estimate is None:
+        return "–"
+    mean, low, high = (f"{100 * value:z.0f}" for value in (estimate.mean, estimate.low, estimate.high))
+    return mean if math.isnan(estimate.low) else f"{mean} [{low}, {high}]"
 
 
 def p_value(p: float) -> str:
@@ -184,7 +199,7 @@ FOCUS = replace(
         "receives all their pictures; no lens is added, and the camera moves from plane to plane. A capture is matched "
         'in intensity over the whole picture and scored. Scores "in focus" cover what is in focus at its plane.'
     ),
-    caution="Targets of one scene are not independent: intervals over targets are too narrow, and p values too small.",
+    caution="Targets of one scene are not independent: intervals and tests are over scenes.",
     picture="Each capture is taken at the plane of its target, registered, matched in intensity and sRGB-encoded",
     cost=(
         "Captures and seconds are those of one hologram: of one plane, or of all planes of a scene for a method that "

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..data.results import Results
-from ..data.statistics import RESAMPLES
 from ..data.text import FILES, words
 from ..markdown import Markdown, bullets, code, code_block, heading, properties
 from ..section import Blocks, Figures, Report, Section
@@ -54,9 +53,9 @@ def _notes(report: Report) -> Iterator[tuple[str, object]]:
     yield "Seeds", f"{'' if files else seeds}{text.seeds}"
     yield (
         "Intervals",
-        f"Percentile bootstrap of the mean over targets, {RESAMPLES:,} resamples, widened for small samples after "
-        "Hesterberg (2015). They show how the mean varies with other targets of the same kind, not with other "
-        f"displays{' or another training of the same method' * trained}.",
+        "Student's t over clusters of targets, targets of one cluster summed; Fieller's for ratios. They show how the "
+        "mean varies with other targets of the same kind, not with other displays"
+        f"{' or another training of the same method' * trained}. A difference whose interval holds zero is not shown.",
     )
     yield (
         "Files",

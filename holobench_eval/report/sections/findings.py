@@ -11,8 +11,8 @@ from ...study.plan import REFERENCE
 from ..data.categories import CALIBRATED, ONLINE
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES, Score
-from ..data.statistics import FEWEST, SIGNIFICANCE, PairedTest
-from ..data.text import p_value, words
+from ..data.statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
+from ..data.text import p_value, percent, sample, words
 from ..markdown import bullets, heading
 from ..section import Blocks, Figures, Report, Section
 
@@ -54,12 +54,18 @@ def findings(results: Results) -> list[tuple[str, list[str]]]:
 
 def _margin(score: Score, test: PairedTest) -> str:
     """The mean paired difference, second minus first, with all that belongs to it."""
-    difference, pairs = test.difference, f"{test.complete} of {test.targets} targets"
-    if test.complete < FEWEST:
-        return f"{score.with_unit(difference.mean, signed=True)} over {pairs}, too few for an interval or a test"
-    low, high = score.number(difference.low, signed=True), score.number(difference.high, signed=True)
-    mean = score.with_unit(difference.mean, signed=True)
-    return f"{mean} [{low}, {high}] over {pairs}, {p_value(test.p_holm)} after Holm"
+    found = test.estimate
+    difference = f"{_difference(score, found)} over {sample(found, test.differences.size)}"
+    if found.clusters < FEWEST:
+        return f"{difference}, too few for an interval or a test"
+    return f"{difference}, {p_value(test.p)}{'' if test.is_shown else ': not shown'}"
+
+
+def _difference(score: Score, estimate: Estimate) -> str:
+    """``+1.20 dB [+0.80, +1.60]``."""
+    mean = score.with_unit(estimate.mean, signed=True)
+    ends = (score.number(end, signed=True) for end in (estimate.low, estimate.high))
+    return mean if np.isnan(estimate.low) else f"{mean} [{', '.join(ends)}]"
 
 
 def _best(results: Results, condition: str) -> list[str]:
@@ -95,12 +101,22 @@ def _leading(
     sentence = f"{subject} {predicate}{seen}: {score.title} {value} {over}."
     compared = ranking[1:2] if best == baseline else [best]
     for test in results.against_baseline:
-        if test.condition == condition and test.second in compared and test.complete:
+        if test.condition == condition and test.second in compared and test.estimate.n:
             if best == baseline:
                 return [f"{sentence} {test.second} follows at {_margin(score, test)}."]
             other = score.with_unit(results.row(test.first, condition)[score.key])
-            return [f"{sentence} Difference from the baseline {baseline} ({other}): {_margin(score, test)}."]
-    return [sentence]
+            sentence += f" Difference from the baseline {baseline} ({other}): {_margin(score, test)}."
+    return [sentence + _lead(results, condition, ranking)]
+
+
+def _lead(results: Results, condition: str, ranking: Sequence[str]) -> str:
+    """By how much the first of a ranking is ahead of the second, and whether that is shown."""
+    if len(ranking) < 2 or results.layout.baseline in ranking[:2]:
+        return ""
+    first, second = ranking[:2]
+    lead = results.estimate(results.values(first, condition) - results.values(second, condition))
+    verdict = "" if lead.is_clear else ", which is not shown"
+    return f" It differs from the second, {second}, by {_difference(results.headline, lead)}{verdict}."
 
 
 def _incomplete(results: Results, condition: str) -> list[str]:
@@ -128,17 +144,17 @@ def _oracle(results: Results, condition: str) -> list[str]:
     for label in results.methods(condition):
         value = results.row(label, condition)[score.key]
         if label in results.layout.privileged and ranking and np.isfinite(value):
-            gap = float(np.nanmean(results.values(label, condition) - results.values(ranking[0], condition)))
+            gap = results.estimate(results.values(label, condition) - results.values(ranking[0], condition))
             sentences.append(
                 f"The privileged method {label}, an oracle that may differentiate through the bench, scores "
-                f"{score.with_unit(value)}, {score.with_unit(gap, signed=True)} from {ranking[0]}."
+                f"{score.with_unit(value)}, {_difference(score, gap)} from {ranking[0]}."
             )
     for category in (CALIBRATED, ONLINE):
         best = results.ranking(condition, categories=(category,))[:1]
-        closed = [value for label in best if np.isfinite(value := results.gap_closed(label, condition))]
+        closed = results.gap_closed(best[0], condition) if best else None
         if closed:
             sentences.append(
-                f"{best[0]}, the best method of the {category} track, closes {100 * closed[0]:z.0f} % of the gap "
+                f"{best[0]}, the best method of the {category} track, closes {percent(closed)} % of the gap "
                 f"between {results.layout.baseline} and the oracle."
             )
     return sentences
@@ -150,37 +166,34 @@ def _significant(results: Results, condition: str) -> list[str]:
     if not tests:
         return []
     if not tested:
-        return [f"No test against the baseline: fewer than {FEWEST} complete pairs."]
-    clear = [test.second for test in tested if test.p_holm < SIGNIFICANCE]
-    most = max(test.complete for test in tested)
-    smallest = min(1.0, len(tested) * 2.0 ** (1 - most))
-    caution = (
-        f"With {most} pairs and {len(tested)} comparisons no corrected p can be below {smallest:.2g}, so this test "
-        f"cannot show a difference."
-        if smallest >= SIGNIFICANCE
-        else f"The smallest corrected p that {most} pairs and {len(tested)} comparisons allow is {smallest:.2g}."
-    )
+        return [f"No test against the baseline: fewer than {FEWEST} clusters with complete pairs."]
+    family = sum(np.isfinite(test.p) for test in results.against_baseline)
+    verdicts: dict[str, list[str]] = {}
+    for test in tested:
+        better = "better" if results.headline.better(test.estimate.mean, 0.0) else "worse"
+        verdicts.setdefault(better if test.is_shown else "not shown to differ", []).append(test.second)
+    told = "; ".join(f"{verdict}: {words(labels)}" for verdict, labels in sorted(verdicts.items()))
+    clusters = max(test.estimate.clusters for test in tested)
+    smallest = 2.0 ** (1 - clusters)
+    caution = f" With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown."
     return [
-        f"Different from the baseline {tested[0].first} at p < {SIGNIFICANCE} after Holm: "
-        f"{words(clear) if clear else 'none'} ({len(clear)} of {len(tested)}). {caution}"
+        f"Against the baseline {tested[0].first}, at p < {SIGNIFICANCE} adjusted for all {family} comparisons of the "
+        f"study: {told}.{caution * (smallest >= SIGNIFICANCE)}"
     ]
 
 
 def _floor(results: Results, condition: str, floor: str) -> list[str]:
-    if floor not in results.floors or not results.has_floor(condition):
-        return []
-    score, row = results.headline, results.row(floor, REFERENCE)
-    differences = {label: results.floor_difference(label, condition, floor) for label in results.methods(condition)}
-    known = {label: value for label, value in differences.items() if np.isfinite(value)}
+    score = results.headline
+    found = {label: results.above_floor(label, condition, floor) for label in results.methods(condition)}
+    known = {label: estimate for label, estimate in found.items() if estimate}
     if not known:
         return []
-    below = [label for label, value in known.items() if not score.better(value, 0.0)]
-    verdict = (
-        f"not better on average: {words(below)}"
-        if below
-        else f"all scored methods ({len(known)}) are better on average"
-    )
-    named = results.layout.text.floor_name(floor)
+    below = [label for label, above in known.items() if not score.better(above.mean, 0.0)]
+    unclear = [label for label, above in known.items() if label not in below and not above.is_clear]
+    verdicts = [f"not better on average: {words(below)}"] if below else []
+    verdicts += [f"better on average, which is not shown: {words(unclear)}"] if unclear else []
+    verdict = "; ".join(verdicts) or f"all scored methods ({len(known)}) are better"
+    named, row = results.layout.text.floor_name(floor), results.row(floor, REFERENCE)
     return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..data.marks import marked
 from ..data.results import Results
-from ..data.statistics import Array, bootstrap_mean
+from ..data.statistics import Array, Estimate, mean_interval
 from ..data.text import number, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
@@ -37,7 +37,7 @@ def by_plane(results: Results, condition: str) -> Markdown:
     rows = []
     for name in results.methods(condition):
         values, stacked = results.values(name, condition), name in results.layout.stacked
-        estimates = [bootstrap_mean(_at(results, values, plane)) for plane in distances]
+        estimates = [_at(results, values, plane) for plane in distances]
         seconds = float(results.row(name, condition)["seconds"])
         rows.append(
             [
@@ -67,7 +67,7 @@ def _compared(results: Results, condition: str, baseline: str, name: str) -> str
     if not np.isfinite(gained).all():
         return ""
     seconds, other = (float(results.row(label, condition)["seconds"]) for label in (name, baseline))
-    estimate = bootstrap_mean(gained)
+    estimate = results.estimate(gained)
     difference = score.estimate(estimate, signed=True)
     unit = f" {score.unit}" if score.unit else ""
     where = " in focus" if score.in_focus else ""
@@ -83,13 +83,13 @@ def _compared(results: Results, condition: str, baseline: str, name: str) -> str
 def _each(results: Results, difference: Array) -> str:
     """The mean difference at every plane."""
     score = results.headline
-    means = {plane: float(_at(results, difference, plane).mean()) for plane in planes(results)}
+    means = {plane: _at(results, difference, plane).mean for plane in planes(results)}
     return words([f"{score.with_unit(mean, signed=True)} at {plane:g} mm" for plane, mean in means.items()])
 
 
-def _at(results: Results, values: Array, plane: float) -> Array:
-    """Those of ``(targets,)`` values that belong to a plane, a value per scene."""
-    return values[[results.layout.planes[target][1] == plane for target in results.targets]]
+def _at(results: Results, values: Array, plane: float) -> Estimate:
+    """Mean of those of ``(targets,)`` values that belong to a plane, a value per scene."""
+    return mean_interval(values[[results.layout.planes[target][1] == plane for target in results.targets]])
 
 
 SECTIONS = (Section("focus", 70, _render, applies=lambda report: bool(report.layout.planes)),)

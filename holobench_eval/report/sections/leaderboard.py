@@ -13,7 +13,7 @@ from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
 from ..data.marks import marked
 from ..data.results import Results
 from ..data.tables import DONE, MEMORY_COLUMN, total_captures
-from ..data.text import number, words
+from ..data.text import number, percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
 from .cost import MEMORY
@@ -40,7 +40,7 @@ def leaderboard(results: Results, condition: str) -> Markdown | None:
         return None
     each, names = results.layout.text.each, _order(results, condition)
     closed = {name: results.gap_closed(name, condition) for name in names}
-    gap = ["way to the ceiling [%]"] if np.isfinite(list(closed.values())).any() else []
+    gap = ["way to the ceiling [%]"] if any(closed.values()) else []
     columns = {
         "total_captures": "total captures",
         "training_captures": "captures for training",
@@ -60,7 +60,7 @@ def leaderboard(results: Results, condition: str) -> Markdown | None:
                 marked(results, name, condition),
                 f"{row['n']:.0f} of {len(results.targets)}",
                 results.headline.in_row(row),
-                *([_percent(closed[name])] if gap else []),
+                *([percent(closed[name])] if gap else []),
                 *(number(row[key]) for key in known),
             ]
         )
@@ -77,10 +77,6 @@ def _order(results: Results, condition: str) -> list[str]:
     return sorted(results.methods(condition), key=position)
 
 
-def _percent(share: float) -> str:
-    return "–" if np.isnan(share) else f"{100 * share:z.0f}"
-
-
 def reading(results: Results) -> str:
     """How the columns of the leaderboard are to be read."""
     each = results.layout.text.each
@@ -92,7 +88,8 @@ def reading(results: Results) -> str:
     if results.layout.baseline and any(results.oracle(condition) for condition in results.conditions):
         sentences.append(
             f'"Way to the ceiling" is the share of the gap between the baseline {results.layout.baseline} and the '
-            "oracle, the best privileged method, that a method closes, by means of the headline."
+            "oracle, the best privileged method, that a method closes, by means of the headline; in brackets its "
+            "interval."
         )
     if ONLINE in results.categories:
         sentences.append(

@@ -11,8 +11,8 @@ from ...display.simulated.changes.draws import MODEL, PARAMETERS
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
 from ..data.ranks import CIRCULAR, Cause, Feature, Pair, Ranks, share
-from ..data.statistics import SIGNIFICANCE, Estimate
-from ..data.text import p_value, words
+from ..data.statistics import SIGNIFICANCE
+from ..data.text import p_value, percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
 
@@ -76,12 +76,6 @@ def _flip(ranks: Ranks, pair: Pair) -> list[str]:
         percent(pair.flipped),
         favours(pair, pair.cause) if pair.cause else NOTHING,
     ]
-
-
-def percent(estimate: Estimate) -> str:
-    """A share in percent with its interval."""
-    mean, low, high = (f"{100 * value:.0f}" for value in (estimate.mean, estimate.low, estimate.high))
-    return f"{mean} [{low}, {high}]"
 
 
 def favours(pair: Pair, cause: Cause) -> str:
@@ -177,8 +171,8 @@ def _pairs(ranks: Ranks) -> list[str]:
         lines.append(
             f"Of the {len(flipping)} pairs that are reversed in some draw, {known} correlate with a parameter "
             "(Spearman's correlation over draws between its value and the difference of the two means, "
-            f"p < {SIGNIFICANCE} after Holm over all {ranks.tests} tests); the table names the strongest. The others "
-            "depend on several parameters at once, on the random patterns, or on chance."
+            f"p < {SIGNIFICANCE} after Bonferroni over all {ranks.tests} tests); the table names the strongest. The "
+            "others depend on several parameters at once, on the random patterns, or on chance."
         )
     return lines
 

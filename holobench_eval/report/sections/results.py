@@ -12,7 +12,7 @@ from ...study.plan import REFERENCE
 from ..charts.quality import Chart, quality_bars, target_dots
 from ..data.results import Results
 from ..data.scores import Score
-from ..data.tables import DONE, STOPPED_COLUMN
+from ..data.tables import DONE, MEDIAN, STOPPED_COLUMN
 from ..data.text import FILES
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Column, Figures, Report, Section, column, method_rows
@@ -24,8 +24,8 @@ def _render(report: Report, figures: Figures) -> Blocks:
     results, layout = report.results, report.layout
     yield heading("Results")
     yield (
-        f"The headline metric is {results.headline.axis}{layout.text.axis}. Brackets hold 95 % bootstrap intervals "
-        "over targets; n is the number of targets with a score."
+        f"The headline metric is {results.headline.axis}{layout.text.axis}. Brackets hold 95 % intervals over "
+        "clusters of targets; n is the number of targets with a score."
     )
     if layout.privileged:
         yield (
@@ -90,11 +90,27 @@ def headline_rows(results: Results, condition: str) -> tuple[list[str], list[lis
     reported = layout.reported_metrics if layout.reported_beside in (None, condition) else ()
     columns: list[Column] = [
         ("n", lambda row: f"{row['n']:.0f} of {len(results.targets)}"),
-        *((score.heading, score.in_row) for score in results.leading),
+        (results.headline.heading, results.headline.in_row),
+        *_beside_the_mean(results, condition),
+        *((score.heading, score.in_row) for score in results.leading[1:]),
         *(column(title, key) for key, title in cost_columns(results).items()),
         *(column(f"reported {Score(metric, metric).axis}", f"reported_{metric}") for metric in reported),
     ]
     return method_rows(results, condition, columns)
+
+
+def _beside_the_mean(results: Results, condition: str) -> list[Column]:
+    """The headline's median over targets, and its mean above a constant image of the same target."""
+    score = results.headline
+    unit = f" [{score.unit}]" if score.unit else ""
+    above = {name: results.above_floor(name, condition) for name in results.methods(condition)}
+
+    def difference(row: pd.Series) -> str:
+        found = above[row["method"]]
+        return score.estimate(found, signed=True) if found else "–"
+
+    columns = [(f"median{unit}", lambda row: score.number(row[f"{score.key}{MEDIAN}"]))]
+    return [*columns, (f"above a constant image{unit}", difference)] if any(above.values()) else columns
 
 
 def stopped(results: Results, condition: str) -> list[str]:

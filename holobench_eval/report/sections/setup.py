@@ -94,7 +94,9 @@ def _from_files(report: Report) -> list[tuple[str, str]]:
 def _targets(results: Results) -> tuple[str, str]:
     more = len(results.targets) - TARGETS_NAMED
     names = ", ".join(results.targets[:TARGETS_NAMED])
-    return "targets", f"{len(results.targets)}: {names}{f' and {more} more' if more > 0 else ''}"
+    count, clusters = len(results.targets), len(set(results.clusters))
+    among = f" in {clusters} clusters" if clusters < count else ""
+    return "targets", f"{count}{among}: {names}{f' and {more} more' if more > 0 else ''}"
 
 
 def _training_images(given: TrainingSet) -> str:

@@ -13,7 +13,7 @@ from ..data.categories import OFFLINE, ONLINE
 from ..data.results import Results
 from ..data.statistics import Estimate
 from ..data.sweeps import SMALL, Sweep
-from ..data.text import words
+from ..data.text import percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
 
@@ -157,11 +157,7 @@ def _stated_range(sweep: Sweep) -> list[str]:
 def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
     lines = []
     for label in sweep.methods:
-        parts = [
-            f"{value}: {100 * share.mean:.0f} %"
-            f"{'' if np.isnan(share.low) else f' [{100 * share.low:.0f}, {100 * share.high:.0f}]'}"
-            for value, share in sweep.recovered(label, remedy).items()
-        ]
+        parts = [f"{value}: {percent(share)} %" for value, share in sweep.recovered(label, remedy).items()]
         if parts:
             lines.append(f"Share of the loss that {remedy.swept.kind} recovers for {label}: {'; '.join(parts)}.")
     return lines
@@ -183,7 +179,10 @@ def claims(results: Results, sweeps: Sequence[Sweep]) -> str:
     ]
     if not verdicts:
         return ""
-    rule = f"A claim holds here if the mean loss is at most {SMALL:g} dB at every value."
+    rule = (
+        f"A claim holds here if the 95 % interval of the largest mean loss ends at or below {SMALL:g} dB, does not if "
+        "it begins above, and else neither is shown."
+    )
     return f"Chakravarthula et al. 2020 (Section 7.2) support three claims with pictures. {rule} {' '.join(verdicts)}"
 
 
@@ -197,7 +196,7 @@ def _claim(sweep: Sweep, label: str) -> str:
         lacking = "the sweep does not go far enough" if complete else "some points have no score"
         return f'"{claim}" cannot be judged for {label} on {sweep.swept.before} ({sweep.kind.words}): {lacking}.'
     value, loss = worst
-    verdict = "holds" if loss.mean <= SMALL else "does not hold"
+    verdict = "holds" if loss.high <= SMALL else "does not hold" if loss.low > SMALL else "is not shown to hold or fail"
     where = f"{sweep.kind.words}, {value_text(value)} {sweep.kind.unit}".rstrip(" ,")
     sentence = (
         f'"{claim}" {verdict} for {label} on {sweep.swept.before}: its largest loss ({where}) is '

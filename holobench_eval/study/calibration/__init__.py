@@ -13,6 +13,7 @@ from annotated_types import MinLen
 from ...core.errors import UserError, suggest
 from ...core.schema import typed
 from ...core.yaml_source import load
+from ...display import Profile
 from ..definition import Targets
 
 
@@ -50,11 +51,12 @@ def names() -> list[str]:
     return sorted(entry.name.removesuffix(".yaml") for entry in _folder().iterdir() if entry.name.endswith(".yaml"))
 
 
-def load_calibration(profile: str) -> Calibration:
-    """The calibration of a profile. UserError: it has none."""
-    if profile not in names():
-        raise UserError(f"profile '{profile}' is not fitted to anything; {suggest(profile, names())}")
-    return typed(load(_folder() / f"{profile}.yaml"), Calibration)
+def load_calibration(profile: Profile) -> Calibration:
+    """The calibration of a profile, or of the one that it is like. UserError: neither has one."""
+    for name in (profile.name, profile.like):
+        if name in names():
+            return typed(load(_folder() / f"{name}.yaml"), Calibration)
+    raise UserError(f"profile '{profile.name}' is not fitted to anything; {suggest(profile.name, names())}")
 
 
 def _folder() -> Path:

@@ -20,10 +20,8 @@ from torch import Tensor
 from ...core import plugins
 from ...core.errors import UserError
 from ...core.io import write_png
-from ...core.yaml_source import load
 from ...display import CalibratedBench, Profile
 from ...display.simulated.pipeline import SimulatedBench
-from ...display.simulated.profile import profile_file
 from ...metrics import match, score
 from ...optics import srgb_encode
 from ..config import load_study
@@ -99,10 +97,10 @@ class Fitting:
         """Mean PSNR [dB] of the network's predictions of captures with these values."""
         wanted = self.calibration.prediction
         assert wanted is not None
-        candidate = load(profile_file(self.profile.name)).data
+        candidate: dict[str, Any] = {"like": self.profile.name}
         for name, value in values.items():
             stage, _, key = name.partition(".")
-            candidate[stage] = {**candidate.get(stage, {}), key: value}
+            candidate.setdefault(stage, {})[key] = value
         with TemporaryDirectory() as name:
             folder = Path(name)
             (folder / "targets").mkdir()

@@ -27,13 +27,16 @@ READ = {
     "zero_order": lambda p: p.zero_order.fraction,
     "zero_phase": lambda p: p.zero_order.phase,
     "specks": lambda p: p.coherent_noise.specks,
+    "linewidth": lambda p: 1e9 * p.spectrum.width[1],
+    "stray": lambda p: p.stray_light.share,
+    "reach": lambda p: p.stray_light.reach,
 }
 """Where a drawn value has to arrive on the bench."""
 
 
 @pytest.fixture(scope="module")
 def profile():
-    return load_profile("leto-aged")
+    return load_profile("leto-2020")
 
 
 def test_values_stay_in_their_ranges_and_reach_near_both_ends(profile):

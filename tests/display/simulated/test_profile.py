@@ -76,3 +76,28 @@ def test_table_must_have_an_entry_for_every_level(tmp_path):
     (tmp_path / "mine.yaml").write_text(text.replace("bits: 4", "bits: 5"))
     with pytest.raises(UserError, match="16 entries; a panel of 5 bits has 32"):
         load_profile("mine.yaml", tmp_path)
+
+
+def test_a_profile_like_another_has_its_values_where_it_gives_none(tmp_path):
+    (tmp_path / "near.yaml").write_text("like: leto-aged\nname: near\nsensor: {full_well: 320}\n")
+    (tmp_path / "far.yaml").write_text("like: near.yaml\nname: far\ncrosstalk: {width: 0.1}\n")
+    base, far = load_profile("leto-aged"), load_profile("far.yaml", tmp_path)
+    assert (far.name, far.sensor.full_well, far.crosstalk.width) == ("far", 320, 0.1)
+    assert (far.sensor.read_noise, far.lut, far.panel) == (base.sensor.read_noise, base.lut, base.panel)
+    digest = far.digest
+    (tmp_path / "near.yaml").write_text("like: leto-aged\nname: near\nsensor: {full_well: 640}\n")
+    assert load_profile("far.yaml", tmp_path).digest != digest
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name: mine\nlike: leto-agde\n", r"mine.yaml:2:7: unknown profile 'leto-agde'; did you mean 'leto-aged'"),
+        ("name: mine\nlike: mine.yaml\n", r"mine.yaml:2:7: more than 4 profiles, each of them like the next"),
+        ("name: mine\nlike: ideal\nsensor: 3\n", r"mine.yaml:3:9: sensor should be a mapping"),
+    ],
+)
+def test_a_profile_like_none_or_like_itself_is_refused(tmp_path, text, message):
+    (tmp_path / "mine.yaml").write_text(text)
+    with pytest.raises(UserError, match=message):
+        load_profile("mine.yaml", tmp_path)

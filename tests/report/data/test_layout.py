@@ -1,3 +1,5 @@
+import re
+
 import pytest
 
 from holobench_eval.report import layout_of
@@ -60,6 +62,13 @@ def test_a_layout_holds_what_the_config_orders(study):
     assert [layout.category(label) for label in layout.methods] == ["open loop", "ceiling", "online"]
     assert layout.reported_metrics == ("psnr",)
     assert layout.reported_source == "a paper, table 3"
+
+
+def test_the_clusters_of_targets_are_those_of_the_dataset(study):
+    assert layout_of(study).clusters == {}
+    study.file.write_text(re.sub("targets: .*", "targets: {dataset: crops, params: {names: [coins]}}", CONFIG))
+    clusters = layout_of(load_study(study.file)).clusters
+    assert clusters == {"coins-1": "coins", "still-life-1": "still-life", "still-life-2": "still-life"}
 
 
 def test_displays_are_described_with_version_scaling_and_the_stages_that_differ_from_the_ideal(study):

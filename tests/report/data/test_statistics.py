@@ -2,88 +2,164 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy import stats
 
-from holobench_eval.report.data.statistics import _resamples, bootstrap_mean, holm, paired_test, wilcoxon
+from holobench_eval.datasets.base import clusters_of
+from holobench_eval.datasets.crops import Crops
+from holobench_eval.report.data import statistics
+from holobench_eval.report.data.statistics import _signs, family_p, mean_interval, ratio_interval
+from tests.support.coverage import DESIGNS, SHAPES, coverage, ratio_coverage, samples
+
+IN_USE = DESIGNS["28 in 15 clusters"]
+PAIRS = list("aabbccddee")
 
 
-def test_intervals_cover_the_true_mean_about_as_often_as_they_say():
-    rng = np.random.default_rng(1)
-    samples = rng.normal(17, 3, size=(400, 8))
-    estimates = [bootstrap_mean(sample) for sample in samples]
-    coverage = np.mean([estimate.low <= 17 <= estimate.high for estimate in estimates])
-    assert 0.91 <= coverage <= 0.985
+def test_the_simulated_design_is_that_of_the_targets_in_use():
+    clusters = list(clusters_of(Crops()).values())
+    assert sorted(map(clusters.count, set(clusters))) == sorted(IN_USE)
 
 
-def test_an_interval_is_the_same_every_time():
+@pytest.mark.parametrize("shape", SHAPES)
+def test_intervals_hold_the_true_mean_as_often_as_they_say(shape):
+    assert 0.93 <= coverage(shape, IN_USE, 4000) <= 0.97
+
+
+@pytest.mark.parametrize("sizes", [DESIGNS["8 alone"], DESIGNS["4 alone"]])
+def test_few_targets_widen_the_interval_and_leave_its_coverage(sizes):
+    assert 0.93 <= coverage("normal", sizes, 4000) <= 0.97
+
+
+def test_targets_that_are_taken_for_independent_have_intervals_that_are_too_narrow():
+    assert coverage("normal", IN_USE, 2000, by_cluster=False) < 0.91
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_intervals_of_ratios_hold_the_true_ratio_as_often_as_they_say(shape):
+    assert 0.93 <= ratio_coverage(shape, IN_USE, 3000) <= 0.97
+
+
+def test_an_interval_of_targets_that_are_alone_is_that_of_students_t():
     values = np.random.default_rng(2).normal(size=9)
-    estimate = bootstrap_mean(values)
-    _resamples.cache_clear()  # as in another process
-    assert bootstrap_mean(values) == estimate
+    low, high = stats.t.interval(0.95, 8, values.mean(), stats.sem(values))
+    found = mean_interval(values)
+    assert (found.low, found.high, found.n, found.clusters) == pytest.approx((low, high, 9, 9))
+
+
+def test_an_interval_of_equal_clusters_is_that_of_their_means():
+    values = np.random.default_rng(3).normal(size=10)
+    means = mean_interval(values.reshape(5, 2).mean(1))
+    found = mean_interval(values, PAIRS)
+    assert (found.low, found.mean, found.high) == pytest.approx((means.low, means.mean, means.high))
+    assert (found.n, found.clusters) == (10, 5)
+
+
+def test_targets_counted_twice_are_no_more_evidence():
+    values = np.random.default_rng(4).normal(size=6)
+    once = mean_interval(values)
+    twice = mean_interval(np.repeat(values, 2), np.repeat(list("abcdef"), 2))
+    assert (twice.low, twice.high) == pytest.approx((once.low, once.high))
 
 
 def test_an_interval_of_equal_values_has_no_width():
-    estimate = bootstrap_mean([0.5] * 6)
+    estimate = mean_interval([0.5] * 6)
     assert (estimate.low, estimate.mean, estimate.high) == (0.5, 0.5, 0.5)
+
+
+def test_no_interval_is_the_range_of_the_values():
+    values = np.random.default_rng(5).normal(size=(100, 4))
+    ends = np.array([[estimate.low, estimate.high] for estimate in map(mean_interval, values)])
+    range_of_each = np.stack([values.min(1), values.max(1)], axis=1)
+    assert not np.isclose(ends, range_of_each).all(1).any()
 
 
 @pytest.mark.parametrize("values", [[], [17.0], [17.0, 19.0]])
 def test_below_three_targets_there_is_no_interval(values):
-    estimate = bootstrap_mean(values)
+    estimate = mean_interval(values)
     assert estimate.n == len(values)
-    assert np.isnan(estimate.low)
-    assert np.isnan(estimate.high)
+    assert np.isnan([estimate.low, estimate.high]).all()
+    assert not estimate.is_clear
 
 
-@given(st.lists(st.integers(-1000, 1000).filter(bool), min_size=3, max_size=12, unique_by=abs))
-def test_wilcoxon_without_ties_equals_the_exact_test_of_scipy(values):
-    assert wilcoxon(values) == pytest.approx(stats.wilcoxon(values, method="exact").pvalue)
+def test_below_three_clusters_there_is_no_interval_and_no_test():
+    values = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 2.0])
+    assert np.isnan(mean_interval(values, list("aaabbb")).low)
+    assert np.isnan(ratio_interval(values, values + 1, list("aaabbb")).low)
+    assert np.isnan(family_p(values[None], list("aaabbb"))).all()
 
 
-@pytest.mark.parametrize("values", [[1, 1, -1, 2, 2, 3], [0, 0, 1, 2, 2, -2], [0.5, 0.5, 0.5, 0.5], [3, -3, 1, -1]])
-def test_wilcoxon_with_ties_and_zeros_equals_a_count_over_all_signs(values):
-    known = np.array([value for value in values if value])
-    ranks = stats.rankdata(np.abs(known))
-    sums = np.array([ranks @ np.array(signs) for signs in itertools.product((0, 1), repeat=known.size)])
-    observed = ranks[known > 0].sum()
-    expected = min(1.0, 2 * min(np.mean(sums <= observed), np.mean(sums >= observed)))
-    assert wilcoxon(values) == pytest.approx(expected)
+def test_a_ratio_is_exact_at_its_ends():
+    gap = np.random.default_rng(6).normal(4, 1, size=10)
+    for share in (0.0, 0.5, 1.0):
+        found = ratio_interval(share * gap, gap, PAIRS)
+        assert (found.low, found.mean, found.high) == pytest.approx((share, share, share))
 
 
-def test_wilcoxon_of_no_difference_is_one():
-    assert wilcoxon([0.0, 0.0, 0.0]) == 1.0
+def test_a_ratio_to_what_is_not_shown_to_differ_from_zero_has_no_interval():
+    values = np.array([1.0, -2.0, 3.0, -1.0, 0.5])
+    assert np.isnan(ratio_interval(values, values[::-1]).low)
 
 
-def test_differences_that_binary_subtraction_makes_unequal_stay_tied():
-    assert wilcoxon([0.3 - 0.2, 0.2 - 0.1, 0.1 - 0.2, 5.0]) == wilcoxon([0.1, 0.1, -0.1, 5.0])
+def counted(differences, clusters):
+    """Step-down p values over every sign of every cluster, by the t statistic itself."""
+    names = sorted(set(clusters))
+    index = np.array([names.index(cluster) for cluster in clusters])
+    found = []
+    for signs in itertools.product((1, -1), repeat=len(names)):
+        turned = np.asarray(signs)[index] * differences
+        sums = np.stack([turned[:, index == number].sum(1) for number in range(len(names))], axis=1)
+        found.append(np.abs(sums.mean(1) / np.maximum(sums.std(1, ddof=1), 1e-15)))
+    adjusted, least = {}, 0.0
+    for number in sorted(range(len(differences)), key=lambda number: -found[0][number]):
+        weaker = [other for other in range(len(differences)) if other not in adjusted]
+        largest = np.max(np.array(found)[:, weaker], axis=1)
+        adjusted[number] = least = max(least, np.mean(largest >= found[0][number] * (1 - 1e-9)))
+    return [adjusted[number] for number in range(len(differences))]
 
 
-def test_holm_equals_a_computation_by_hand():
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+def test_p_values_equal_a_count_over_all_signs():
+    differences = np.random.default_rng(7).normal([[0.0], [0.6], [2.0]], 1, size=(3, 10))
+    assert family_p(differences, PAIRS) == pytest.approx(counted(differences, PAIRS))
 
 
-def test_holm_does_not_count_tests_that_were_not_made():
-    corrected = holm([0.01, float("nan"), 0.02])
-    assert corrected[0] == pytest.approx(0.02)
-    assert np.isnan(corrected[1])
-    assert corrected[2] == pytest.approx(0.02)
+def test_signs_that_are_drawn_give_nearly_the_p_values_of_all_signs(monkeypatch):
+    differences = np.random.default_rng(8).normal([[0.0], [0.4], [0.7], [1.0]], 1, size=(4, 12))
+    exact = family_p(differences)
+    monkeypatch.setattr(statistics, "MOST_ENUMERATED", 5)
+    _signs.cache_clear()
+    drawn = family_p(differences)
+    _signs.cache_clear()
+    assert np.abs(drawn - exact).max() < 0.01
+    assert (drawn > 0).all()
 
 
-def test_holm_never_exceeds_one():
-    assert holm([0.9, 0.8]) == [1.0, 1.0]
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_family_without_a_difference_shows_one_in_at_most_one_of_twenty_studies(shape):
+    """Five comparisons with one baseline, so that they are correlated; 97 % of 1000 studies would show too few."""
+    drawn, clusters = samples(shape, DESIGNS["8 alone"], 1000, columns=6)
+    shown = [(family_p(study[1:] - study[0], clusters) < 0.05).any() for study in drawn]
+    assert np.mean(shown) <= 0.065
 
 
-def test_pairs_with_a_hole_are_left_out_and_counted():
-    first, second = np.array([1.0, 2.0, 3.0, np.nan, 5.0]), np.array([2.0, 3.0, 4.0, 9.0, np.nan])
-    test = paired_test("bench", "a", "b", (first, second))
-    assert (test.complete, test.targets) == (3, 5)
-    assert test.difference.mean == 1.0
-    assert test.p == pytest.approx(0.25)
+def test_a_family_costs_little_where_its_comparisons_are_alike():
+    differences = np.random.default_rng(9).normal(0.6, 1, size=12)
+    alone, alike = family_p(differences[None])[0], family_p(np.stack([differences] * 20))[0]
+    assert alike == pytest.approx(alone)
 
 
-def test_two_pairs_give_a_difference_and_no_test():
-    test = paired_test("bench", "a", "b", (np.array([1.0, 2.0]), np.array([2.0, 4.0])))
-    assert test.difference.mean == 1.5
-    assert np.isnan(test.p)
+def test_no_difference_has_p_one():
+    assert family_p(np.zeros((1, 5))) == [1.0]
+
+
+def test_a_hole_is_left_out_of_its_own_comparison_alone():
+    differences = np.random.default_rng(10).normal(1, 1, size=(2, 8))
+    holed = differences.copy()
+    holed[1, 3:] = np.nan
+    assert family_p(holed[:1]) == pytest.approx(family_p(differences[:1]))
+    assert family_p(holed[1:]) == pytest.approx(family_p(differences[1:, :3]))
+
+
+def test_more_clusters_than_signs_can_be_counted_give_the_same_p_every_time():
+    differences = np.random.default_rng(11).normal(0.3, 1, size=(2, 24))
+    first = family_p(differences)
+    _signs.cache_clear()  # as in another process
+    assert family_p(differences) == pytest.approx(first, abs=0)

@@ -57,6 +57,20 @@ def test_rows_follow_the_config_and_end_with_the_floor(records):
     assert found == [*synthetic.layout().pairs, *((name, REFERENCE) for name in FLOORS)]
 
 
+def test_clusters_and_the_median_stand_in_the_table_and_widen_the_interval():
+    found = rows({"t1": 1.0, "t2": 1.5, "t3": 4.0, "t4": 4.5, "t5": 2.0, "t6": 2.5})
+    alone = {"targets": ("t1", "t2", "t3", "t4", "t5", "t6"), "pairs": (("a", "bench"),), "baseline": None}
+    grouped = alone | {"clusters": dict(zip(alone["targets"], "ppqqrr", strict=True))}
+    wide, narrow = (
+        row_of(Results(records_frame(found, layout), layout).table, "a")
+        for layout in (synthetic.layout(**grouped), synthetic.layout(**alone))
+    )
+    assert (wide["n"], wide["clusters"], wide["psnr_linear_median"]) == (6, 3, 2.25)
+    assert wide["psnr_linear"] == narrow["psnr_linear"]
+    assert wide["psnr_linear_lo"] < narrow["psnr_linear_lo"]
+    assert "clusters" not in narrow
+
+
 def test_targets_keep_the_order_of_the_dataset():
     frame = records_frame(rows({"t1": 1.0, "t2": 2.0}), PLAIN)
     assert list(frame["target"]) == ["t2", "t1"]

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report import Results, records_frame
+from holobench_eval.report import Results, csv_text, records_frame
+from holobench_eval.report.data.tables import read_records
 from holobench_eval.report.sections.findings import findings
 from holobench_eval.study.plan import REFERENCE
 from tests.support import synthetic_study as synthetic
@@ -38,22 +39,26 @@ def test_the_best_method_is_named_with_its_margin_interval_and_p():
     text = sentences(results_of({"old": psnr(17.0), "new": {"psnr_linear": 19.0 + 2 * NOISE}}))["bench"]
     assert "new ranks first of 2 methods: PSNR 19.10" in text
     assert "Difference from the baseline old (17.05 dB): +2.05 dB [" in text
-    assert "8 of 8 targets, p = 0.008 after Holm" in text
-    assert "at p < 0.05 after Holm: new (1 of 1)" in text
+    assert "8 of 8 targets, p = 0.008." in text
+    assert "Against the baseline old, at p < 0.05 adjusted for all 1 comparisons of the study: better: new." in text
+    assert "not shown" not in text
 
 
 def test_when_the_baseline_wins_the_next_method_is_compared_with_it():
     text = sentences(results_of({"old": psnr(20.0), "mid": psnr(19.0), "low": psnr(15.0)}))["bench"]
     assert "The baseline old ranks first of 3 methods: PSNR 20.05" in text
     assert "mid follows at -1.00 dB [" in text
+    assert "of the study: worse: mid and low." in text
 
 
 def test_a_privileged_method_is_the_oracle_and_never_the_best():
     scores = {"old": psnr(17.0), "new": psnr(18.0), "oracle": psnr(30.0)}
-    text = sentences(results_of(scores, privileged=frozenset({"oracle"})))["bench"]
+    found = results_of(scores, privileged=frozenset({"oracle"}))
+    text = sentences(found)["bench"]
     assert "new ranks first of 2 methods" in text
     assert "The privileged method oracle, an oracle that may differentiate" in text
-    assert "+12.00 dB from new" in text
+    assert "+12.00 dB [+12.00, +12.00] from new" in text
+    assert [test.second for test in found.against_baseline if np.isfinite(test.p)] == ["new"]
 
 
 def test_a_method_that_does_not_beat_a_constant_image_is_named():
@@ -96,20 +101,45 @@ def test_a_metric_that_disagrees_with_the_headline_is_named():
 def test_two_targets_give_no_test_and_say_so():
     text = sentences(results_of({"old": psnr(17.0), "new": psnr(18.0)}, targets=TARGETS[:2]))["bench"]
     assert "too few for an interval or a test" in text
-    assert "No test against the baseline: fewer than 3 complete pairs." in text
+    assert "No test against the baseline: fewer than 3 clusters with complete pairs." in text
     assert "p =" not in text
 
 
 def test_a_test_that_could_not_have_shown_anything_says_so():
     text = sentences(results_of({"old": psnr(17.0), "new": psnr(18.0)}, targets=TARGETS[:4]))["bench"]
-    assert "this test cannot show a difference" in text
+    assert "With 4 clusters no p can be below 0.12: no difference can be shown." in text
 
 
-def test_every_pair_is_tested_and_corrected_within_its_display():
-    results = results_of({"old": psnr(17.0), "mid": psnr(18.0), "new": psnr(19.0)})
+def test_every_method_is_tested_against_the_baseline_alone_and_all_in_one_family():
+    scores = {"old": psnr(17.0), "mid": {"psnr_linear": 17.3 + NOISE[::-1]}, "new": {"psnr_linear": 17.1 - NOISE}}
+    results = results_of(scores)
     assert [(t.first, t.second) for t in results.against_baseline] == [("old", "mid"), ("old", "new")]
-    assert len(results.between_all) == 3
-    assert results.between_all[0].p_holm == pytest.approx(3 * 2 / 2**8)
+    alone = results_of({label: scores[label] for label in ("old", "mid")}).against_baseline[0]
+    assert results.against_baseline[0].p > alone.p
+
+
+def test_a_difference_that_may_be_chance_is_not_shown():
+    found = results_of({"old": psnr(17.0), "new": {"psnr_linear": 17.2 - NOISE}})
+    text = sentences(found)["bench"]
+    assert "8 of 8 targets, p = 0.672: not shown." in text
+    assert "of the study: not shown to differ: new." in text
+
+
+def test_a_lead_over_the_second_that_may_be_chance_is_not_shown():
+    scores = {"old": psnr(15.0), "mid": psnr(18.0), "new": {"psnr_linear": 18.2 - NOISE}}
+    text = sentences(results_of(scores))["bench"]
+    assert "new ranks first of 3 methods" in text
+    assert "It differs from the second, mid, by +0.10 dB [" in text
+    assert "], which is not shown." in text
+
+
+def test_targets_of_one_cluster_are_counted_as_one():
+    scores = {"old": psnr(17.0), "new": {"psnr_linear": 19.0 + 2 * NOISE}}
+    pairs = {target: f"photograph {index // 2}" for index, target in enumerate(TARGETS)}
+    found = results_of(scores, clusters=pairs)
+    assert "8 of 8 targets in 4 clusters, p = 0.125: not shown" in sentences(found)["bench"]
+    again = Results(read_records(csv_text(found.frame)), synthetic.layout(baseline="old"))  # from records alone
+    assert again.against_baseline[0].estimate == found.against_baseline[0].estimate
 
 
 def test_a_headline_that_no_record_has_is_an_error_with_a_suggestion():
@@ -129,4 +159,4 @@ def test_a_floor_without_a_score_is_not_spoken_of():
     assert results.floors == ["floor_speckle"]
     text = sentences(results)["bench"]
     assert "constant" not in text
-    assert "pure speckle scores 9.05 dB; all scored methods (1) are better on average" in text
+    assert "pure speckle scores 9.05 dB; all scored methods (1) are better." in text

@@ -1,4 +1,3 @@
-import numpy as np
 import pytest
 
 from holobench_eval.report import Results, csv_text, recompute_table, records_frame
@@ -78,16 +77,19 @@ def test_a_headline_of_which_less_is_better_is_ranked_the_other_way(records):
 
 
 def test_no_gap_is_closed_at_the_baseline_and_all_of_it_at_the_oracle(found):
-    assert found.gap_closed("wirtinger", "ideal") == 0
-    assert found.gap_closed("oracle", "ideal") == 1
+    for name, share in (("wirtinger", 0), ("oracle", 1)):
+        closed = found.gap_closed(name, "ideal")
+        assert (closed.low, closed.mean, closed.high) == pytest.approx((share, share, share))
     mean = {name: found.values(name, "ideal").mean() for name in ("wirtinger", "hil", "oracle")}
     expected = (mean["hil"] - mean["wirtinger"]) / (mean["oracle"] - mean["wirtinger"])
-    assert found.gap_closed("hil", "ideal") == pytest.approx(expected)
+    closed = found.gap_closed("hil", "ideal")
+    assert closed.mean == pytest.approx(expected)
+    assert closed.low < expected < closed.high
 
 
 def test_there_is_no_gap_to_an_oracle_below_the_baseline(records):
     bad = [r | {"scores": {"psnr_linear": 1.0}} if r["label"] == "oracle" else r for r in records]
-    assert np.isnan(results(bad).gap_closed("hil", "ideal"))
+    assert results(bad).gap_closed("hil", "ideal") is None
     assert "way to the ceiling" not in leaderboard(results(bad), "ideal")
 
 

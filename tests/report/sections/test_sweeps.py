@@ -112,7 +112,7 @@ def test_what_a_remedy_gets_back_is_told_as_a_share(results: Results) -> None:
     assert share.mean == pytest.approx(7 / 8)
     assert of(results, "eye").recovered("Wirtinger", of(results, "known_eye")) == {}  # it lost nothing
     told = section_sweeps.sentences(of(results, "eye"), sweeps(results))
-    assert any("88 %" in sentence for sentence in told)
+    assert any("88 [88, 88] %" in sentence for sentence in told)
 
 
 def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> None:
@@ -124,6 +124,17 @@ def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> 
     assert "goes from +4.00 to -5.00 dB" in told
     without = Results(results.frame[results.frame["name"] != "hil"], replace(layout(), pairs=()))
     assert section_sweeps.claims(without, sweeps(without)) == ""
+
+
+def test_a_claim_whose_interval_is_on_both_sides_of_the_bound_is_neither_shown_to_hold_nor_to_fail() -> None:
+    found = records()
+    for record in found:
+        if record["label"] == "HIL" and "drift" in record["cell"]["condition"]:
+            record["scores"]["psnr_linear"] = psnr("HIL", record["cell"]["target"]) - 3.0 * (
+                record["cell"]["target"] > "b"
+            )
+    uneven = Results(records_frame(found, layout()), layout())
+    assert 'three months" is not shown to hold or fail for HIL' in section_sweeps.claims(uneven, sweeps(uneven))
 
 
 def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Results) -> None:

@@ -13,7 +13,7 @@ from ..profile import Profile
 
 STAGES = (
     *("seed", "sampling", "lut", "crosstalk", "aperture", "flicker", "illumination", "coherent_noise", "propagation"),
-    "zero_order",
+    *("zero_order", "spectrum", "stray_light"),
 )
 MODEL = (
     "every parameter of the table drawn evenly within its range, and every random pattern anew; pose, camera and what "
@@ -95,6 +95,23 @@ def _zero_phase(profile: Profile, value: float) -> Profile:
     return replace(profile, zero_order=replace(profile.zero_order, phase=value))
 
 
+def _width(profile: Profile, value: float) -> Profile:
+    if not any(profile.spectrum.width):
+        return profile
+    width = (value * 1e-9, value * 1e-9, value * 1e-9)
+    return replace(profile, spectrum=replace(profile.spectrum, width=width))
+
+
+def _share(profile: Profile, value: float) -> Profile:
+    if not profile.stray_light.share:
+        return profile
+    return replace(profile, stray_light=replace(profile.stray_light, share=value))
+
+
+def _reach(profile: Profile, value: float) -> Profile:
+    return replace(profile, stray_light=replace(profile.stray_light, reach=value))
+
+
 def _specks(profile: Profile, value: float) -> Profile:
     return replace(profile, coherent_noise=replace(profile.coherent_noise, specks=round(value)))
 
@@ -116,6 +133,9 @@ PARAMETERS: Mapping[str, Parameter] = {
     "zero_order": Parameter("unmodulated light", "of the power", 0.0, 0.35, "20 % usual, 35 % reported", _zero_order),
     "zero_phase": Parameter("phase of the unmodulated light", "rad", -TAU / 2, TAU / 2, "unknown", _zero_phase),
     "specks": Parameter("specks of dust on the panel", "", 0.0, 50.0, "assumed", _specks),
+    "linewidth": Parameter("width of the laser line", "nm", 1.0, 5.0, "1-5 nm of laser diodes", _width),
+    "stray": Parameter("stray light", "of the light", 0.05, 0.7, "assumed, as in the fit of leto-2020", _share),
+    "reach": Parameter("reach of the stray light", "panel heights", 0.05, 0.3, "assumed", _reach),
 }
 """What is drawn. Ranges without another source are those of the sources that the profiles name."""
 

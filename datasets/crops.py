@@ -1,0 +1,159 @@
+"""Crops of photographs at their own resolution, and renderings: enough pictures for a difference to show."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+import torch
+from annotated_types import Interval
+from PIL import Image
+from torch import Tensor
+
+from ..core.errors import UserError
+from . import still_life
+from .base import chosen, from_srgb, known, named_digest, shipped, with_channels
+from .photographs import FILES as PHOTOGRAPHS
+
+VERSION = 1  # part of every digest: raise it when another rule chooses the crops
+
+MATPLOTLIB = "matplotlib/mpl-data/sample_data"
+# name, file and folder; without those that have no crop of 208 pixels: text is smaller, and at its own resolution
+# retina is flat but for its black corners
+FILES = {name: (file, "skimage/data") for name, file in PHOTOGRAPHS.items() if name not in ("text", "retina")} | {
+    "motorcycle": ("motorcycle_left.png", "skimage/data"),
+    "coins": ("coins.png", "skimage/data"),
+    "moon": ("moon.png", "skimage/data"),
+    "ihc": ("ihc.png", "skimage/data"),
+    "grace_hopper": ("grace_hopper.jpg", MATPLOTLIB),
+}
+RENDERING = "still-life"
+
+# Smallest contrast of a crop, linear light (rms difference from its mean colour): a constant image would score
+# 26 dB on a flatter one, more than most captures score on anything.
+FLAT = 0.05
+
+
+class Crop(NamedTuple):
+    """Where a crop lies: photograph, first row and column."""
+
+    photograph: str
+    top: int
+    left: int
+
+
+@dataclass(frozen=True)
+class Crops:
+    """Square crops, at native resolution, of the photographs inside scikit-image and matplotlib; and renderings.
+
+    A centred grid of as many disjoint squares of ``size`` pixels as fit is laid over each photograph. Its crops are
+    the ``each`` squares nearest to its middle, the upper or left one of two equally near ones, without those whose
+    contrast is below ``FLAT``. A crop is named by its place in the grid: ``astronaut-2`` is the second square, row by
+    row. Crops of one photograph are one cluster; so are the renderings, still lifes of one generator. The photographs
+    are decoded as sRGB.
+
+    size: pixels a side; 208 is the region that is scored on a panel of 256 x 256. A smaller region shows the middle
+    of a crop, a larger one is refused: nothing is resized. each: crops of a photograph, at most. names: the
+    photographs, in this order (default: all of ``FILES``). renderings: how many.
+    """
+
+    size: Annotated[int, Interval(ge=32, le=4096)] = 208
+    each: Annotated[int, Interval(ge=1, le=100)] = 2
+    names: tuple[str, ...] = tuple(FILES)
+    renderings: Annotated[int, Interval(ge=0, le=100)] = 2
+
+    training: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """UserError for an unknown or repeated name."""
+        chosen("photograph", self.names, tuple(FILES))
+
+    def items(self) -> list[str]:
+        """``photograph-place``, photograph by photograph, then the renderings. UserError for one without a crop."""
+        return [*self._places(), *(f"{RENDERING}-{number}" for number in range(1, self.renderings + 1))]
+
+    def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
+        """The middle of a crop as ``(channels, *shape)`` linear light in [0, 1]. UserError for a larger shape."""
+        rows, columns = shape
+        place = self._place(item)
+        if place is None:
+            picture = torch.from_numpy(still_life.still_life(item, shape)[0]).permute(2, 0, 1).float().contiguous()
+            return with_channels(picture, channels)
+        if max(shape) > self.size:
+            raise UserError(
+                f"a crop of {self.size} x {self.size} pixels has no room for a target of {rows} x {columns}; "
+                "choose a larger size, or the dataset photographs, which are enlarged"
+            )
+        top, left = place.top + (self.size - rows) // 2, place.left + (self.size - columns) // 2
+        return with_channels(_cut(Crop(place.photograph, top, left), shape).clone(), channels)
+
+    def digest(self, item: str) -> str:
+        """SHA-256 of the photograph's file and of the place, or of the rendering's name."""
+        place = self._place(item)
+        if place is None:
+            return named_digest(item, still_life.VERSION)
+        content = hashlib.sha256(_content(place.photograph)).hexdigest()
+        return named_digest("crop", VERSION, content, place.top, place.left, self.size)
+
+    def cluster(self, item: str) -> str:
+        """The photograph of a crop; one name for all renderings."""
+        place = self._place(item)
+        return RENDERING if place is None else place.photograph
+
+    def _place(self, item: str) -> Crop | None:
+        return self._places().get(known("crop", item, self.items()))
+
+    def _places(self) -> dict[str, Crop]:
+        """Where the crop of every item lies."""
+        return {item: crop for name in self.names for item, crop in _best(name, self.size, self.each)}
+
+
+@lru_cache(maxsize=256)
+def _best(name: str, size: int, each: int) -> tuple[tuple[str, Crop], ...]:
+    """Name and place of the crops of a photograph, row by row. UserError for a photograph without one."""
+    picture = _decoded(name)
+    height, width = picture.shape[1:]
+    rows, columns = height // size, width // size
+    places = [(row, column) for row in range(rows) for column in range(columns)]
+    nearest = sorted(places, key=lambda place: math.hypot(2 * place[0] - rows + 1, 2 * place[1] - columns + 1))
+    top, left = (height - rows * size) // 2, (width - columns * size) // 2
+    crops = {place: Crop(name, top + size * place[0], left + size * place[1]) for place in nearest}
+    kept = [place for place, crop in crops.items() if _contrast(_cut(crop, (size, size))) >= FLAT][:each]
+    found = tuple((f"{name}-{places.index(place) + 1}", crops[place]) for place in sorted(kept))
+    if not found:
+        raise UserError(
+            f"photograph '{name}' has {height} x {width} pixels and no crop of {size} x {size} with a contrast of "
+            f"{FLAT:g}; choose a smaller size, or leave it out of names"
+        )
+    return found
+
+
+def _cut(crop: Crop, shape: tuple[int, int]) -> Tensor:
+    """``(3, *shape)`` of a photograph."""
+    rows, columns = slice(crop.top, crop.top + shape[0]), slice(crop.left, crop.left + shape[1])
+    return _decoded(crop.photograph)[:, rows, columns]
+
+
+def _contrast(picture: Tensor) -> float:
+    """Root mean square of the difference from the mean colour, of ``(3, h, w)``."""
+    return float((picture - picture.mean((1, 2), keepdim=True)).square().mean().sqrt())
+
+
+def _content(name: str) -> bytes:
+    file, folder = FILES[name]
+    content = shipped(file, folder)
+    if content is None:
+        package = folder.partition("/")[0].replace("skimage", "scikit-image")
+        raise UserError(f"photograph '{name}' is not in the installed {package}; leave it out of names")
+    return content
+
+
+@lru_cache(maxsize=32)
+def _decoded(name: str) -> Tensor:
+    with Image.open(io.BytesIO(_content(name))) as image:
+        return from_srgb(np.asarray(image))

@@ -1,0 +1,106 @@
+"""Crops at native resolution."""
+
+import itertools
+
+import numpy as np
+import pytest
+import torch
+from matplotlib import cbook
+from PIL import Image
+
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import UserError
+from holobench_eval.datasets import crops
+from holobench_eval.datasets.base import clusters_of, from_srgb
+from holobench_eval.datasets.crops import FILES, FLAT, Crops
+from holobench_eval.display import load_profile
+
+
+def test_the_default_is_at_least_24_targets_in_15_clusters_for_a_panel_of_256():
+    dataset = Crops()
+    assert load_profile("leto-aged").spec((256, 256)).region.shape == (dataset.size, dataset.size)
+    assert len(dataset.items()) == 28
+    assert len(set(clusters_of(dataset).values())) == 15
+
+
+def test_what_the_default_scores_does_not_change_unnoticed():
+    """A change here needs a new VERSION of the dataset, since committed studies score these crops."""
+    places = Crops()._places()
+    assert places["astronaut-1"] == ("astronaut", 48, 48)
+    chosen = {name: [int(item[-1]) for item in places if places[item].photograph == name] for name in FILES}
+    assert {name: numbers for name, numbers in chosen.items() if numbers != [1, 2]} == {
+        "rocket": [4, 5],
+        "hubble_deep_field": [6, 7],
+        "motorcycle": [2, 5],
+        "coins": [1],
+        "moon": [1],
+    }
+
+
+def test_a_crop_has_the_pixels_of_its_photograph():
+    with Image.open(cbook.get_sample_data("grace_hopper.jpg", asfileobj=False)) as image:
+        picture = from_srgb(np.asarray(image))
+    top, left = (600 - 2 * 208) // 2, (512 - 2 * 208) // 2
+    wanted = picture[:, top : top + 208, left + 208 : left + 416]
+    assert torch.equal(Crops().load("grace_hopper-2", (208, 208)), wanted)
+
+
+def test_a_smaller_region_shows_the_middle_of_a_crop():
+    whole = Crops().load("astronaut-1", (208, 208))
+    assert torch.equal(Crops().load("astronaut-1", (169, 100)), whole[:, 19:188, 54:154])
+
+
+def test_crops_of_a_photograph_are_disjoint_and_inside_it():
+    for name in FILES:
+        height, width = crops._decoded(name).shape[1:]
+        places = [crop for _, crop in crops._best(name, 208, 100)]
+        assert all(0 <= top <= height - 208 and 0 <= left <= width - 208 for _, top, left in places)
+        for one, other in itertools.combinations(places, 2):
+            assert max(abs(one.top - other.top), abs(one.left - other.left)) >= 208
+
+
+def test_flat_crops_are_left_out():
+    dataset = Crops(names=("moon",), each=4, renderings=0)
+    assert dataset.items() == ["moon-1"]  # of four squares
+    for place in ((48, 256), (256, 48), (256, 256)):
+        assert crops._contrast(crops._cut(crops.Crop("moon", *place), (208, 208))) < FLAT
+
+
+def test_the_middle_of_a_photograph_comes_first():
+    assert Crops(names=("hubble_deep_field",), each=1).items()[0] == "hubble_deep_field-6"  # of four by four
+    assert Crops(names=("motorcycle",), each=1).items()[0] == "motorcycle-2"  # of two rows of three
+
+
+def test_renderings_are_drawn_in_the_shape_asked_for_and_are_one_cluster():
+    dataset = Crops(names=("coins",), renderings=2)
+    assert dataset.items() == ["coins-1", "still-life-1", "still-life-2"]
+    assert dataset.load("still-life-1", (300, 250)).shape == (3, 300, 250)
+    assert [dataset.cluster(item) for item in dataset.items()] == ["coins", "still-life", "still-life"]
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"names": ["coin"]}, "unknown photograph 'coin'; did you mean 'coins'"),
+        ({"names": ["coins"], "size": 320}, "'coins' has 303 x 384 pixels and no crop of 320 x 320 with a contrast"),
+        ({"each": 0}, "'each'"),
+    ],
+)
+def test_wrong_parameters_are_one_line(params, message):
+    with pytest.raises(UserError) as caught:
+        plugins.build("datasets", "crops", params).items()
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_region_larger_than_a_crop_is_one_line():
+    with pytest.raises(
+        UserError, match="208 x 208 pixels has no room for a target of 877 x 1560; choose a larger size"
+    ):
+        Crops().load("coins-1", (877, 1560))
+
+
+def test_a_photograph_missing_from_its_package_is_one_line(monkeypatch):
+    monkeypatch.setitem(FILES, "brick", ("no-such-file.png", "skimage/data"))
+    with pytest.raises(UserError, match="'brick' is not in the installed scikit-image; leave it out of names"):
+        crops._content("brick")

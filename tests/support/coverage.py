@@ -1,0 +1,72 @@
+"""How often intervals hold the true mean: ``python -m tests.support.coverage`` prints the table of the docs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from holobench_eval.report.data.statistics import Estimate, mean_interval, ratio_interval
+
+Array = NDArray[np.float64]
+Draw = Callable[[np.random.Generator, tuple[int, ...]], Array]
+
+# of mean 0 and variance 1
+SHAPES: dict[str, Draw] = {
+    "normal": lambda rng, size: rng.normal(size=size),
+    "skewed (gamma, skewness 1)": lambda rng, size: (rng.gamma(4, size=size) - 4) / 2,
+    "very skewed (exponential, skewness 2)": lambda rng, size: rng.exponential(size=size) - 1,
+    "heavy-tailed (t, 3 degrees of freedom)": lambda rng, size: rng.standard_t(3, size=size) / np.sqrt(3),
+}
+# targets in each cluster: those of the dataset ``crops``, as many targets that are alone, and few
+DESIGNS = {
+    "28 in 15 clusters": (2,) * 10 + (1, 1) + (2,) * 3,
+    "28 alone": (1,) * 28,
+    "16 alone": (1,) * 16,
+    "8 alone": (1,) * 8,
+    "4 alone": (1,) * 4,
+}
+SHARED = 0.5  # share of the variance that the targets of a cluster have in common
+
+
+def samples(shape: str, sizes: tuple[int, ...], count: int, columns: int = 1) -> tuple[Array, list[str]]:
+    """``(count, columns, targets)`` values of mean 0, and the cluster of each target."""
+    rng = np.random.default_rng([len(sizes), sum(sizes), list(SHAPES).index(shape)])
+    index = np.repeat(np.arange(len(sizes)), sizes)
+    common = SHAPES[shape](rng, (count, columns, len(sizes)))[..., index]
+    if max(sizes) == 1:
+        return common, [str(cluster) for cluster in index]
+    own = SHAPES[shape](rng, (count, columns, len(index)))
+    return np.sqrt(SHARED) * common + np.sqrt(1 - SHARED) * own, [str(cluster) for cluster in index]
+
+
+def coverage(shape: str, sizes: tuple[int, ...], count: int, by_cluster: bool = True) -> float:
+    """Share of the intervals that hold the true mean."""
+    drawn, clusters = samples(shape, sizes, count)
+    return float(np.mean([_holds(mean_interval(one[0], clusters if by_cluster else None), 0.0) for one in drawn]))
+
+
+def ratio_coverage(shape: str, sizes: tuple[int, ...], count: int) -> float:
+    """The same of the ratio of two means, 1 and 4, of correlated values."""
+    drawn, clusters = samples(shape, sizes, count, columns=2)
+    found = [ratio_interval(1 + one[0] + 0.5 * one[1], 4 + one[1], clusters) for one in drawn]
+    return float(np.mean([_holds(estimate, 0.25) for estimate in found]))
+
+
+def _holds(estimate: Estimate, truth: float) -> bool:
+    return estimate.low <= truth <= estimate.high
+
+
+def main() -> None:
+    """Print the table."""
+    print("| values |", " | ".join(DESIGNS), "| ratio, 28 in 15 |")
+    print("|---|" + "---|" * (len(DESIGNS) + 1))
+    for shape in SHAPES:
+        found = [coverage(shape, sizes, 20_000) for sizes in DESIGNS.values()]
+        found.append(ratio_coverage(shape, DESIGNS["28 in 15 clusters"], 20_000))
+        print(f"| {shape} |", " | ".join(f"{100 * share:.1f}" for share in found), "|")
+
+
+if __name__ == "__main__":
+    main()
