@@ -93,3 +93,22 @@ def test_what_changes_no_number_keeps_its_cell(tmp_path: Path, old: str, new: st
     before = {cell.id for cell in plan(load_study(config)).cells}
     config.write_text(config.read_text().replace(old, new))
     assert before <= {cell.id for cell in plan(load_study(config)).cells}
+
+
+def test_a_row_may_have_an_exposure_of_its_own(tmp_path: Path) -> None:
+    rows = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: matched, exposure: matched}')
+    alone, both = plan(study_in(tmp_path, rows[:1])), plan(study_in(tmp_path, rows))
+    assert {cell.id for cell in alone.cells} < {cell.id for cell in both.cells}
+    assert {cell.exposure for label, cell in both.labelled() if label == "matched"} == {"matched"}
+
+
+def test_the_same_method_at_the_same_exposure_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="remove one"):
+        study_in(tmp_path, ("plugins.py:Toy", '{name: "plugins.py:Toy", label: again, exposure: equal}'))
+
+
+def test_a_second_baseline_is_the_label_of_a_row(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    config.write_text(f"{config.read_text()}second_baseline: toy\n")
+    with pytest.raises(UserError, match="no method has the label 'toy'"):
+        load_study(config)

@@ -37,6 +37,7 @@ def findings(results: Results) -> list[tuple[str, list[str]]]:
             [
                 *_best(results, condition),
                 *_best_online(results, condition),
+                *_second_baseline(results, condition),
                 *_incomplete(results, condition),
                 *_other_metrics(results, condition),
                 *_oracle(results, condition),
@@ -117,6 +118,20 @@ def _lead(results: Results, condition: str, ranking: Sequence[str]) -> str:
     lead = results.estimate(results.values(first, condition) - results.values(second, condition))
     verdict = "" if lead.is_clear else ", which is not shown"
     return f" It differs from the second, {second}, by {_difference(results.headline, lead)}{verdict}."
+
+
+def _second_baseline(results: Results, condition: str) -> list[str]:
+    """Differences of all ranked methods from the study's second baseline; they are not in the family of tests."""
+    second, score = results.layout.second_baseline, results.headline
+    if second is None or second not in results.methods(condition) or not results.is_complete(second, condition):
+        return []
+    value, own = score.with_unit(results.row(second, condition)[score.key]), results.values(second, condition)
+    differences = [
+        f"{label} {_difference(score, results.estimate(results.values(label, condition) - own))}"
+        for label in results.ranking(condition)
+        if label != second
+    ]
+    return [f"Differences from the second baseline, {second} ({value}), untested: {'; '.join(differences)}."]
 
 
 def _incomplete(results: Results, condition: str) -> list[str]:

@@ -51,6 +51,14 @@ def test_when_the_baseline_wins_the_next_method_is_compared_with_it():
     assert "of the study: worse: mid and low." in text
 
 
+def test_differences_are_also_given_to_a_second_baseline_where_the_study_names_one():
+    scores = {"old": psnr(17.0), "strong": psnr(18.0), "new": psnr(19.0), "oracle": psnr(30.0)}
+    privileged = frozenset({"oracle"})
+    text = sentences(results_of(scores, second_baseline="strong", privileged=privileged))["bench"]
+    assert "the second baseline, strong (18.05 dB), untested: new +1.00 dB [+1.00, +1.00]; old -1.00 dB" in text
+    assert "second baseline" not in sentences(results_of(scores, privileged=privileged))["bench"]
+
+
 def test_a_privileged_method_is_the_oracle_and_never_the_best():
     scores = {"old": psnr(17.0), "new": psnr(18.0), "oracle": psnr(30.0)}
     found = results_of(scores, privileged=frozenset({"oracle"}))
