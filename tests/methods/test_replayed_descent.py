@@ -34,7 +34,7 @@ METHODS: dict[str, Any] = {
     "too large a step": Wirtinger(iterations=ITERATIONS, step=0.8, offset="none"),
     "sgd": AmplitudeSGD(iterations=ITERATIONS, offset="none"),
     "multi_plane": MultiPlane(iterations=ITERATIONS, offset="none"),
-    "oracle": Oracle(iterations=ITERATIONS, start_iterations=1),
+    "oracle": Oracle(iterations=ITERATIONS, start_iterations=1, rounds=1),
 }
 
 
