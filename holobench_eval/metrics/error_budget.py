@@ -20,16 +20,20 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-# Names of the scores, all in units of a white pixel squared. What a target, the ideal image of the hologram, the
-# method's prediction and another capture of the same hologram leave unexplained of a capture; and of the ideal image,
-# its error against the target, which is the algorithm's own.
-TARGET, IDEAL, PREDICTION, REPEAT = (
+SMALLEST = 1e-12  # error that counts as none, a PSNR of 120 dB
+
+# Names of the scores, in units of a white pixel squared: what the target, the ideal image of the hologram, the method's
+# prediction and the noise-free picture leave unexplained of a capture.
+TARGET, IDEAL, PREDICTION, NOISE = (
     "unexplained_by_target",
     "unexplained_by_ideal_image",
     "unexplained",
     "unexplained_but_noise",
 )
+# What the target leaves unexplained of the ideal image: the algorithm's own error.
 ALGORITHM = "error_of_ideal_image"
+# What ideal image and prediction leave of captures of the training's held-out images, over what the target does.
+HELD_OUT_IDEAL, HELD_OUT = "held_out_by_ideal_image", "held_out"
 
 
 def unexplained(capture: Tensor, prediction: Tensor, target: Tensor) -> float:

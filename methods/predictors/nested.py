@@ -106,7 +106,7 @@ class NestedPrediction(ThroughModel):
     search: SearchRetrieval = SearchRetrieval(iterations=0)
     start: Wirtinger = Wirtinger(iterations=50)
 
-    RATES: ClassVar[Rates] = Rates(model=1e-2, network=1e-3)
+    RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
     version: ClassVar[int] = 1
 
     @abstractmethod

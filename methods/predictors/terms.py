@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 
 DEGREE = 4  # of the polynomial: a Gaussian beam off its centre needs 2, a cos^4 vignetting 4
-FIRST_BLUR, FIRST_SHARE, FIRST_REACH = 0.4, 0.02, 0.1  # px; of the light; of the picture's height
+FIRST_BLUR, FIRST_SHARE, FIRST_REACH = 0.4, 0.05, 0.1  # px; of the light; of the picture's height
 DARK = 1e-6  # below it the slope of a power is not followed
 
 

@@ -18,6 +18,7 @@ from ...display import RectifiedCapture
 from ...display.api import Exposure
 from ...metrics import match
 from .. import cost, opening
+from ..artifacts import Artifact
 from ..displays import Condition
 from ..plan import Cell
 from ..store import Record
@@ -32,27 +33,28 @@ def prediction(job: Job) -> Measured:
     Capture and prediction get the factors that match the capture to the target, so that the capture is a picture in
     [0, 1]; the protocol's own match of the prediction follows.
     """
-    return compared(job, lambda foreseen: {})
+    return compared(job, lambda seen: {})
 
 
 @dataclass(frozen=True)
 class Foreseen:
-    """A hologram ``(C, H, W)`` [rad], its target, its capture, and the prediction of it, each ``(C, h, w)``."""
+    """A hologram ``(C, H, W)`` [rad] of a target ``(C, h, w)``, its capture, and the prediction of that ``(C, h, w)``,
+    in the same unit; what the prediction took, and what was learned before."""
 
     phase: Tensor
     target: Tensor
-    capture: Tensor
+    capture: RectifiedCapture
     prediction: Tensor
+    taken: cost.Cost
+    learned: Artifact | None
 
 
-def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
-    """Predict the capture, and score the prediction by the protocol; ``more`` gives further scores."""
-    task, cell, display = job.task, job.task.cells[0], job.task.conditions[0]
-    target = job.target(cell, display)
+def foresee(job: Job, cell: Cell, display: Condition) -> Foreseen:
+    """Predict the capture of the hologram of a cell's target by the task's method."""
+    task, target = job.task, job.target(cell, display)
     phase, capture = shown(job, cell, display)
     method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
     refuse_saturated(capture)
-    wanted, factors = match(capture.image, target)
     handle = opening.open_display(display, cell.seed, job.device).for_method(
         method,
         task.label,
@@ -66,25 +68,32 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
     watch = cost.start(job.device)
     predicted = method.predict(own, handle)
     taken = watch.stop()
-    if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *wanted.shape):
-        raise wrong_output(job, "predict", predicted, f"an image {(1, *wanted.shape)}")
-    image = factors.view(-1, 1, 1) * predicted.detach().cpu()[0]
-    taken = cost.keep(job.timing, taken, job.setting.retime)
-    further = more(Foreseen(phase, target, capture.image, image))
+    if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *target.shape):
+        raise wrong_output(job, "predict", predicted, f"an image {(1, *target.shape)}")
+    return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned)
+
+
+def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
+    """Predict the capture, and score the prediction by the protocol; ``more`` gives further scores."""
+    seen = foresee(job, job.task.cells[0], job.task.conditions[0])
+    wanted, factors = match(seen.capture.image, seen.target)
+    image = factors.view(-1, 1, 1) * seen.prediction
+    taken = cost.keep(job.timing, seen.taken, job.setting.retime)
+    further = more(seen)
 
     def compare(cell: Cell, _: Condition) -> Record:
-        keep_pictures(job, cell, image, wanted, phase)
+        keep_pictures(job, cell, image, wanted, seen.phase)
         return Record(
             cell=cell.description(),
             state="done",
-            label=task.label,
+            label=job.task.label,
             scores=protocol_scores(job, cell, image, wanted) | further,
             seconds=taken.seconds,
             alone=job.alone,
             memory_mib=taken.memory_mib,
-            registration_residual_px=capture.residual,
-            saturated=capture.saturated,
-            learned=account(learned),
+            registration_residual_px=seen.capture.residual,
+            saturated=seen.capture.saturated,
+            learned=account(seen.learned),
         )
 
     return compare
