@@ -66,9 +66,9 @@ def _held_out(job: Job, cell: Cell) -> list[Cell]:
     training = job.task.preparation
     if training is None:
         return []
-    source = {"dataset": training.dataset, "dataset_params": training.dataset_params}
+    there = replace(cell, dataset=training.dataset, dataset_params=training.dataset_params)
     images = training.images[-training.held_out :]
-    return [replace(cell, **source, target=item, target_sha256=sha256) for item, sha256 in images]
+    return [replace(there, target=item, target_sha256=sha256) for item, sha256 in images]
 
 
 def _ask_for_all(job: Job, photographs: list[tuple[Cell, bool]], display: Condition) -> None:

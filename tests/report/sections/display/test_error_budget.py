@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from holobench_eval.report import Description, write_report
+from holobench_eval.report.charts.error_budget import draw_budgets
+from holobench_eval.report.data.error_budget import budgets
+from holobench_eval.report.sections.display.error_budget import reading, remarks
+from tests.report.data.test_error_budget import HELD_OUT, LEFT, METHODS, record, results
+
+
+def test_the_paragraph_bounds_what_each_prediction_and_the_noise_allow() -> None:
+    (budget,) = budgets(results(HELD_OUT))
+    text = str(reading(budget, "wirtinger"))
+    assert text.startswith("**ideal.** The captures of wirtinger holograms have 19.00")
+    network, field = budget.explained[-2:]
+    assert network.gain is not None
+    assert field.gain is not None
+    assert f"{network.gain.mean:.2f}" in text
+    assert f"and {field.gain.mean:.2f}" in text
+    assert "Temporal noise allows no more than" in text
+    assert "nan" not in text
+
+
+def test_what_gives_way_and_what_is_below_zero_is_said() -> None:
+    (budget,) = budgets(results(HELD_OUT | {"network": 0.65}))
+    assert remarks(budget) == ["network predicts the held-out captures no better than terms, which stands for it."]
+    (plain,) = budgets(results(HELD_OUT))
+    assert remarks(plain) == []
+
+
+def test_a_report_has_the_budget_and_its_figure_before_all_else(tmp_path: Path) -> None:
+    records = [record(label, target, HELD_OUT) for target in LEFT for label in METHODS]
+    text = write_report(results(HELD_OUT).layout, records, tmp_path, {}, Description())[0].read_text()
+    assert text.index("## The error budget") < text.index("## Findings")
+    assert (tmp_path / "figures" / "error-budget.png").is_file()
+    assert "| temporal noise |" in text
+
+
+def test_nothing_is_drawn_without_a_budget(tmp_path: Path) -> None:
+    draw_budgets(tmp_path / "none.png", [])
+    assert not (tmp_path / "none.png").exists()
