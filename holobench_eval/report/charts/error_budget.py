@@ -21,10 +21,10 @@ DARK = ("#0072B2", "#6A3D9A", "#7F5539", NOISE, GREY)  # colours on which white 
 
 
 def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
-    """Draw the budgets of displays, which share their labels. Nothing is drawn without any."""
+    """Draw the budgets of displays. Nothing is drawn without any."""
     if not budgets:
         return
-    colours = _colours(budgets[0])
+    colours = _colours(budgets)
     with style():
         figure = new_figure(WIDTH, HEADER + ROW * len(budgets) + LEGEND)
         figure.set_layout_engine("constrained")
@@ -44,14 +44,16 @@ def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
         for axes in (left, right):
             axes.tick_params(axis="y", length=0)
             grid(axes, "x")
-        handles = [Patch(facecolor=colours[part.label], label=part.label) for part in budgets[0].parts]
+        handles = [Patch(facecolor=colour, label=label) for label, colour in colours.items()]
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
         save(figure, path)
 
 
-def _colours(budget: Budget) -> Mapping[str, str]:
-    explained = {part.label: COLOURS[index % len(COLOURS)] for index, part in enumerate(budget.explained)}
-    return explained | {budget.rest.label: REST, budget.noise.label: NOISE}
+def _colours(budgets: Sequence[Budget]) -> Mapping[str, str]:
+    """Of every part by its label, in the order of the bars."""
+    labels = dict.fromkeys(part.label for budget in budgets for part in budget.explained)
+    explained = {label: COLOURS[index % len(COLOURS)] for index, label in enumerate(labels)}
+    return explained | {budgets[0].rest.label: REST, budgets[0].noise.label: NOISE}
 
 
 def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:

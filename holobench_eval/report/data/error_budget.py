@@ -32,8 +32,8 @@ TARGET, IDEAL_IMAGE, REST, NOISE = "the target", "the ideal image", "unexplained
 class Part:
     """A part of the error. label: who explains it, or what it is; share: of the total; gain: 10 lg (e_0 / e_k), the
     PSNR [dB] that captures without this part and those before it would have gained, and of the noise what captures
-    with nothing but noise would (None: for the rest, which nobody knows how to remove); stands: whose prediction
-    stands for it, its own or a better one before it."""
+    with nothing but noise would (None: for the rest, which nobody knows how to remove, and where there is no noise);
+    stands: whose prediction stands for it, its own or a better one before it."""
 
     label: str
     share: Estimate
@@ -104,7 +104,7 @@ def budget(results: Results, condition: str) -> Budget:
             for k in range(1, len(links))
         ),
         rest=Part(REST, bootstrap_mean(links[-1] - noise)),
-        noise=Part(NOISE, bootstrap_mean(noise), bootstrap_mean(-decibel(noise))),
+        noise=Part(NOISE, bootstrap_mean(noise), bootstrap_mean(-decibel(noise)) if noise.all() else None),
     )
 
 

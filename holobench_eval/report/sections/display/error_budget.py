@@ -53,9 +53,14 @@ def reading(budget: Budget, holograms: str) -> Markdown:
         f"The captures of {holograms} holograms have {_decibel(budget.psnr)} over {budget.targets} targets. The ideal "
         f"images of these holograms have {_decibel(budget.ideal_psnr)}, and what they explain of the captures' error "
         f"is worth {_decibel(ideal.gain)}: more a better algorithm for the ideal display cannot gain. Removing all "
-        f"that is explained can gain at most {words(gains)}. Temporal noise allows no more than "
-        f"{_decibel(budget.noise.gain)}. By parts: {_percent(ideal)} {ideal.label}, {words(shares)}.",
+        f"that is explained can gain at most {words(gains)}. {_limit(budget)} "
+        f"By parts: {_percent(ideal)} {ideal.label}, {words(shares)}.",
     )
+
+
+def _limit(budget: Budget) -> str:
+    gain = budget.noise.gain
+    return "There is no temporal noise." if gain is None else f"Temporal noise allows no more than {_decibel(gain)}."
 
 
 def remarks(budget: Budget) -> list[str]:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from holobench_eval.report import Description, write_report
@@ -20,6 +21,12 @@ def test_the_paragraph_bounds_what_each_prediction_and_the_noise_allow() -> None
     assert f"and {field.gain.mean:.2f}" in text
     assert "Temporal noise allows no more than" in text
     assert "nan" not in text
+
+
+def test_a_display_without_noise_sets_no_limit() -> None:
+    (budget,) = budgets(results(HELD_OUT))
+    quiet = replace(budget, noise=replace(budget.noise, gain=None))
+    assert "There is no temporal noise." in str(reading(quiet, "wirtinger"))
 
 
 def test_what_gives_way_and_what_is_below_zero_is_said() -> None:
