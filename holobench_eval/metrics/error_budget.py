@@ -32,8 +32,6 @@ TARGET, IDEAL, PREDICTION, NOISE = (
 )
 # What the target leaves unexplained of the ideal image: the algorithm's own error.
 ALGORITHM = "error_of_ideal_image"
-# What ideal image and prediction leave of captures of the training's held-out images, over what the target does.
-HELD_OUT_IDEAL, HELD_OUT = "held_out_by_ideal_image", "held_out"
 
 
 def unexplained(capture: Tensor, prediction: Tensor, target: Tensor) -> float:

@@ -49,9 +49,10 @@ class Foreseen:
     learned: Artifact | None
 
 
-def foresee(job: Job, cell: Cell, display: Condition) -> Foreseen:
-    """Predict the capture of the hologram of a cell's target by the task's method."""
-    task, target = job.task, job.target(cell, display)
+def _foresee(job: Job) -> Foreseen:
+    """Predict the capture of the hologram of the task's target."""
+    task, cell, display = job.task, job.task.cells[0], job.task.conditions[0]
+    target = job.target(cell, display)
     phase, capture = shown(job, cell, display)
     method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
     refuse_saturated(capture)
@@ -75,7 +76,7 @@ def foresee(job: Job, cell: Cell, display: Condition) -> Foreseen:
 
 def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
     """Predict the capture, and score the prediction by the protocol; ``more`` gives further scores."""
-    seen = foresee(job, job.task.cells[0], job.task.conditions[0])
+    seen = _foresee(job)
     wanted, factors = match(seen.capture.image, seen.target)
     image = factors.view(-1, 1, 1) * seen.prediction
     taken = cost.keep(job.timing, seen.taken, job.setting.retime)

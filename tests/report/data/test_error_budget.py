@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from holobench_eval.metrics import error_budget as scores
-from holobench_eval.report.data.error_budget import Budget, budgets, chosen
+from holobench_eval.report.data.error_budget import budgets
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import records_frame
 from tests.support import synthetic_study as synthetic
@@ -18,10 +18,9 @@ LEFT = {
     "coffee": (0.010, 0.0095, 0.006, 0.007, 0.0015, 0.0001),
     "rocket": (0.002, 0.0021, 0.0018, 0.0017, 0.0004, 0.0002),
 }
-HELD_OUT = {"ideal": 0.97, "terms": 0.6, "network": 0.5, "field": 0.1}
 
 
-def results(held_out: dict[str, float], missing: str = "") -> Results:
+def results(missing: str = "", noise: float | None = None) -> Results:
     layout = synthetic.layout(
         pairs=tuple((label, "ideal") for label in METHODS),
         targets=tuple(LEFT),
@@ -32,63 +31,53 @@ def results(held_out: dict[str, float], missing: str = "") -> Results:
         holograms="wirtinger (iterations = 50)",
     )
     records = [
-        record(label, target, held_out)
-        for target in LEFT
-        for label in METHODS
-        if (label, target) != (missing, "coffee")
+        record(label, target, noise) for target in LEFT for label in METHODS if (label, target) != (missing, "coffee")
     ]
     return Results(records_frame(records, layout), layout)
 
 
-def record(label: str, target: str, held_out: dict[str, float]) -> dict[str, Any]:
-    by_target, by_ideal, *by_methods, noise = LEFT[target]
+def record(label: str, target: str, noise: float | None = None) -> dict[str, Any]:
+    by_target, by_ideal, *by_methods, usual = LEFT[target]
     values = {
         "psnr_linear": 20.0,
         scores.TARGET: by_target,
         scores.IDEAL: by_ideal,
         scores.PREDICTION: by_methods[METHODS.index(label)],
-        scores.NOISE: noise,
+        scores.NOISE: usual if noise is None else noise,
         scores.ALGORITHM: 0.001,
-        scores.HELD_OUT_IDEAL: held_out["ideal"],
-        scores.HELD_OUT: held_out[label],
     }
     return synthetic.record(label, synthetic.cell(label, target, "ideal"), values)
 
 
-def shares(budget: Budget) -> dict[str, float]:
-    return {part.label: part.share.mean for part in budget.parts}
-
-
-def test_a_part_is_what_one_prediction_explains_beyond_the_one_before_in_shares_of_each_target() -> None:
-    (budget,) = budgets(results(HELD_OUT))
+def test_the_parts_add_up_and_the_gains_are_those_of_all_until_then() -> None:
+    (budget,) = budgets(results())
     left = np.array(list(LEFT.values()))
-    expected = -np.diff(left / left[:, :1], axis=1).mean(0)
-    assert list(shares(budget).values()) == pytest.approx([*expected, (left[:, 5] / left[:, 0]).mean()])
-    assert sum(shares(budget).values()) == pytest.approx(1)
+    assert sum(part.share.mean for part in budget.parts) == pytest.approx(1)
     gains = [part.gain.mean for part in budget.explained if part.gain]
-    assert gains == pytest.approx(10 * np.log10(left[:, :1] / left[:, 1:5]).mean(0))
+    best = np.minimum.accumulate(left[:, :5], axis=1)[:, 1:]
+    assert gains == pytest.approx(10 * np.log10(left[:, :1] / best).mean(0))
+    assert budget.noise.gain is not None
+    assert budget.noise.gain.mean == pytest.approx(10 * np.log10(left[:, 0] / left[:, 5]).mean())
     assert budget.psnr.mean == pytest.approx(-10 * np.log10(left[:, 0]).mean())
 
 
-def test_a_prediction_that_held_out_captures_speak_against_gives_way_to_the_one_before() -> None:
-    (budget,) = budgets(results(HELD_OUT | {"network": 0.65}))
-    assert shares(budget)["network"] == 0
-    assert [part.stands for part in budget.explained] == ["the ideal image", "terms", "terms", "field"]
-    assert sum(shares(budget).values()) == pytest.approx(1)
+def test_no_part_is_negative_and_what_a_worse_prediction_leaves_alone_is_kept() -> None:
+    (budget,) = budgets(results())
+    left = np.array(list(LEFT.values()))
+    assert left[1, 3] > left[1, 2]  # on one target the network does worse than the terms,
+    assert left[2, 1] > left[2, 0]  # on another the ideal image worse than the target
+    best = np.minimum.accumulate(left[:, :5], axis=1) / left[:, :1]
+    assert [part.share.mean for part in budget.explained] == pytest.approx((-np.diff(best, axis=1)).mean(0))
+    assert all(part.share.mean >= 0 and part.share.low >= 0 for part in budget.explained)
+    alone = [part.alone.mean for part in budget.explained if part.alone]
+    assert alone == pytest.approx((left[:, 1:5] / left[:, :1]).mean(0))
 
 
-def test_a_part_below_zero_is_kept_where_held_out_captures_promised_more() -> None:
-    (budget,) = budgets(results(HELD_OUT | {"field": 0.55, "network": 0.01}))
-    assert shares(budget)["field"] == 0
-    (budget,) = budgets(results(HELD_OUT | {"terms": 0.01, "network": 0.005, "field": 0.001, "ideal": 2.0}))
-    assert shares(budget)["the ideal image"] == 0  # the target predicts better, and stands for it
-    assert shares(budget)["terms"] > 0
-
-
-def test_an_unknown_held_out_error_leaves_every_prediction_to_itself() -> None:
-    assert chosen([1.0, 0.5, float("nan"), 0.9]) == [0, 1, 2, 3]
-    assert chosen([1.0, 1.2, 0.9, 0.95]) == [0, 0, 2, 2]
+def test_noise_that_is_rounding_alone_sets_no_limit() -> None:
+    (budget,) = budgets(results(noise=1e-17))
+    assert budget.noise.gain is None
+    assert budget.noise.share.mean == pytest.approx(0, abs=1e-12)
 
 
 def test_a_display_without_all_scores_has_no_budget() -> None:
-    assert budgets(results(HELD_OUT, missing="network")) == []
+    assert budgets(results(missing="network")) == []

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ...charts.error_budget import draw_budgets
-from ...data.error_budget import Budget, Part, budgets
+from ...data.error_budget import Budget, budgets
 from ...data.statistics import Estimate
 from ...data.text import words
 from ...markdown import Markdown, blocks, bullets, heading, table
@@ -28,33 +28,32 @@ def _render(report: Report, figures: Figures) -> Blocks:
         return
     for budget in found:
         yield blocks([heading(budget.condition, 3), _table(budget)])
-        yield bullets(remarks(budget))
     yield HOW
 
 
 HOW = (
-    "Parts are differences between one prediction and the next and add up to the whole. Each line stands for the best "
-    "of its own prediction and of those above it, chosen by captures of the held-out images of the training: a part is "
-    "below zero where what was learned does not hold for the targets. Shares are those of a target's error, decibels "
-    "those of its PSNR, and both are means over targets. Temporal noise comes from a second capture of every hologram. "
-    "Decibels are upper bounds: where light is missing, or a picture cannot be darker, no hologram removes what is "
-    "explained, and a hologram that removes it is another one, whose rest may differ. A larger model, or more "
-    "captures, may explain more."
+    "Parts are differences between one prediction and the next and add up to the whole. Each line stands, target by "
+    "target, for the best of its own prediction and of those above it: a bound, as if it were known which to believe. "
+    "The last column is what a prediction leaves by itself; where it is more than the line above leaves, what was "
+    "learned does not hold for some targets. Shares are those of a target's error, decibels those of its PSNR, and "
+    "both are means over targets. Temporal noise comes from a second capture of every hologram. Decibels are upper bounds: "
+    "where light is missing, or a picture cannot be darker, no hologram removes what is explained, and a hologram that "
+    "removes it is another one, whose rest may differ. A larger model, or more captures, may explain more."
 )
 
 
 def reading(budget: Budget, holograms: str) -> Markdown:
     """The paragraph that reads a budget."""
     ideal, *models = budget.explained
-    gains = [f"{_decibel(part.gain)} for {part.label}" for part in models]
-    shares = [f"{_percent(part)} {part.label}" for part in (*models, budget.rest, budget.noise)]
+    first, *others = [(part.label, _decibel(part.gain)) for part in models]
+    bounds = [f"{first[0]} can gain at most {first[1]}", *(f"{label} {gain}" for label, gain in others)]
+    shares = [f"{100 * part.share.mean:z.0f} % {part.label}" for part in budget.parts]
     return Markdown("**{}.** {}").format(
         budget.condition,
         f"The captures of {holograms} holograms have {_decibel(budget.psnr)} over {budget.targets} targets. The ideal "
         f"images of these holograms have {_decibel(budget.ideal_psnr)}, and what they explain of the captures' error "
-        f"is worth {_decibel(ideal.gain)}: more a better algorithm for the ideal display cannot gain. Removing all "
-        f"that is explained can gain at most {words(gains)}. {_limit(budget)} "
-        f"By parts: {_percent(ideal)} {ideal.label}, {words(shares)}.",
+        f"is worth {_decibel(ideal.gain)}: more a better algorithm for the ideal display cannot gain. By removing what "
+        f"they explain, {words(bounds)}. {_limit(budget)} By parts: {words(shares)}.",
     )
 
 
@@ -63,20 +62,13 @@ def _limit(budget: Budget) -> str:
     return "There is no temporal noise." if gain is None else f"Temporal noise allows no more than {_decibel(gain)}."
 
 
-def remarks(budget: Budget) -> list[str]:
-    """Sentences on links that an earlier prediction stands for, and on parts below zero."""
-    lines = [
-        f"{part.label} predicts the held-out captures no better than {part.stands}, which stands for it."
-        for part in budget.explained
-        if part.stands != part.label
-    ]
-    below = [part.label for part in budget.explained if part.share.mean < 0]
-    return [*lines, f"Below zero, worse on the targets than on held-out images: {words(below)}."] if below else lines
-
-
 def _table(budget: Budget) -> Markdown:
-    rows = [[part.label, _interval(part.share, 100, 1), _decibel(part.gain, unit="")] for part in budget.parts]
-    return table(["explained by", "share of the squared error [%]", "PSNR gained at most, with all above [dB]"], rows)
+    rows = [
+        [part.label, _percent(part.share, 1), _decibel(part.gain, unit=""), _percent(part.alone, 1)]
+        for part in budget.parts
+    ]
+    gained, left = "PSNR gained at most, with all above [dB]", "left by it alone [%]"
+    return table(["explained by", "share of the squared error [%]", gained, left], rows)
 
 
 def _decibel(gain: Estimate | None, unit: str = " dB") -> str:
@@ -88,8 +80,8 @@ def _interval(estimate: Estimate, factor: float, digits: int) -> str:
     return mean if low == "nan" else f"{mean} [{low}, {high}]"
 
 
-def _percent(part: Part) -> str:
-    return f"{100 * part.share.mean:z.0f} %"
+def _percent(share: Estimate | None, digits: int) -> str:
+    return "–" if share is None else _interval(share, 100, digits)
 
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:

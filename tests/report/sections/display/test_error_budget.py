@@ -6,12 +6,12 @@ from pathlib import Path
 from holobench_eval.report import Description, write_report
 from holobench_eval.report.charts.error_budget import draw_budgets
 from holobench_eval.report.data.error_budget import budgets
-from holobench_eval.report.sections.display.error_budget import reading, remarks
-from tests.report.data.test_error_budget import HELD_OUT, LEFT, METHODS, record, results
+from holobench_eval.report.sections.display.error_budget import reading
+from tests.report.data.test_error_budget import LEFT, METHODS, record, results
 
 
 def test_the_paragraph_bounds_what_each_prediction_and_the_noise_allow() -> None:
-    (budget,) = budgets(results(HELD_OUT))
+    (budget,) = budgets(results())
     text = str(reading(budget, "wirtinger"))
     assert text.startswith("**ideal.** The captures of wirtinger holograms have 19.00")
     network, field = budget.explained[-2:]
@@ -24,21 +24,14 @@ def test_the_paragraph_bounds_what_each_prediction_and_the_noise_allow() -> None
 
 
 def test_a_display_without_noise_sets_no_limit() -> None:
-    (budget,) = budgets(results(HELD_OUT))
+    (budget,) = budgets(results())
     quiet = replace(budget, noise=replace(budget.noise, gain=None))
     assert "There is no temporal noise." in str(reading(quiet, "wirtinger"))
 
 
-def test_what_gives_way_and_what_is_below_zero_is_said() -> None:
-    (budget,) = budgets(results(HELD_OUT | {"network": 0.65}))
-    assert remarks(budget) == ["network predicts the held-out captures no better than terms, which stands for it."]
-    (plain,) = budgets(results(HELD_OUT))
-    assert remarks(plain) == []
-
-
 def test_a_report_has_the_budget_and_its_figure_before_all_else(tmp_path: Path) -> None:
-    records = [record(label, target, HELD_OUT) for target in LEFT for label in METHODS]
-    text = write_report(results(HELD_OUT).layout, records, tmp_path, {}, Description())[0].read_text()
+    records = [record(label, target) for target in LEFT for label in METHODS]
+    text = write_report(results().layout, records, tmp_path, {}, Description())[0].read_text()
     assert text.index("## The error budget") < text.index("## Findings")
     assert (tmp_path / "figures" / "error-budget.png").is_file()
     assert "| temporal noise |" in text
