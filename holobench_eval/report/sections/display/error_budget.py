@@ -36,9 +36,10 @@ HOW = (
     "target, for the best of its own prediction and of those above it: a bound, as if it were known which to believe. "
     "The last column is what a prediction leaves by itself; where it is more than the line above leaves, what was "
     "learned does not hold for some targets. Shares are those of a target's error, decibels those of its PSNR, and "
-    "both are means over targets. Temporal noise comes from a second capture of every hologram. Decibels are upper bounds: "
-    "where light is missing, or a picture cannot be darker, no hologram removes what is explained, and a hologram that "
-    "removes it is another one, whose rest may differ. A larger model, or more captures, may explain more."
+    "both are means over targets. Temporal noise comes from a second capture of every hologram. Decibels are upper "
+    "bounds: where light is missing, or a picture cannot be darker, no hologram removes what is explained, and a "
+    "hologram that removes it is another one, whose rest may differ. A larger model, or more captures, may explain "
+    "more."
 )
 
 
@@ -52,7 +53,7 @@ def reading(budget: Budget, holograms: str) -> Markdown:
         budget.condition,
         f"The captures of {holograms} holograms have {_decibel(budget.psnr)} over {budget.targets} targets. The ideal "
         f"images of these holograms have {_decibel(budget.ideal_psnr)}, and what they explain of the captures' error "
-        f"is worth {_decibel(ideal.gain)}: more a better algorithm for the ideal display cannot gain. By removing what "
+        f"is worth {_decibel(ideal.gain)}: a better algorithm for the ideal display cannot gain more. By removing what "
         f"they explain, {words(bounds)}. {_limit(budget)} By parts: {words(shares)}.",
     )
 

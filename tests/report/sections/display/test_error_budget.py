@@ -17,8 +17,8 @@ def test_the_paragraph_bounds_what_each_prediction_and_the_noise_allow() -> None
     network, field = budget.explained[-2:]
     assert network.gain is not None
     assert field.gain is not None
-    assert f"{network.gain.mean:.2f}" in text
-    assert f"and {field.gain.mean:.2f}" in text
+    assert f"network {network.gain.mean:.2f}" in text
+    assert f"and field {field.gain.mean:.2f}" in text
     assert "Temporal noise allows no more than" in text
     assert "nan" not in text
 
