@@ -3,9 +3,9 @@
 The scores are those of ``metrics.error_budget``; e(P) is what a prediction P leaves unexplained of a capture. The
 predictions stand in a chain, each of which is meant to know more than the one before: the target, the ideal image of
 the hologram, and the methods of the study in the order of its config. Link k of the chain is, target by target, *the
-best of the first k predictions*. So the parts are nested and never negative, and each is an upper bound: what could be
-explained by somebody who knew k predictions and which of them to believe. A prediction that does worse on a target than
-one before it explains nothing of it, and what it leaves alone is reported beside the parts.
+best of the first k predictions*. So what is explained is nested and never negative, and it is an upper bound: that of
+somebody who knew k predictions and, for each target, which of them to believe. A prediction that does worse on a target
+than one before it explains nothing of it; what it leaves alone is reported beside the parts.
 
 With e_k of link k, the parts are e_(k-1) - e_k, "what link k explains", then e_K - N, the rest, and N, the temporal
 noise, which no prediction can explain; they add up to e_0, the error of the captures against their targets, exactly.
