@@ -95,7 +95,7 @@ def _exposure(results: Results) -> str:
         return "No effect: without noise the unit of light changes no score."
     if results.layout.measure == FILES:
         return "Unknown. The intensity match removes its effect on brightness, not its effect on noise."
-    known = EXPOSURES if results.layout.measure != "prediction" else EXPOSURES_PREDICTED
+    known = EXPOSURES if not results.layout.predicts else EXPOSURES_PREDICTED
     policies = sorted(set(results.frame["exposure"]) - {""})
     return " ".join(known.get(policy, policy) for policy in policies) or "Not recorded."
 
@@ -109,7 +109,7 @@ def _saturation(results: Results) -> str:
     if results.layout.measure == FILES:
         doubt = " Above 0.1 % highlights are clipped; a study on a bench would refuse the capture." * (most > 0.001)
         return f"At most {100 * most:.3g} % of a capture's samples in the scored region are at full scale.{doubt}"
-    refused = "; above 0.1 % a capture is refused" if results.layout.measure != "prediction" else ""
+    refused = "; above 0.1 % a capture is refused" if not results.layout.predicts else ""
     return f"At most {100 * most:.3g} % of a capture's samples{refused}."
 
 
