@@ -307,6 +307,28 @@ class Display(Protocol):
         ...
 
 
+def ideal_image(phase: Tensor, spec: DisplaySpec) -> Tensor:
+    """The intensity that the nominal model makes of a phase.
+
+    Parameters
+    ----------
+    phase
+        ``(C, H, W)`` [rad].
+    spec
+        The display's nominal optics.
+
+    Returns
+    -------
+    Tensor
+        ``(C, h, w)`` in the region; the mean incident light on the panel is 1.
+    """
+    fields = [
+        spec.propagator(channel, device=panel.device).forward(torch.polar(torch.ones_like(panel), panel))
+        for channel, panel in enumerate(phase.float())
+    ]
+    return spec.region.crop(torch.stack(fields)).abs().square()
+
+
 Fiducials = Callable[[Display, Tensor], Mapping[tuple[int, int], Tensor]]
 """Phases ``(C, H, W)`` [rad] of the holograms of a grid ``(C, h, w)`` that registers a display's camera, by name."""
 

@@ -176,12 +176,14 @@ def _entry(study: Study, document: Document, index: int) -> MethodEntry:
     entry, where = study.methods[index], ("methods", index)
     with placed(document, (*where, "name"), (*where, "params")):
         method = plugins.build("methods", entry.name, dict(entry.params), study.folder)
-        if study.measure == "prediction" and not hasattr(method, "predict"):
-            raise UserError(f"method '{entry.name}' predicts no captures; measure: prediction needs methods that do")
+        if study.predicts and not hasattr(method, "predict"):
+            raise UserError(
+                f"method '{entry.name}' predicts no captures; measure: {study.measure} needs methods that do"
+            )
     if study.display.real and getattr(method, "privileged", False):
         message = f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one"
         raise document.error((*where, "name") if (*where, "name") in document.keys else where, message)
-    if entry.captures is not None and (not getattr(method, "camera", False) or study.measure == "prediction"):
+    if entry.captures is not None and (not getattr(method, "camera", False) or study.predicts):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)
     profiles = subset(study, document, entry.profiles, (*where, "profiles"))

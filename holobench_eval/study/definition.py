@@ -17,6 +17,8 @@ from ..display.api import Exposure
 LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
 Text = Annotated[str, MinLen(1)]
+Measure = Literal["picture", "prediction", "error_budget", "focus"]
+PREDICTIONS = ("prediction", "error_budget")  # measures of captures that methods predict
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,8 @@ class Study:
     """A grid of cells and the tables drawn from it; see ``load_study``.
 
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
-    captures of ``holograms`` against those captures; ``focus`` scores the planes of focal stacks, each at its own
+    captures of ``holograms`` against those captures; ``error_budget`` also splits the error of these captures by what
+    the methods, in the order of the config, explain of it; ``focus`` scores the planes of focal stacks, each at its own
     distance. note: a paragraph that the report prints beside its tables.
     repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
     whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
@@ -167,7 +170,7 @@ class Study:
     display: DisplayGrid
     targets: Targets
     methods: Annotated[tuple[MethodEntry, ...], MinLen(1)]
-    measure: Literal["picture", "prediction", "focus"] = "picture"
+    measure: Measure = "picture"
     holograms: Probe = Probe()
     training: Training = Training()
     sweeps: tuple[Sweep, ...] = ()
@@ -215,6 +218,11 @@ class Study:
         training = self.training
         dataset = plugins.build("datasets", training.dataset, dict(training.params), self.folder)
         return tuple((item, dataset.digest(item)) for item in dataset.items())
+
+    @property
+    def predicts(self) -> bool:
+        """Whether its methods predict captures of the holograms of another one."""
+        return self.measure in PREDICTIONS
 
     @property
     def labels(self) -> tuple[str, ...]:

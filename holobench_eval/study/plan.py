@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from ..core import plugins
 from ..core.errors import UserError
 from ..core.hashing import digest
 from ..display.api import Exposure
 from ..metrics import catalogue
-from .definition import MethodEntry, Study
+from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
 from .focal_stacks import VERSION as IN_FOCUS
 from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
@@ -40,7 +40,7 @@ class Cell:
     panel: rows and columns in pixels; condition: name of the display, or ``reference`` for the floor;
     repeat, seed: names of the noise; harness_sha256: version of optics, bench, registration and metrics
     (``versions.HARNESS``); metrics: name and version of every metric that can be computed here; measure: what
-    is scored, ``picture``, ``prediction`` or ``focus``; holograms: whose captures are predicted (empty for pictures);
+    is scored, see ``Study``; holograms: whose captures are predicted (empty for pictures);
     prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the
     most that the display allows while the target is solved (None: no limit); change: kind and value of what has changed
     on the display since methods were prepared for it (empty: nothing); session: name of the series of photographs that
@@ -66,7 +66,7 @@ class Cell:
     harness_sha256: str
     metrics: tuple[str, ...]
     exposure: Exposure
-    measure: Literal["picture", "prediction", "focus"] = "picture"
+    measure: Measure = "picture"
     holograms: Mapping[str, Any] = field(default_factory=dict)
     prepared: tuple[str, ...] = ()
     captures: int | None = None
@@ -234,7 +234,7 @@ class _Ground:
             metrics=self.metrics,
             exposure=exposure or study.display.exposure,
             measure=study.measure,
-            holograms=probe if study.measure == "prediction" else {},
+            holograms=probe if study.predicts else {},
             prepared=prepared,
             captures=captures,
             change=dict([display.change]) if display.change and condition != REFERENCE else {},
@@ -268,7 +268,7 @@ class _Ground:
         """The targets and displays of each solution."""
         measure = self.study.measure
         for group in (
-            [(display,) for display in entry_displays] if measure == "prediction" else _sharing(cls, entry_displays)
+            [(display,) for display in entry_displays] if self.study.predicts else _sharing(cls, entry_displays)
         ):
             if measure == "focus":
                 yield from showings(cls, group, targets, self.planes)

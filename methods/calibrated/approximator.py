@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import torch
 from torch import Tensor, nn
@@ -54,11 +54,14 @@ class PredictedCapture(nn.Module):
 
 
 class ModelApproximator:
-    """A model of the display and the network that adds to it, see `PredictedCapture`; both learn from one loss."""
+    """A model of the display and the network that adds to it, see ``CAPTURE``; both learn from one loss."""
+
+    CAPTURE: ClassVar[type[PredictedCapture]] = PredictedCapture
+    LOSS: ClassVar[str] = "l1"
 
     def __init__(self, model: nn.Module, network: nn.Module | None, rates: Rates) -> None:
         self.model, self.network = model, network
-        self._capture = PredictedCapture(model, network)
+        self._capture = self.CAPTURE(model, network)
         self._learners = [(model, rates.model), *([] if network is None else [(network, rates.network)])]
         self.to(torch.device("cpu"))
 
@@ -73,15 +76,19 @@ class ModelApproximator:
         """Nothing to choose: a model has a brightness of its own."""
 
     def step(self, sample: Sample, progress: float) -> dict[str, float]:
-        """One step on the absolute error of a capture, relative to the capture's brightness. The rates fall to zero
-        along half a cosine in every round, of which ``progress`` is done."""
+        """One step on the error of a capture. The rates fall to zero along half a cosine in every round, of which
+        ``progress`` is done."""
         for group, (_, rate) in zip(self._optimiser.param_groups, self._learners, strict=True):
             group["lr"] = cosine_decay(rate, progress)
-        loss = functional.l1_loss(self._capture(sample.phase, sample.light), sample.capture) / sample.capture.mean()
+        loss = self.error(self._capture(sample.phase, sample.light), sample.capture)
         self._optimiser.zero_grad()
         loss.backward()
         self._optimiser.step()
-        return {"l1": float(loss.detach())}
+        return {self.LOSS: float(loss.detach())}
+
+    def error(self, predicted: Tensor, capture: Tensor) -> Tensor:
+        """The absolute error of a capture ``(C, h, w)``, relative to its brightness."""
+        return functional.l1_loss(predicted, capture) / capture.mean()
 
     def image(self, light: Tensor) -> Image:
         """The display with the parameters as they are now, held."""

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
+from ..learned.retrieval import PhaseRetrieval
 from .hil import HIL
 from .offset import best_offset
 from .start import SmoothStart
@@ -24,6 +25,8 @@ class HILTuned(HIL):
 
     Parameters
     ----------
+    retrieval : PhaseRetrieval
+        Eq. 22, nearer to the start than in `HIL`.
     start : SmoothStart
         Where Algorithm 1 and every retrieval begin. Of the tolerances 0.2, 0.1, 0.04 and 0.02 the default was best on
         captures of dead leaves, and within 0.3 dB of the best on darkened ones (their cube).
@@ -33,6 +36,7 @@ class HILTuned(HIL):
         and so nor does the network's input, but unmodulated light interferes with the image.
     """
 
+    retrieval: PhaseRetrieval = PhaseRetrieval()
     start: SmoothStart = SmoothStart(tolerance=0.1)
     offsets: Annotated[int, Interval(ge=1, le=64)] = 8
 

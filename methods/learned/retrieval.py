@@ -41,8 +41,9 @@ class PhaseRetrieval:
     iterations : int
         0 leaves the start as it is; the paper takes 300.
     step : float
-        Adam's step [rad], cosine-decayed to zero (not in the paper, whose step of 0.001 rad is constant). Twice this
-        step lost 0.6 dB on captures of dead leaves: the network is to be believed near its start alone.
+        Adam's step [rad], cosine-decayed to zero (not in the paper, whose step of 0.001 rad is constant). From a smooth
+        start on `leto-aged`, twice this step lost 0.6 dB on captures of dead leaves: the network is to be believed near
+        its start alone.
     perceptual : float
         Weight of LPIPS where its weights are found, else of the weight-free feature distance (``mofd``, not in the
         paper), of sRGB pictures; 1 in the paper, which gives none of the other three.

@@ -71,7 +71,12 @@ def test_a_section_that_does_not_apply_leaves_nothing(added: None, tmp_path: Pat
 
 
 def test_every_file_of_sections_is_in_the_list_and_no_two_sections_share_a_place() -> None:
-    files = {path.stem for path in Path(sections.__file__).parent.glob("*.py")} - {"__init__"}
+    folder = Path(sections.__file__).parent
+    files = {
+        ".".join(path.relative_to(folder).with_suffix("").parts)
+        for path in folder.rglob("*.py")
+        if path.stem != "__init__"
+    }
     assert files == set(sections.NAMES)
     orders = [section.order for section in sections.sections()]
     assert orders == sorted(set(orders))

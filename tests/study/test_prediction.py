@@ -85,7 +85,11 @@ REFUSED = [
         "3:19: method 'trained.py:Gain' has to be trained; holograms should be of one that learns nothing",
     ),
     ("holograms: {params: {iteration: 3}}", "[wirtinger]", "3:22: method 'wirtinger' has no parameter 'iteration'"),
-    ("measure: predictions", "[wirtinger]", "3:10: measure should be 'picture', 'prediction' or 'focus'"),
+    (
+        "measure: predictions",
+        "[wirtinger]",
+        "3:10: measure should be 'picture', 'prediction', 'error_budget' or 'focus'",
+    ),
 ]
 
 

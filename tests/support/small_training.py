@@ -52,6 +52,10 @@ QUICK: dict[str, dict[str, Any]] = {
     "hil_plus": {"network": _SMALL, **_CALIBRATED},
     **{key: {**_CALIBRATED, "patterns": 2} for key in ("parametric_model", "learned_kernel")},
     **{key: {**_CALIBRATED, "patterns": 2, "width": 4} for key in ("cnn_prop_cnn", "hybrid_model")},
+    **{
+        key: {"training": {"steps": 8}, "retrieval": {"iterations": 3}, "start": _EARLY}
+        for key in ("image_terms", "image_network", "field_network")
+    },
 }
 
 

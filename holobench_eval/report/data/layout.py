@@ -10,7 +10,7 @@ from ...core import plugins
 from ...datasets.base import clusters_of
 from ...display.simulated.changes import draws
 from ...display.simulated.profile import load_profile
-from ...study.definition import Study
+from ...study.definition import PREDICTIONS, Study
 from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
@@ -58,8 +58,8 @@ class Layout:
     privileged: labels of methods that may differentiate through the bench; they are oracles, not competitors.
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
-    note: a paragraph that the study wants beside its tables. measure: ``picture``, ``prediction``, ``focus`` or
-    ``files`` (pictures that were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
+    note: a paragraph that the study wants beside its tables. measure: that of the study, or ``files`` (pictures that
+    were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
     holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
     stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
     that is a trained network (None: benches).
@@ -106,6 +106,11 @@ class Layout:
         if label in self.camera:
             return ONLINE
         return CALIBRATED if label in self.trained else OPEN_LOOP
+
+    @property
+    def predicts(self) -> bool:
+        """Whether predictions are compared with captures."""
+        return self.measure in PREDICTIONS
 
     @property
     def spends_captures(self) -> bool:
@@ -179,7 +184,7 @@ def layout_of(study: Study) -> Layout:
         note=study.note,
         measure=study.measure,
         metrics=study.protocol.metrics,
-        holograms=f"{probe.name} ({plain(probe.params)})" if study.measure == "prediction" else "",
+        holograms=f"{probe.name} ({plain(probe.params)})" if study.predicts else "",
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,
         identities=frozenset(entry.label for entry in study.methods if _network(entry.params) == "identity"),

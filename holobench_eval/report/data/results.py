@@ -213,7 +213,7 @@ class Results:
         The reference rows make them: for predictions, captures of one display.
         """
         captured = self.frame.loc[self.frame["condition"] == REFERENCE, "profile"]
-        return self.layout.measure != "prediction" or condition in set(captured)
+        return not self.layout.predicts or condition in set(captured)
 
     @cached_property
     def holes(self) -> pd.DataFrame:

@@ -249,7 +249,7 @@ REAL_SEEDS = (
 )
 
 
-_BY_MEASURE = {"picture": PICTURE, "prediction": PREDICTION, "focus": FOCUS, FILES: GIVEN}
+_BY_MEASURE = {"picture": PICTURE, "prediction": PREDICTION, "error_budget": PREDICTION, "focus": FOCUS, FILES: GIVEN}
 
 
 def text_of(

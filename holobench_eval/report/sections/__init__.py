@@ -7,6 +7,7 @@ from importlib import import_module
 from ..section import Section
 
 NAMES = (
+    "display.error_budget",
     "setup",
     "findings",
     "results",
@@ -16,7 +17,7 @@ NAMES = (
     "focus",
     "comparison",
     "training",
-    "diagnosis",
+    "display.diagnosis",
     "targets",
     "metrics",
     "alignment",

@@ -95,7 +95,7 @@ def _exposure(results: Results) -> str:
         return "No effect: without noise the unit of light changes no score."
     if results.layout.measure == FILES:
         return "Unknown. The intensity match removes its effect on brightness, not its effect on noise."
-    known = EXPOSURES if results.layout.measure != "prediction" else EXPOSURES_PREDICTED
+    known = EXPOSURES if not results.layout.predicts else EXPOSURES_PREDICTED
     rows = results.frame.groupby("exposure")["method"].unique()
     policies = sorted(set(rows.index) - {""})
     named = "" if len(policies) < 2 else f" This is the exposure of {words(sorted(rows.get('matched', ())))}."
@@ -111,7 +111,7 @@ def _saturation(results: Results) -> str:
     if results.layout.measure == FILES:
         doubt = " Above 0.1 % highlights are clipped; a study on a bench would refuse the capture." * (most > 0.001)
         return f"At most {100 * most:.3g} % of a capture's samples in the scored region are at full scale.{doubt}"
-    refused = "; above 0.1 % a capture is refused" if results.layout.measure != "prediction" else ""
+    refused = "; above 0.1 % a capture is refused" if not results.layout.predicts else ""
     return f"At most {100 * most:.3g} % of a capture's samples{refused}."
 
 

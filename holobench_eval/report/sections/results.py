@@ -79,7 +79,7 @@ def cost_columns(results: Results, each: str = "") -> dict[str, str]:
     trained = "training_captures" in results.table
     training = {"training_captures": "captures for training", "training_seconds": "seconds of training"}
     solving = {"captures": f"captures{each}{' while solving' * trained}", "seconds": f"seconds{each}"}
-    if results.layout.measure == "prediction":
+    if results.layout.predicts:
         del solving["captures"]
     return training | solving if trained else solving
 

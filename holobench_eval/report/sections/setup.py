@@ -63,7 +63,7 @@ def _on_displays(report: Report) -> list[tuple[str, str]]:
     panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
     predicted = [("measured", f"predictions of the captures of holograms by {layout.holograms}")]
     return [
-        *(predicted if layout.measure == "prediction" else []),
+        *(predicted if layout.predicts else []),
         _targets(report.results),
         ("dataset", "; ".join(sets)),
         *([("training images", _training_images(layout.training))] if layout.training else []),

@@ -12,17 +12,19 @@ from ...core.io import write_atomically
 from ..displays import Condition
 from ..plan import Cell
 from ..store import Record
-from . import focus, picture, prediction
+from . import error_budget, focus, picture, prediction
 from .job import Job, Measure, Measured
 
 MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
     "picture": picture.picture,
     "prediction": prediction.prediction,
+    "error_budget": error_budget.error_budget,
     "focus": focus.focus,
 }
 FLOORS: Mapping[str, Measure] = {  # the same for floor images
     "picture": picture.floor,
     "prediction": prediction.floor,
+    "error_budget": prediction.floor,
     "focus": focus.floor,
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from ...display import RectifiedCapture
 from ...display.api import Exposure
 from ...metrics import match
 from .. import cost, opening
+from ..artifacts import Artifact
 from ..displays import Condition
 from ..plan import Cell
 from ..store import Record
@@ -31,12 +33,29 @@ def prediction(job: Job) -> Measured:
     Capture and prediction get the factors that match the capture to the target, so that the capture is a picture in
     [0, 1]; the protocol's own match of the prediction follows.
     """
+    return compared(job, lambda seen: {})
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """A hologram ``(C, H, W)`` [rad] of a target ``(C, h, w)``, its capture, and the prediction of that ``(C, h, w)``,
+    in the same unit; what the prediction took, and what was learned before."""
+
+    phase: Tensor
+    target: Tensor
+    capture: RectifiedCapture
+    prediction: Tensor
+    taken: cost.Cost
+    learned: Artifact | None
+
+
+def _foresee(job: Job) -> Foreseen:
+    """Predict the capture of the hologram of the task's target."""
     task, cell, display = job.task, job.task.cells[0], job.task.conditions[0]
-    method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
     target = job.target(cell, display)
-    phase, capture = _shown(job, cell, display)
+    phase, capture = shown(job, cell, display)
+    method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
     refuse_saturated(capture)
-    wanted, factors = match(capture.image, target)
     handle = opening.open_display(display, cell.seed, job.device).for_method(
         method,
         task.label,
@@ -50,24 +69,32 @@ def prediction(job: Job) -> Measured:
     watch = cost.start(job.device)
     predicted = method.predict(own, handle)
     taken = watch.stop()
-    if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *wanted.shape):
-        raise wrong_output(job, "predict", predicted, f"an image {(1, *wanted.shape)}")
-    image = factors.view(-1, 1, 1) * predicted.detach().cpu()[0]
-    taken = cost.keep(job.timing, taken, job.setting.retime)
+    if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *target.shape):
+        raise wrong_output(job, "predict", predicted, f"an image {(1, *target.shape)}")
+    return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned)
+
+
+def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
+    """Predict the capture, and score the prediction by the protocol; ``more`` gives further scores."""
+    seen = _foresee(job)
+    wanted, factors = match(seen.capture.image, seen.target)
+    image = factors.view(-1, 1, 1) * seen.prediction
+    taken = cost.keep(job.timing, seen.taken, job.setting.retime)
+    further = more(seen)
 
     def compare(cell: Cell, _: Condition) -> Record:
-        keep_pictures(job, cell, image, wanted, phase)
+        keep_pictures(job, cell, image, wanted, seen.phase)
         return Record(
             cell=cell.description(),
             state="done",
-            label=task.label,
-            scores=protocol_scores(job, cell, image, wanted),
+            label=job.task.label,
+            scores=protocol_scores(job, cell, image, wanted) | further,
             seconds=taken.seconds,
             alone=job.alone,
             memory_mib=taken.memory_mib,
-            registration_residual_px=capture.residual,
-            saturated=capture.saturated,
-            learned=account(learned),
+            registration_residual_px=seen.capture.residual,
+            saturated=seen.capture.saturated,
+            learned=account(seen.learned),
         )
 
     return compare
@@ -77,7 +104,7 @@ def floor(job: Job) -> Measured:
     """The scores of floor images on the capture that methods predict."""
 
     def wanted(cell: Cell, display: Condition) -> Tensor:
-        return match(_shown(job, cell, display)[1].image, job.target(cell, display))[0]
+        return match(shown(job, cell, display)[1].image, job.target(cell, display))[0]
 
     return references(job, wanted)
 
@@ -95,23 +122,33 @@ class _Hologram:
     exposure: Exposure
 
 
-def _shown(job: Job, cell: Cell, display: Condition) -> tuple[Tensor, RectifiedCapture]:
-    """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture."""
+def shown(job: Job, cell: Cell, display: Condition, again: bool = False) -> tuple[Tensor, RectifiedCapture]:
+    """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture; or, ``again``, another
+    capture of it, with noise of its own."""
     name, params = cell.holograms["name"], canonical(dict(cell.holograms["params"]))
     hologram = _Hologram(
         name, cell.holograms["sha256"], params, job.source(cell), cell.repeat, cell.seed, cell.exposure
     )
-    return _photographed(hologram, display, job.setting.folder, job.device)
+    return _photographed(hologram, display, job.setting.folder, job.device, again)
 
 
 @lru_cache(maxsize=64)
-def _photographed(
-    hologram: _Hologram, display: Condition, folder: Path, device: torch.device
-) -> tuple[Tensor, RectifiedCapture]:
-    """The phase of a hologram and its capture, computed once in a process."""
+def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch.device) -> Tensor:
+    """The phase of a hologram, computed once in a process."""
     bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
     item, own = hologram.source[3], target.to(device, copy=True)
     method = plugins.build("methods", hologram.method, json.loads(hologram.params), folder)
     handle = bench.for_method(method, hologram.method, own, item=item, repeat=hologram.repeat)
-    phase = method.solve(own[None], handle).detach().cpu()[0]
+    phase: Tensor = method.solve(own[None], handle).detach().cpu()[0]
+    return phase
+
+
+@lru_cache(maxsize=64)
+def _photographed(
+    hologram: _Hologram, display: Condition, folder: Path, device: torch.device, again: bool
+) -> tuple[Tensor, RectifiedCapture]:
+    """The phase of a hologram and a capture of it, taken once in a process."""
+    bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
+    item = f"{hologram.source[3]}, again" if again else hologram.source[3]  # it names the noise
+    phase = _solved(hologram, display, folder, device)
     return phase, bench.photograph(phase, target, item=item, repeat=hologram.repeat, exposure=hologram.exposure)

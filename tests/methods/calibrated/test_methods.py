@@ -128,23 +128,23 @@ def test_training_is_decided_by_the_seeds_alone(name: str) -> None:
 
 
 @names
-def test_captures_are_patterns_images_rounds_and_held_out_images_shown_once_a_round_and_twice_in_the_end(
+def test_captures_are_patterns_images_rounds_and_held_out_images_once_a_round_and_twice_for_the_fallback(
     name: str,
 ) -> None:
-    for patterns, rounds, held_out in ((2, 2, 1), (0, 1, 2)):
+    for patterns, rounds, held_out, switch in ((2, 2, 1, False), (0, 1, 2, True)):
         memory = Memory()
         bench = training_bench(SPEC, memory, images=3, held_out=held_out)
-        method = replace(METHODS[name], patterns=patterns, training=replace(SHORT["training"], rounds=rounds))
-        method.prepare(bench)
-        assert bench.captures == patterns + 3 + (rounds - 1) + rounds * held_out + 2 * held_out
+        training = replace(SHORT["training"], rounds=rounds)
+        replace(METHODS[name], patterns=patterns, training=training, fallback=switch).prepare(bench)
+        assert bench.captures == patterns + 3 + (rounds - 1) + (rounds + 2 * switch) * held_out
         assert memory.fate.passed.count("after a photograph") == bench.captures
 
 
 @names
 def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
-    memory = Memory(as_files=True)
+    method, memory = replace(METHODS[name], fallback=True), Memory(as_files=True)
     bench = training_bench(SPEC, memory, images=2)
-    learned = METHODS[name].prepare(bench)
+    learned = method.prepare(bench)
     moments = memory.fate.passed
     photographs = [at for at, moment in enumerate(moments) if moment == "after a photograph"]
     kept = [at for at, moment in enumerate(moments) if moment == "after keeping approximator"]
@@ -152,10 +152,10 @@ def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
         memory = Memory(as_files=True)
         torch.manual_seed(at)
         with pytest.raises(Killed):
-            METHODS[name].prepare(training_bench(SPEC, memory, Fate(at), images=2))
+            method.prepare(training_bench(SPEC, memory, Fate(at), images=2))
         torch.manual_seed(at + 1)
         again = training_bench(SPEC, memory, images=2)
-        assert same(METHODS[name].prepare(again), learned), (at, moments[at])
+        assert same(method.prepare(again), learned), (at, moments[at])
         assert again.captures == bench.captures, (at, moments[at])
 
 

@@ -71,6 +71,15 @@ def test_the_clusters_of_targets_are_those_of_the_dataset(study):
     assert clusters == {"coins-1": "coins", "still-life-1": "still-life", "still-life-2": "still-life"}
 
 
+def test_rows_whose_network_is_the_ideal_image_are_known(tmp_path):
+    (tmp_path / "plugins.py").write_text(PLUGINS)
+    network = '{name: hil, label: "%s", params: {network: {name: %s}}}'
+    methods = f"  - {network % ('none', 'identity')}\n  - {network % ('some', 'unet')}\n"
+    config = CONFIG.replace("headline:", methods + "training: {dataset: dead_leaves}\nheadline:")
+    (tmp_path / "study.yaml").write_text(config)
+    assert layout_of(load_study(tmp_path / "study.yaml")).identities == {"none"}
+
+
 def test_displays_are_described_with_version_scaling_and_the_stages_that_differ_from_the_ideal(study):
     ideal, aged = describe(study).displays
     assert "Version 1, sha256 " in ideal.heading

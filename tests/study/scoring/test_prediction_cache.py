@@ -17,5 +17,5 @@ def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch: pyte
     for version in ("before", "before", "after"):
         probe = {"name": "mine.py:Mine", "params": {}, "sha256": version}
         cell: Any = SimpleNamespace(holograms=probe, repeat=0, seed=1, exposure="equal")
-        prediction._shown(job, cell, SimpleNamespace())  # type: ignore[arg-type]
+        prediction.shown(job, cell, SimpleNamespace())  # type: ignore[arg-type]
     assert asked[0] == asked[1] != asked[2]

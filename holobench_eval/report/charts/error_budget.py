@@ -1,0 +1,88 @@
+"""Error budgets: a stacked bar of shares for every display, and beside it the decibels that each link is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+
+from ..data.error_budget import Budget, Part
+from .style import COLOURS, GREY, PALE, grid, new_figure, save, style
+
+WIDTH = 1040  # pixels
+ROW, HEADER, LEGEND = 110, 40, 110  # pixels: of a display, above and below all
+SHARES, GAINS = 0.6, 0.4  # of the width
+LEGIBLE = 4.0  # percent from which on a part carries its number
+REST, NOISE = PALE, "#333333"
+DARK = ("#0072B2", "#6A3D9A", "#7F5539", NOISE, GREY)  # colours on which white is legible
+
+
+def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
+    """Draw the budgets of displays. Nothing is drawn without any."""
+    if not budgets:
+        return
+    colours = _colours(budgets)
+    with style():
+        figure = new_figure(WIDTH, HEADER + ROW * len(budgets) + LEGEND)
+        figure.set_layout_engine("constrained")
+        left, right = figure.subplots(1, 2, sharey=True, width_ratios=[SHARES, GAINS])
+        for row, budget in enumerate(budgets):
+            _shares(left, row, budget, colours)
+            _gains(right, row, budget, colours)
+        names = [f"{budget.condition}\n{budget.psnr.mean:.2f} dB" for budget in budgets]
+        left.set_yticks(range(len(budgets)), names, parse_math=False)
+        left.set_ylim(len(budgets) - 0.5, -0.5)
+        left.axvline(0, color="black", linewidth=0.8)
+        left.set_xlabel("share of the squared error of the captures [%]")
+        left.set_title("what explains the error", loc="left", weight="bold")
+        right.set_xlabel("PSNR gained if it were removed, with all to its left [dB]")
+        right.set_title("what its removal is worth at most", loc="left", weight="bold")
+        right.set_xlim(left=min(0.0, right.get_xlim()[0]))
+        for axes in (left, right):
+            axes.tick_params(axis="y", length=0)
+            grid(axes, "x")
+        handles = [Patch(facecolor=colour, label=label) for label, colour in colours.items()]
+        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+        save(figure, path)
+
+
+def _colours(budgets: Sequence[Budget]) -> Mapping[str, str]:
+    """Of every part by its label, in the order of the bars."""
+    labels = dict.fromkeys(part.label for budget in budgets for part in budget.explained)
+    explained = {label: COLOURS[index % len(COLOURS)] for index, label in enumerate(labels)}
+    return explained | {budgets[0].rest.label: REST, budgets[0].noise.label: NOISE}
+
+
+def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:
+    """The parts side by side from zero on; negative ones to its left, hatched."""
+    right = left = 0.0
+    for part in budget.parts:
+        share = 100 * part.share.mean
+        start = right if share >= 0 else left
+        hatch = "////" if share < 0 else None
+        colour = colours[part.label]
+        axes.barh(row, share, left=start, height=0.5, color=colour, edgecolor="white", linewidth=0.5, hatch=hatch)
+        if abs(share) >= LEGIBLE:
+            white = colour in DARK and share > 0
+            words = f"{share:.0f}"
+            axes.text(start + share / 2, row, words, ha="center", va="center", color="white" if white else "black")
+        right, left = (right + share, left) if share >= 0 else (right, left + share)
+
+
+def _gains(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:
+    """A mark with its interval for each link of the chain, from above to below, and one for the noise alone."""
+    links: list[Part] = [*budget.explained, budget.noise]
+    heights = row + np.linspace(-0.3, 0.3, len(links))
+    for part, height in zip(links, heights, strict=True):
+        if part.gain is None:
+            continue
+        low, high = np.nan_to_num([part.gain.mean - part.gain.low, part.gain.high - part.gain.mean])
+        colour = colours[part.label]
+        axes.errorbar(part.gain.mean, height, xerr=[[low], [high]], fmt="o", color=colour, markersize=5, capsize=2)
+        end = part.gain.mean + high
+        axes.annotate(
+            f"{part.gain.mean:z.1f}", (end, height), (5, 0), textcoords="offset points", va="center", fontsize=8
+        )

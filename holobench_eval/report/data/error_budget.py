@@ -1,0 +1,112 @@
+"""The error of captures in parts: what each prediction explains of it that the one before did not, noise, and the rest.
+
+The scores are those of ``metrics.error_budget``; e(P) is what a prediction P leaves unexplained of a capture. The
+predictions stand in a chain, each of which is meant to know more than the one before: the target, the ideal image of
+the hologram, and the methods of the study in the order of its config. Link k of the chain is, target by target, *the
+best of the first k predictions*. So what is explained is nested and never negative, and it is an upper bound: that of
+somebody who knew k predictions and, for each target, which of them to believe. A prediction that does worse on a target
+than one before it explains nothing of it; what it leaves alone is reported beside the parts.
+
+With e_k of link k, the parts are e_(k-1) - e_k, "what link k explains", then e_K - N, the rest, and N, the temporal
+noise, which no prediction can explain; they add up to e_0, the error of the captures against their targets, exactly.
+The rest has a sign by chance, since N comes from a second capture. Parts are given as shares of e_0, target by target,
+so that a dark picture counts as much as a bright one, as it does in a mean of decibels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...metrics import error_budget as scores
+from .results import Results
+from .statistics import Array, Estimate, bootstrap_mean
+
+# Labels of the parts that are of no method.
+IDEAL_IMAGE, REST, NOISE = "the ideal image", "unexplained", "temporal noise"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the error. label: who explains it, or what it is; share: of the total; gain: 10 lg (e_0 / e_k), the
+    PSNR [dB] that captures without this part and those before it would have gained, and of the noise what captures
+    with nothing but noise would (None: for the rest, which nobody knows how to remove, and where there is no noise);
+    alone: share of the total that the prediction leaves by itself (None: of no prediction)."""
+
+    label: str
+    share: Estimate
+    gain: Estimate | None = None
+    alone: Estimate | None = None
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The error of the captures of a display. psnr: of the captures against their targets [dB], before the protocol's
+    clip; ideal_psnr: the same of the ideal images; explained: by the links of the chain after the first, that of the
+    ideal image first. All are means over targets."""
+
+    condition: str
+    targets: int
+    psnr: Estimate
+    ideal_psnr: Estimate
+    explained: tuple[Part, ...]
+    rest: Part
+    noise: Part
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """All that adds up to the total."""
+        return (*self.explained, self.rest, self.noise)
+
+
+def budgets(results: Results) -> list[Budget]:
+    """The budget of every display on which all methods have the scores for all targets."""
+    if results.layout.measure != "error_budget":
+        return []
+    return [
+        budget(results, condition)
+        for condition in results.conditions
+        if all(results.is_complete(label, condition, scores.PREDICTION) for label in results.methods(condition))
+    ]
+
+
+def budget(results: Results, condition: str) -> Budget:
+    """The budget of a display, see the module."""
+    methods = results.methods(condition)
+
+    def of(label: str, key: str) -> Array:
+        return results.values(label, condition, key)
+
+    target, ideal, noise, algorithm = (
+        of(methods[0], key) for key in (scores.TARGET, scores.IDEAL, scores.NOISE, scores.ALGORITHM)
+    )
+    total = np.maximum(target, scores.SMALLEST)
+    alone = np.stack([target, ideal, *(of(label, scores.PREDICTION) for label in methods)]) / total
+    links = np.minimum.accumulate(alone)
+    return Budget(
+        condition=condition,
+        targets=total.size,
+        psnr=bootstrap_mean(-decibel(total)),
+        ideal_psnr=bootstrap_mean(-decibel(algorithm)),
+        explained=tuple(
+            Part(
+                label,
+                bootstrap_mean(links[k - 1] - links[k]),
+                bootstrap_mean(-decibel(links[k])),
+                bootstrap_mean(alone[k]),
+            )
+            for k, label in enumerate([IDEAL_IMAGE, *methods], start=1)
+        ),
+        rest=Part(REST, bootstrap_mean(links[-1] - noise / total)),
+        noise=Part(
+            NOISE,
+            bootstrap_mean(noise / total),
+            bootstrap_mean(decibel(total) - decibel(noise)) if (noise > scores.SMALLEST).all() else None,
+        ),
+    )
+
+
+def decibel(error: Array) -> Array:
+    """10 lg of an error."""
+    return 10 * np.log10(np.maximum(error, scores.SMALLEST))

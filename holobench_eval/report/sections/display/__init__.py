@@ -1,0 +1,1 @@
+"""Sections that say what a display is like, not what a method makes of it."""

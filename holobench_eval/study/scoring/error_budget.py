@@ -1,0 +1,45 @@
+"""What a prediction explains of the error of a capture, beside the scores of the prediction."""
+
+from __future__ import annotations
+
+from ...core.errors import Pending
+from ...display.api import ideal_image
+from ...metrics import error_budget as budget
+from ..displays import Condition
+from ..plan import Cell
+from .job import Job, Measured
+from .picture import refuse_saturated
+from .prediction import Foreseen, compared, shown
+
+
+def error_budget(job: Job) -> Measured:
+    """Predict the capture of a hologram, and compare what leaves how much of it unexplained: the target, the hologram's
+    ideal image, the prediction, and a second capture, which has the noise alone; see ``metrics.error_budget``."""
+    cell, display = job.task.cells[0], job.task.conditions[0]
+    _ask_for_both(job, cell, display)
+
+    def scores(seen: Foreseen) -> dict[str, float]:
+        _, again = shown(job, cell, display, again=True)
+        refuse_saturated(again)
+        ideal, capture = ideal_image(seen.phase, display.spec), seen.capture.image
+        return {
+            budget.TARGET: budget.unexplained(capture, seen.target, seen.target),
+            budget.IDEAL: budget.unexplained(capture, ideal, seen.target),
+            budget.PREDICTION: budget.unexplained(capture, seen.prediction, seen.target),
+            budget.NOISE: budget.temporal(capture, again.image, seen.target),
+            budget.ALGORITHM: budget.unexplained(ideal, seen.target, seen.target),
+        }
+
+    return compared(job, scores)
+
+
+def _ask_for_both(job: Job, cell: Cell, display: Condition) -> None:
+    """Have both photographs of a bench that other software drives asked for in one round, before any training."""
+    waiting: Pending | None = None
+    for again in (False, True):
+        try:
+            shown(job, cell, display, again)
+        except Pending as error:
+            waiting = error
+    if waiting is not None:
+        raise waiting

@@ -1,0 +1,149 @@
+"""Three predictions of a capture, each a special case of the next: what an error budget is made of.
+
+image terms    a few numbers on the ideal intensity: shading, blur, haze and tone (`ImageTerms`)
+image network  the same, and a U-Net that sees the ideal intensity and adds to it
+field network  the same on the intensity of a field that interferes (`DisplayModel`), and the U-Net sees the field too
+
+Each begins as the ideal image, learns from captures of the same holograms, and has the squared error as its loss, since
+that is what is divided. So a later one can only fail to explain what an earlier one does by its training.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor, nn
+
+from ...display.api import DisplaySpec, ideal_image
+from ...display.training import TrainingBench
+from ...optics.phasor import squared_modulus
+from ..calibrated.approximator import ModelApproximator, PredictedCapture, Rates
+from ..calibrated.display_model import DisplayModel
+from ..calibrated.method import SearchRetrieval, ThroughModel
+from ..hil.networks import Network
+from ..learned.samples import Schedule, Steps
+from ..learned.weights import seeded, start_at_zero
+from ..wirtinger import Wirtinger
+from .terms import ImageTerms
+
+
+class IdealImage(nn.Module):
+    """Phase ``(C, H, W)`` [rad] to the intensity ``(C, h, w)`` of the nominal model; nothing to learn."""
+
+    def __init__(self, spec: DisplaySpec) -> None:
+        super().__init__()
+        self.spec = spec
+
+    def forward(self, phase: Tensor) -> Tensor:
+        """See the class."""
+        return ideal_image(phase, self.spec)
+
+
+class WithTerms(nn.Module):
+    """Light in the region, an intensity (real) or a field (complex), and what then happens to its intensity."""
+
+    def __init__(self, light: nn.Module, spec: DisplaySpec) -> None:
+        super().__init__()
+        self.light = light
+        self.terms = ImageTerms(len(spec.wavelengths), spec.region.shape)
+
+
+class TermsCapture(PredictedCapture):
+    """The terms of a `WithTerms`, and what a network adds; it sees what they see, and the outcome."""
+
+    model: WithTerms
+
+    def forward(self, phase: Tensor, light: Tensor) -> Tensor:
+        """See the base."""
+        white = light[:, None, None]
+        output: Tensor = self.model.light(phase)
+        if output.is_complex():
+            field = output / white.sqrt()
+            intensity = squared_modulus(field)
+            seen = [intensity, field.real, field.imag]
+        else:
+            intensity = output / white
+            seen = [intensity]
+        capture: Tensor = self.model.terms(intensity)
+        if self.network is None:
+            return capture
+        added: Tensor = self.network(torch.cat([capture, *seen])[None])[0]
+        return capture + added
+
+
+class SquaredErrorApproximator(ModelApproximator):
+    """`ModelApproximator` of a `WithTerms` by the squared error."""
+
+    CAPTURE: ClassVar[type[PredictedCapture]] = TermsCapture
+    LOSS: ClassVar[str] = "l2"
+
+    def error(self, predicted: Tensor, capture: Tensor) -> Tensor:
+        """The squared error of a capture ``(C, h, w)``, relative to its power."""
+        return (predicted - capture).square().mean() / capture.square().mean()
+
+
+@dataclass(frozen=True)
+class OneRound(Schedule):
+    """Captures of the start alone: what is learned is asked about holograms of the same kind."""
+
+    rounds: Annotated[int, Interval(ge=1, le=1)] = 1
+    steps: Steps = 600
+
+
+@dataclass(frozen=True)
+class NestedPrediction(ThroughModel):
+    """What the three have in common; the parameters are those of `ThroughModel`.
+
+    `start` makes the holograms that are captured to learn from; in an error budget it should be the study's
+    ``holograms``.
+    """
+
+    training: OneRound = OneRound()
+    search: SearchRetrieval = SearchRetrieval(iterations=0)
+    start: Wirtinger = Wirtinger(iterations=50)
+
+    RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
+    version: ClassVar[int] = 1
+
+    @abstractmethod
+    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
+        """The ideal image, before it has learned."""
+
+    def _is_nominal(self, bench: TrainingBench, approximator: ModelApproximator) -> bool:
+        return False  # it is made to predict; `solve` shows what its predictions are good for
+
+    def _network(self, spec: DisplaySpec, inputs: int) -> nn.Module:
+        channels = len(spec.wavelengths)
+        with seeded("nested prediction", self.seed):
+            return start_at_zero(Network(name="unet").generator(inputs * channels, channels))
+
+
+@dataclass(frozen=True)
+class ImageTermsModel(NestedPrediction):
+    """A few numbers on the ideal intensity, see `ImageTerms`."""
+
+    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
+        """See the base."""
+        return SquaredErrorApproximator(WithTerms(IdealImage(spec), spec), None, self.RATES)
+
+
+@dataclass(frozen=True)
+class ImageNetwork(NestedPrediction):
+    """`ImageTermsModel` and a U-Net that sees the ideal intensity and adds to the prediction."""
+
+    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
+        """See the base."""
+        return SquaredErrorApproximator(WithTerms(IdealImage(spec), spec), self._network(spec, 2), self.RATES)
+
+
+@dataclass(frozen=True)
+class FieldNetwork(NestedPrediction):
+    """`ImageNetwork` on a field that interferes: `DisplayModel` in the place of the ideal model."""
+
+    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
+        """See the base."""
+        return SquaredErrorApproximator(WithTerms(DisplayModel(spec), spec), self._network(spec, 4), self.RATES)

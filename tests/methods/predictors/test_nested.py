@@ -1,0 +1,53 @@
+"""That each prediction contains the one before it, and what each learns that the one before cannot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from holobench_eval.display.api import ideal_image
+from holobench_eval.methods.predictors.nested import FieldNetwork, ImageNetwork, ImageTermsModel, NestedPrediction
+from holobench_eval.metrics.error_budget import unexplained
+from tests.support.small_training import pictures, small_spec
+
+ALL = (ImageTermsModel(), ImageNetwork(), FieldNetwork())
+SPEC = small_spec(colours=2)
+LIGHT = torch.tensor([2.0, 5.0])
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_before_it_has_learned_a_prediction_is_the_ideal_image(method: NestedPrediction) -> None:
+    target = pictures(SPEC)[0]
+    phase = 6 * torch.rand((2, *SPEC.shape), generator=torch.Generator().manual_seed(1))
+    smooth = torch.nn.functional.avg_pool2d(phase[None], 9, stride=1, padding=4)[0]
+    predicted = method.approximator(SPEC).image(LIGHT)(smooth)
+    ideal = ideal_image(smooth, SPEC)
+    assert unexplained(predicted, ideal, target) < 0.05 * unexplained(predicted, target, target)
+    assert float(predicted.mean()) == pytest.approx(float((ideal / LIGHT[:, None, None]).mean()), rel=0.1)
+
+
+def test_the_network_of_the_first_sees_no_phase_and_that_of_the_field_does() -> None:
+    phase = 6 * torch.rand((2, *SPEC.shape), generator=torch.Generator().manual_seed(1))
+    turned = phase + 1.0  # a constant phase: the same ideal image
+    for method, changes in ((ImageNetwork(), False), (FieldNetwork(), True)):
+        approximator = method.approximator(SPEC)
+        assert approximator.network is not None
+        with torch.no_grad():
+            for parameter in approximator.network.parameters():
+                parameter.add_(0.01)
+        image = approximator.image(LIGHT)
+        assert torch.allclose(image(phase), image(turned), rtol=1e-3, atol=1e-4) is not changes
+
+
+def test_light_of_another_exposure_is_another_unit_of_the_same_capture() -> None:
+    phase = torch.zeros(2, *SPEC.shape)
+    approximator = ImageTermsModel().approximator(SPEC)
+    assert torch.allclose(2 * approximator.image(2 * LIGHT)(phase), approximator.image(LIGHT)(phase), rtol=1e-4)
+
+
+def test_the_error_is_squared_and_relative() -> None:
+    approximator = replace(ImageTermsModel(), seed=1).approximator(SPEC)
+    capture = pictures(SPEC)[0]
+    assert float(approximator.error(1.1 * capture, capture)) == pytest.approx(0.01, rel=1e-4)

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from holobench_eval.report import Description, write_report
+from holobench_eval.report.charts.error_budget import draw_budgets
+from holobench_eval.report.data.error_budget import budgets
+from holobench_eval.report.sections.display.error_budget import reading
+from tests.report.data.test_error_budget import LEFT, METHODS, record, results
+
+
+def test_the_paragraph_bounds_what_each_prediction_and_the_noise_allow() -> None:
+    (budget,) = budgets(results())
+    text = str(reading(budget, "wirtinger"))
+    assert text.startswith("**ideal.** The captures of wirtinger holograms have 19.00")
+    network, field = budget.explained[-2:]
+    assert network.gain is not None
+    assert field.gain is not None
+    assert f"network {network.gain.mean:.2f}" in text
+    assert f"and field {field.gain.mean:.2f}" in text
+    assert "Temporal noise allows no more than" in text
+    assert "nan" not in text
+
+
+def test_a_display_without_noise_sets_no_limit() -> None:
+    (budget,) = budgets(results())
+    quiet = replace(budget, noise=replace(budget.noise, gain=None))
+    assert "There is no temporal noise." in str(reading(quiet, "wirtinger"))
+
+
+def test_a_report_has_the_budget_and_its_figure_before_all_else(tmp_path: Path) -> None:
+    records = [record(label, target) for target in LEFT for label in METHODS]
+    text = write_report(results().layout, records, tmp_path, {}, Description())[0].read_text()
+    assert text.index("## The error budget") < text.index("## Findings")
+    assert (tmp_path / "figures" / "error-budget.png").is_file()
+    assert "| temporal noise |" in text
+
+
+def test_nothing_is_drawn_without_a_budget(tmp_path: Path) -> None:
+    draw_budgets(tmp_path / "none.png", [])
+    assert not (tmp_path / "none.png").exists()
