@@ -19,7 +19,6 @@ from annotated_types import Interval
 from torch import Tensor, nn
 
 from ...display.api import DisplaySpec, ideal_image
-from ...display.training import TrainingBench
 from ...optics.phasor import squared_modulus
 from ..calibrated.approximator import ModelApproximator, PredictedCapture, Rates
 from ..calibrated.display_model import DisplayModel
@@ -112,9 +111,6 @@ class NestedPrediction(ThroughModel):
     @abstractmethod
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """The ideal image, before it has learned."""
-
-    def _is_nominal(self, bench: TrainingBench, approximator: ModelApproximator) -> bool:
-        return False  # it is made to predict; `solve` shows what its predictions are good for
 
     def _network(self, spec: DisplaySpec, inputs: int) -> nn.Module:
         channels = len(spec.wavelengths)

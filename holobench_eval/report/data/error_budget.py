@@ -21,7 +21,7 @@ import numpy as np
 
 from ...metrics import error_budget as scores
 from .results import Results
-from .statistics import Array, Estimate, bootstrap_mean
+from .statistics import Array, Estimate
 
 # Labels of the parts that are of no method.
 IDEAL_IMAGE, REST, NOISE = "the ideal image", "unexplained", "temporal noise"
@@ -74,6 +74,7 @@ def budgets(results: Results) -> list[Budget]:
 def budget(results: Results, condition: str) -> Budget:
     """The budget of a display, see the module."""
     methods = results.methods(condition)
+    interval = results.estimate
 
     def of(label: str, key: str) -> Array:
         return results.values(label, condition, key)
@@ -87,22 +88,22 @@ def budget(results: Results, condition: str) -> Budget:
     return Budget(
         condition=condition,
         targets=total.size,
-        psnr=bootstrap_mean(-decibel(total)),
-        ideal_psnr=bootstrap_mean(-decibel(algorithm)),
+        psnr=interval(-decibel(total)),
+        ideal_psnr=interval(-decibel(algorithm)),
         explained=tuple(
             Part(
                 label,
-                bootstrap_mean(links[k - 1] - links[k]),
-                bootstrap_mean(-decibel(links[k])),
-                bootstrap_mean(alone[k]),
+                interval(links[k - 1] - links[k]),
+                interval(-decibel(links[k])),
+                interval(alone[k]),
             )
             for k, label in enumerate([IDEAL_IMAGE, *methods], start=1)
         ),
-        rest=Part(REST, bootstrap_mean(links[-1] - noise / total)),
+        rest=Part(REST, interval(links[-1] - noise / total)),
         noise=Part(
             NOISE,
-            bootstrap_mean(noise / total),
-            bootstrap_mean(decibel(total) - decibel(noise)) if (noise > scores.SMALLEST).all() else None,
+            interval(noise / total),
+            interval(decibel(total) - decibel(noise)) if (noise > scores.SMALLEST).all() else None,
         ),
     )
 
