@@ -16,7 +16,7 @@ from ..core.hashing import digest
 
 # Everything between a phase and its score: optics, simulated bench, registration, metrics. A new version is any new
 # text; every cell is then computed again.
-HARNESS = "3: compiled steps of retrieval; sub-samples in the band alone"
+HARNESS = "4: scattered light taken off before registration"
 # The alignment of a photograph with its target without fiducials (``holoeval score``).
 ALIGNMENT = "bf6ba199e08d4095b8e39ad30dae6362d6e0fc515bce398ded0ee8949f3d5df6"
 

@@ -140,7 +140,7 @@ class Fitting:
             return [psnr[name] - published for name, published in self.calibration.figures.items()]
 
         own = [np.clip(1 + (self._own(name) - low) / (high - low), 1.05, 1.95) for name, (low, high) in ranges.items()]
-        found = least_squares(errors, own, bounds=(1.0, 2.0), diff_step=STEP, xtol=1e-2, max_nfev=EVALUATIONS)
+        found = least_squares(errors, own, bounds=(1.0, 2.0), diff_step=[STEP] * len(own), xtol=1e-2, max_nfev=EVALUATIONS)
         return values(found.x)
 
     def _own(self, name: str) -> float:
@@ -164,7 +164,7 @@ class Fitting:
     @cached_property
     def _targets(self) -> dict[str, Tensor]:
         given, shape = self.calibration.targets, self.profile.spec(self.calibration.panel).region.shape
-        dataset = plugins.build("datasets", given.dataset, given.params)
+        dataset = plugins.build("datasets", given.dataset, dict(given.params))
         return {item: dataset.load(item, shape) for item in dataset.items()}
 
     @cached_property

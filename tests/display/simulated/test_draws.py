@@ -84,7 +84,8 @@ def test_random_patterns_differ_between_draws(profile):
     assert len(seeds) == len(DRAWS) + 1
 
 
-def test_a_drawn_bench_is_built_and_photographs(profile):
+def test_a_drawn_bench_is_built_and_photographs():
+    profile = load_profile("leto-aged")
     phase = 6 * torch.rand(3, *PANEL, generator=torch.Generator().manual_seed(1))
     target = torch.full((3, 104, 104), 0.5)
     images = []

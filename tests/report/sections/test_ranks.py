@@ -256,14 +256,14 @@ def swept_of(folder, profile):
 
 
 def test_a_layout_knows_what_was_drawn_whether_the_profile_has_a_name_or_a_path(tmp_path):
-    drawn, other = swept_of(tmp_path, "leto-aged")
-    assert drawn.drawn == tuple(draws.values(PROFILE, index) for index in (1, 2, 3))
+    drawn, other = swept_of(tmp_path, "leto-2020")
+    assert drawn.drawn == tuple(draws.values(load_profile("leto-2020"), index) for index in (1, 2, 3))
     assert other.drawn == ()
-    path = files("holobench_eval.display.simulated") / "profiles" / "leto-aged.yaml"
+    path = files("holobench_eval.display.simulated") / "profiles" / "leto-2020.yaml"
     (tmp_path / "own.yaml").write_text(path.read_text())
     assert swept_of(tmp_path, "own.yaml")[0] == drawn
 
 
 def test_parameters_of_a_stage_that_the_display_lacks_are_not_among_what_was_drawn(tmp_path):
     (one, *_), _ = (swept.drawn for swept in swept_of(tmp_path, "ideal"))
-    assert set(draws.PARAMETERS) - set(one) == {"fill"}
+    assert set(draws.PARAMETERS) - set(one) == {"fill", "linewidth", "stray", "reach"}

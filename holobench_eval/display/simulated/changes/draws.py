@@ -109,6 +109,8 @@ def _share(profile: Profile, value: float) -> Profile:
 
 
 def _reach(profile: Profile, value: float) -> Profile:
+    if not profile.stray_light.share:
+        return profile
     return replace(profile, stray_light=replace(profile.stray_light, reach=value))
 
 
