@@ -48,7 +48,7 @@ def smooth(shape: tuple[int, ...], seed: int = 1) -> Tensor:
 
 @pytest.fixture(scope="module")
 def benches() -> dict[torch.device, CalibratedBench]:
-    """The paper-like display without the noise of its camera, on both devices."""
+    """`leto-aged` without the noise of its camera, on both devices."""
     profile = load_profile("leto-aged")
     quiet = replace(profile, sensor=replace(profile.sensor, noise=False))
     with repeatable(1, CUDA):

@@ -70,7 +70,7 @@ class Fitting:
             error = self.predicted(values) - wanted.psnr
             self.tell(f"{_listed(values)}: network {error + wanted.psnr:.2f} dB")
             trials.append((value, error, values))
-            if abs(error) < NEAR:
+            if abs(error) < NEAR or (value == high if error < 0 else value == low):
                 break
             if len(trials) == 1:
                 value += (high - low) / 10 * (1 if error < 0 else -1)
@@ -140,7 +140,9 @@ class Fitting:
             return [psnr[name] - published for name, published in self.calibration.figures.items()]
 
         own = [np.clip(1 + (self._own(name) - low) / (high - low), 1.05, 1.95) for name, (low, high) in ranges.items()]
-        found = least_squares(errors, own, bounds=(1.0, 2.0), diff_step=[STEP] * len(own), xtol=1e-2, max_nfev=EVALUATIONS)
+        found = least_squares(
+            errors, own, bounds=(1.0, 2.0), diff_step=[STEP] * len(own), xtol=1e-2, max_nfev=EVALUATIONS
+        )
         return values(found.x)
 
     def _own(self, name: str) -> float:
