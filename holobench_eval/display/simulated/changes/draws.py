@@ -20,6 +20,8 @@ MODEL = (
     "is public of the panel stay"
 )
 
+WIDE = 0.8  # of the band: the iris that ranges of aberrations are given for
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -75,16 +77,18 @@ def _distance(profile: Profile, value: float) -> Profile:
 
 
 def _astigmatism(profile: Profile, value: float) -> Profile:
-    return _aberration(profile, "astigmatism_0", value)
+    return _aberration(profile, "astigmatism_0", value, 2)
 
 
 def _coma(profile: Profile, value: float) -> Profile:
-    return _aberration(profile, "coma_x", value)
+    return _aberration(profile, "coma_x", value, 3)
 
 
-def _aberration(profile: Profile, name: str, value: float) -> Profile:
+def _aberration(profile: Profile, name: str, value: float, power: int) -> Profile:
+    """The ranges are of a wide iris; through a smaller one the same lenses have less, by that power of its radius."""
+    waves = value * (profile.panel.pupil / WIDE) ** power
     way = profile.propagation
-    return replace(profile, propagation=replace(way, aberration={**way.aberration, name: value}))
+    return replace(profile, propagation=replace(way, aberration={**way.aberration, name: waves}))
 
 
 def _zero_order(profile: Profile, value: float) -> Profile:
