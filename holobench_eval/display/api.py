@@ -73,8 +73,8 @@ class Region:
 class DisplaySpec:
     """Nominal optics of a display: all that a method may know about it.
 
-    The blaze that an off-axis display adds to every phase, and the re-centring of its image, belong to the display, so
-    the nominal model is on axis for every method.
+    An off-axis display adds its blaze to every phase and re-centres the image, so the nominal model is on axis. The
+    blaze is given for methods that model the panel, whose look-up table and crosstalk meet the phase with the blaze.
 
     Parameters
     ----------
@@ -96,6 +96,8 @@ class DisplaySpec:
         The scored window.
     eye
         That of the viewer, where its prescription is known: ``focus`` of ``stages.eye.Eye``.
+    blaze
+        That the display adds, (vertical, horizontal) cycles a pixel.
     """
 
     name: str
@@ -107,6 +109,7 @@ class DisplaySpec:
     pupil: float | None
     region: Region
     eye: Matrix = (0.0, 0.0, 0.0)
+    blaze: tuple[float, float] = (0.0, 0.0)
 
     def propagator(
         self, channel: int, dtype: torch.dtype = torch.complex64, device: torch.device | str = "cpu"

@@ -19,7 +19,7 @@ from ...core.graphs import is_recorded
 from ...display.api import DisplaySpec
 from ...imaging.shifts import correlate_each
 from ...optics import AngularSpectrum
-from ...optics.phase import TAU, wrap
+from ...optics.phase import TAU, blaze, wrap
 from ...optics.phasor import mean_phasor, phasor
 from ...optics.zernike import NAMES, zernike
 
@@ -37,7 +37,9 @@ FIRST_CROSSTALK = 0.3
 # Effects (Profile.effects) that the model has a term for. All others of a bench lie outside its form:
 # fringes, of which SOURCE_GRID follows the coarser ones alone, and the light from between the pixels as far as it is
 # not simply unmodulated, are among them.
-FORM = frozenset({"look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES})
+FORM = frozenset(
+    {"blaze", "look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES}
+)
 
 
 class Maps(NamedTuple):
@@ -74,6 +76,7 @@ class DisplayModel(nn.Module):
         self.aberration = nn.Parameter(torch.zeros(channels, len(MODES)))
         self.brightness = nn.Parameter(torch.zeros(channels))
         self.register_buffer("modes", pupil_modes(spec.region.shape, spec.pupil), persistent=False)
+        self.register_buffer("ramp", blaze(spec.shape, spec.blaze) if any(spec.blaze) else None, persistent=False)
         self._held: tuple[Tensor, Maps] | None = None
 
     def __getstate__(self) -> dict[str, object]:
@@ -82,8 +85,11 @@ class DisplayModel(nn.Module):
     def forward(self, phase: Tensor) -> Tensor:
         """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; its intensity is in the captures' unit."""
         maps = self._maps()
-        panel = lit(self._driven(phase) * maps.gain, maps.taps)
+        shown = phase if self.ramp is None else phase + self.ramp
+        panel = lit(self._driven(shown) * maps.gain, maps.taps, self.spec.blaze)
         panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * maps.light
+        if self.ramp is not None:  # the optical axis follows the blaze
+            panel = panel * phasor(self.ramp.new_ones(()), -self.ramp)
         region = [self.spec.region.crop(self._propagator(c).forward(field)) for c, field in enumerate(panel)]
         return torch.fft.ifft2(torch.fft.fft2(torch.stack(region)) * maps.pupil) * maps.amplitude
 
@@ -137,23 +143,27 @@ class DisplayModel(nn.Module):
         return torch.exp(enlarged(self.amplitude, shape)) * phasor(self.angle.new_ones(()), enlarged(self.angle, shape))
 
 
-def lit(phase: Tensor, taps: Tensor) -> Tensor:
-    """Light that each pixel sends out, ``(C, H, W)``: the mean over its sub-samples, at which the phase ``(C, H, W)``
-    [rad] is that of square pixels convolved with a Gaussian.
+def lit(phase: Tensor, taps: Tensor, cycles: tuple[float, float] = (0.0, 0.0)) -> Tensor:
+    """Light that each pixel sends along a blaze, ``(C, H, W)``: the mean over its sub-samples, at which the phase
+    ``(C, H, W)`` [rad] is that of square pixels convolved with a Gaussian, less the blaze within the pixel.
 
-    taps: share of each neighbouring pixel in each sub-sample, ``(C, samples, 2 reach + 1)``, along one axis.
+    taps: share of each neighbouring pixel in each sub-sample, ``(C, samples, 2 reach + 1)``, along one axis; cycles:
+    the blaze, (vertical, horizontal) cycles a pixel.
     """
     channels = len(phase)
+    within = blaze((SAMPLES, SAMPLES), (cycles[0] / SAMPLES, cycles[1] / SAMPLES)).to(phase)
+    within = (within - within[SAMPLES // 2, SAMPLES // 2]).reshape(-1, 1, 1)
     padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
     if not is_recorded(phase.device) and not taps.requires_grad:  # half the time of what follows
         pairs = zip(padded[0], taps.tolist(), strict=True)
         blurred = (correlate_each(correlate_each(colour, own, -2), own, -1).flatten(0, 1) for colour, own in pairs)
-        return torch.stack([mean_phasor(colour, 0) for colour in blurred])
+        turned = (colour - within for colour in blurred) if any(cycles) else blurred
+        return torch.stack([mean_phasor(colour, 0) for colour in turned])
     rows = functional.conv2d(padded, taps.reshape(channels * SAMPLES, 1, -1, 1), groups=channels)
     rows = rows.view(channels, SAMPLES, *rows.shape[-2:]).transpose(0, 1)  # colours side by side again
     columns = functional.conv2d(rows, taps.reshape(channels * SAMPLES, 1, 1, -1), groups=channels)
     columns = columns.view(SAMPLES, channels, SAMPLES, *columns.shape[-2:])
-    return mean_phasor(columns.transpose(0, 1).flatten(1, 2), 1)
+    return mean_phasor(columns.transpose(0, 1).flatten(1, 2) - within, 1)
 
 
 def enlarged(grid: Tensor, shape: tuple[int, int]) -> Tensor:

@@ -17,9 +17,10 @@ from annotated_types import Interval
 from torch import Tensor
 from torch.nn import functional
 
+from ...display.api import DisplaySpec
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
-from ...optics.phase import TAU, wrap
+from ...optics.phase import TAU, blaze, wrap
 from ..common import Bench, matched
 from ..double_phase import DoublePhase
 from ..wirtinger import Wirtinger
@@ -38,7 +39,7 @@ class OpenLoop(Protocol):
 
 @dataclass(frozen=True)
 class PhaseGamma(ABC):
-    """An open-loop method whose phase, wrapped to [0, 2 pi), is shown as 2 pi (phase / 2 pi)^gamma.
+    """An open-loop method whose pattern on the panel, a phase in [0, 2 pi), becomes 2 pi (phase / 2 pi)^gamma.
 
     There is one gamma for all colours of a display, as the paper says of no more. It is the one whose captures of
     training images, of all `COARSE` and then of all `FINE` around the best of them, have the least squared error: with
@@ -94,7 +95,8 @@ class PhaseGamma(ABC):
 
         def capture() -> dict[str, list[float]]:
             shots = [
-                [(curved(phase, gamma), image, ("gamma", f"{gamma:.6f}")) for image, phase in pairs] for gamma in gammas
+                [(corrected(phase, gamma, bench.spec), image, ("gamma", f"{gamma:.6f}")) for image, phase in pairs]
+                for gamma in gammas
             ]
             bench.announce(shot for group in shots for shot in group)
             errors = []
@@ -129,7 +131,13 @@ class PhaseGamma(ABC):
         CellError
             Where the method was not trained.
         """
-        return curved(self.of.solve(target, bench), bench.learned["gamma"])
+        return corrected(self.of.solve(target, bench), bench.learned["gamma"], bench.spec)
+
+
+def corrected(phase: Tensor, gamma: float, spec: DisplaySpec) -> Tensor:
+    """A phase ``(..., H, W)`` [rad] whose pattern on the panel, which has the blaze of the display, is `curved`."""
+    ramp = blaze(spec.shape, spec.blaze, device=phase.device)
+    return curved(phase + ramp, gamma) - ramp
 
 
 def curved(phase: Tensor, gamma: float) -> Tensor:

@@ -51,6 +51,7 @@ class Panel(Stage):
             bits=self.bits,
             pupil=self.pupil,
             region=Region((self.shape[0] - height) // 2, (self.shape[1] - width) // 2, height, width),
+            blaze=self.blaze,
         )
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
