@@ -16,7 +16,9 @@ def calibrate(profile: ProfileName) -> None:
     loaded, screen = load_profile(profile), console()
     calibration = load_calibration(loaded)
     with watching(screen) as watch:
-        fitting = Fitting(loaded, calibration, watch, lambda line: screen.print(line, highlight=False, soft_wrap=True))
+        fitting = Fitting(
+            profile, loaded, calibration, watch, lambda line: screen.print(line, highlight=False, soft_wrap=True)
+        )
         values, network = fitting.fit()
         psnr = fitting.captured(values)
     rows, columns = calibration.panel

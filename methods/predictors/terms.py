@@ -59,7 +59,8 @@ class ImageTerms(nn.Module):
 def spread(side: int, width: Tensor, lossless: bool = False) -> Tensor:
     """Gaussians ``(C, side, side)`` of standard deviations ``width`` ``(C,)`` [px] around each pixel of a line.
 
-    It is dark beyond the ends, and what is spread there is lost; ``lossless``: it is kept inside.
+    It is dark beyond the ends, and what is spread there is lost. ``lossless``: each pixel is a weighted mean of those
+    of the line, so that flat light stays flat up to the ends; light of pixels near them is then not conserved.
     """
     places = torch.arange(side, dtype=width.dtype, device=width.device)
     gaussians = torch.exp(-((places[:, None] - places) ** 2) / (2 * width[:, None, None] ** 2))

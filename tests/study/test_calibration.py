@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -22,7 +23,11 @@ SMALL = Calibration(
 
 def fitting(calibration: Calibration, lines: list[str] | None = None) -> Fitting:
     return Fitting(
-        load_profile("leto-mild"), calibration, Lines(lambda line: None), ([] if lines is None else lines).append
+        "leto-mild",
+        load_profile("leto-mild"),
+        calibration,
+        Lines(lambda line: None),
+        ([] if lines is None else lines).append,
     )
 
 
@@ -57,7 +62,7 @@ def test_a_fit_of_one_parameter_finds_it_from_captures_that_were_made_with_it() 
 
 def test_the_parameter_of_a_prediction_is_found_in_few_trainings(monkeypatch: pytest.MonkeyPatch) -> None:
     free = {"stray_light.share": (0.05, 0.7), "crosstalk.width": (0.1, 0.6)}
-    calibration = replace(SMALL, free=free, prediction=Prediction(25.0, "stray_light.share", {}))
+    calibration = replace(SMALL, free=free, prediction=Prediction(25.0, "stray_light.share", 0.3, {}))
     asked: list[float] = []
 
     def predicted(_: Fitting, values: Mapping[str, float]) -> float:
@@ -66,13 +71,45 @@ def test_the_parameter_of_a_prediction_is_found_in_few_trainings(monkeypatch: py
 
     monkeypatch.setattr(Fitting, "predicted", predicted)
     monkeypatch.setattr(Fitting, "_fit_figures", lambda _, fixed: {"crosstalk.width": 0.3, **fixed})
+    monkeypatch.setattr(Fitting, "_quick", lambda _, values: dict(SMALL.figures))
     found, psnr = fitting(calibration).fit()
     assert psnr == 18 + 15 * found["stray_light.share"] ** 1.2
     assert abs(psnr - 25.0) < NEAR
     assert len(asked) <= TRAININGS
 
 
-def test_a_network_is_trained_on_the_candidate_and_scored_on_its_captures() -> None:
+MET = {0.62: (15.3, 17.5), 0.685: (15.51, 17.34), 0.7: (15.53, 17.27)}  # dB, by the share of stray light
+
+
+@pytest.mark.parametrize("start", [0.62, 0.685])
+@pytest.mark.parametrize(("tolerance", "best"), [(0.3, 0.685), (0.4, 0.7), (0.1, 0.62)])
+def test_no_prediction_is_bought_with_figures_outside_their_tolerance(
+    monkeypatch: pytest.MonkeyPatch, start: float, tolerance: float, best: float
+) -> None:
+    shipped, profile = load_calibration(load_profile("leto-2020")), load_profile("leto-2020")
+    assert shipped.prediction is not None
+    calibration = replace(shipped, prediction=replace(shipped.prediction, tolerance=tolerance))
+    profile = replace(profile, stray_light=replace(profile.stray_light, share=start))
+    tried: list[float] = []
+
+    def predicted(_: Fitting, values: Mapping[str, float]) -> float:
+        tried.append(values["stray_light.share"])
+        return 23.96 + (24.34 - 23.96) * (tried[-1] - 0.62) / (0.685 - 0.62)  # never near enough: the range ends first
+
+    def quick(_: Fitting, values: Mapping[str, float]) -> dict[str, float]:
+        return dict(zip(("double_phase", "wirtinger"), MET[values["stray_light.share"]], strict=True))
+
+    monkeypatch.setattr(Fitting, "predicted", predicted)
+    monkeypatch.setattr(Fitting, "_quick", quick)
+    monkeypatch.setattr(Fitting, "_fit_figures", lambda _, fixed: fixed)
+    found, _ = Fitting("leto-2020", profile, calibration, Lines(lambda line: None), lambda line: None).fit()
+    assert tried[-1] == 0.7
+    assert found["stray_light.share"] == max(best, start)
+
+
+def test_a_network_is_trained_on_the_candidate_and_scored_on_its_captures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     study = {
         "title": "small",
         "measure": "prediction",
@@ -89,9 +126,13 @@ def test_a_network_is_trained_on_the_candidate_and_scored_on_its_captures() -> N
             }
         ],
     }
-    calibration = replace(SMALL, prediction=Prediction(25.0, "stray_light.share", study))
+    calibration = replace(SMALL, prediction=Prediction(25.0, "stray_light.share", 0.3, study))
     clear, hazy = (fitting(calibration).predicted({"stray_light.share": share}) for share in (0.0, 0.6))
     assert clear > hazy + 0.5
+    (tmp_path / "mine.yaml").write_text("like: leto-mild\nname: leto-mild-b\n")
+    monkeypatch.chdir(tmp_path)  # the file is named from here, and the study lies elsewhere
+    own = replace(fitting(calibration), source="mine.yaml", profile=load_profile("mine.yaml"))
+    assert own.predicted({"stray_light.share": 0.0}) != clear
 
 
 def test_a_parameter_that_no_profile_has_is_refused() -> None:
@@ -102,3 +143,13 @@ def test_a_parameter_that_no_profile_has_is_refused() -> None:
 def test_a_profile_that_is_fitted_to_nothing_is_refused() -> None:
     with pytest.raises(UserError, match="'ideal' is not fitted to anything"):
         load_calibration(load_profile("ideal"))
+
+
+def test_a_calibration_belongs_to_the_profile_of_its_name_and_to_others_of_its_kind(tmp_path: Path) -> None:
+    for name in ("leto-2020-b", "mine"):
+        (tmp_path / f"{name}.yaml").write_text(f"like: leto-2020\nname: {name}\n")
+    own = load_calibration(load_profile("leto-2020"))
+    assert load_calibration(load_profile("leto-2020-b.yaml", tmp_path)) == own
+    for other in (load_profile("mine.yaml", tmp_path), load_profile("leto-sled")):
+        with pytest.raises(UserError, match=f"'{other.name}' is not fitted to anything"):
+            load_calibration(other)

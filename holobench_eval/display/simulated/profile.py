@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import reduce
 from importlib.resources import files
+from itertools import accumulate
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
@@ -58,7 +58,7 @@ class Profile:
     residual_bound
         Largest registration residual with which a study may run [region px, rms].
     like
-        A profile, by name or file, whose values hold where this file gives none.
+        A profile, by name or file (from the folder of this one), whose values hold where this file gives none.
     digest
         sha256 of the file, and of those it is like.
 
@@ -176,8 +176,16 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
         There is no such profile, or its file has a fault, with file:line:column.
     """
     documents = _documents(name, folder)
-    document = documents[0]
-    profile = typed(document, Profile, reduce(_over, [each.data for each in reversed(documents)]))
+    text = "".join(each.text for each in documents)
+    documents.reverse()  # a fault of a base is told of its own file
+    merged = accumulate((each.data for each in documents), _over)
+    *_, profile = [_built(each, values) for each, values in zip(documents, merged, strict=True)]
+    return replace(profile, digest=hashlib.sha256(text.encode()).hexdigest())
+
+
+def _built(document: Document, values: Mapping[str, Any]) -> Profile:
+    """The profile of a file, with the values of those it is like. UserError: a fault, with file:line:column."""
+    profile = typed(document, Profile, values)
     if profile.lut.table and len(profile.lut.table) != 2**profile.panel.bits:
         levels = 2**profile.panel.bits
         message = f"the table has {len(profile.lut.table)} entries; a panel of {profile.panel.bits} bits has {levels}"
@@ -186,13 +194,12 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     if spectra not in (0, colours):
         message = f"there are {spectra} measured spectra; the panel has {colours} wavelengths"
         raise document.error(("spectrum", "measured"), message)
-    text = "".join(each.text for each in documents)
-    return replace(profile, digest=hashlib.sha256(text.encode()).hexdigest())
+    return profile
 
 
 def _documents(name: str, folder: Path | None) -> list[Document]:
     """The file of a profile, that of the profile it is like, and so on. UserError: one of them is not there."""
-    path = _file(name, folder)
+    path = _file(name, Path() if folder is None else folder, Path())
     documents = [load(path)]
     while (base := documents[-1].data.get("like")) is not None:
         if len(documents) == DEEPEST:
@@ -215,9 +222,10 @@ def _over(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
     return {**base, **changes, **nested}
 
 
-def _file(name: str, folder: Path | None = None) -> Path:
+def _file(name: str, *folders: Path) -> Path:
+    """Where a profile's file is: among those of the package, or in the first of the folders that has it."""
     if name.endswith((".yaml", ".yml")):
-        candidates = [Path(name)] if folder is None else [folder / name, Path(name)]
+        candidates = [folder / name for folder in folders]
         path = next((path for path in candidates if path.is_file()), None)
         if path is None:
             raise UserError(f"profile '{name}': no such file: {candidates[0]}")

@@ -31,7 +31,8 @@ IDEAL_IMAGE, REST, NOISE = "the ideal image", "unexplained", "temporal noise"
 class Part:
     """A part of the error. label: who explains it, or what it is; share: of the total; gain: 10 lg (e_0 / e_k), the
     PSNR [dB] that captures without this part and those before it would have gained, and of the noise what captures
-    with nothing but noise would (None: for the rest, which nobody knows how to remove, and where there is no noise);
+    with nothing but noise would, over the targets that have any (None: for the rest, which nobody knows how to remove,
+    and where there is no noise);
     alone: share of the total that the prediction leaves by itself (None: of no prediction)."""
 
     label: str
@@ -82,7 +83,7 @@ def budget(results: Results, condition: str) -> Budget:
     target, ideal, noise, algorithm = (
         of(methods[0], key) for key in (scores.TARGET, scores.IDEAL, scores.NOISE, scores.ALGORITHM)
     )
-    total = np.maximum(target, scores.SMALLEST)
+    total, noisy = np.maximum(target, scores.SMALLEST), noise > scores.SMALLEST
     alone = np.stack([target, ideal, *(of(label, scores.PREDICTION) for label in methods)]) / total
     links = np.minimum.accumulate(alone)
     return Budget(
@@ -103,7 +104,7 @@ def budget(results: Results, condition: str) -> Budget:
         noise=Part(
             NOISE,
             interval(noise / total),
-            interval(decibel(total) - decibel(noise)) if (noise > scores.SMALLEST).all() else None,
+            interval(np.where(noisy, decibel(total) - decibel(noise), np.nan)) if noisy.any() else None,
         ),
     )
 

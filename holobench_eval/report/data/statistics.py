@@ -39,7 +39,7 @@ class Estimate:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the interval lies on one side of zero: else a difference is not shown."""
+        """Whether the interval lies on one side of zero; of one comparison, not adjusted for others."""
         return self.low > 0 or self.high < 0
 
 

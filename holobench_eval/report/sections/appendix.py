@@ -55,7 +55,9 @@ def _notes(report: Report) -> Iterator[tuple[str, object]]:
         "Intervals",
         "Student's t over clusters of targets, targets of one cluster summed; Fieller's for ratios. They show how the "
         "mean varies with other targets of the same kind, not with other displays"
-        f"{' or another training of the same method' * trained}. A difference whose interval holds zero is not shown.",
+        f"{' or another training of the same method' * trained}. They are of one comparison each and "
+        'not adjusted: whether a difference from the baseline is "shown" is said by the paired tests alone; other '
+        "differences are untested.",
     )
     yield (
         "Files",

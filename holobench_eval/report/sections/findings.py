@@ -111,13 +111,14 @@ def _leading(
 
 
 def _lead(results: Results, condition: str, ranking: Sequence[str]) -> str:
-    """By how much the first of a ranking is ahead of the second, and whether that is shown."""
+    """By how much the first of a ranking is ahead of the second: the two are chosen by their scores, so untested."""
     if len(ranking) < 2 or results.layout.baseline in ranking[:2]:
         return ""
     first, second = ranking[:2]
     lead = results.estimate(results.values(first, condition) - results.values(second, condition))
-    verdict = "" if lead.is_clear else ", which is not shown"
-    return f" It differs from the second, {second}, by {_difference(results.headline, lead)}{verdict}."
+    zero = ", and its interval holds zero" if lead.low <= 0 <= lead.high else ""
+    difference = f"{_difference(results.headline, lead)}, untested, as the two were chosen by rank{zero}"
+    return f" It differs from the second, {second}, by {difference}."
 
 
 def _second_baseline(results: Results, condition: str) -> list[str]:
@@ -206,7 +207,7 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
     below = [label for label, above in known.items() if not score.better(above.mean, 0.0)]
     unclear = [label for label, above in known.items() if label not in below and not above.is_clear]
     verdicts = [f"not better on average: {words(below)}"] if below else []
-    verdicts += [f"better on average, which is not shown: {words(unclear)}"] if unclear else []
+    verdicts += [f"better on average, without an interval clear of zero: {words(unclear)}"] if unclear else []
     verdict = "; ".join(verdicts) or f"all scored methods ({len(known)}) are better"
     named, row = results.layout.text.floor_name(floor), results.row(floor, REFERENCE)
     return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]

@@ -21,12 +21,14 @@ from ..definition import Targets
 class Prediction:
     """How well a network predicts captures from their ideal intensity.
 
-    psnr: mean [dB]; parameter: the free one that decides it; study: a study with the measure ``prediction`` and one
-    method, without display and targets, which are those of the calibration.
+    psnr: mean [dB]; parameter: the free one that decides it; tolerance: how far from their figures captures may be [dB]
+    for its sake; study: a study with the measure ``prediction`` and one method, without display and targets, which are
+    those of the calibration.
     """
 
     psnr: float
     parameter: str
+    tolerance: float
     study: Mapping[str, Any]
 
 
@@ -52,9 +54,12 @@ def names() -> list[str]:
 
 
 def load_calibration(profile: Profile) -> Calibration:
-    """The calibration of a profile, or of the one that it is like. UserError: neither has one."""
-    for name in (profile.name, profile.like):
-        if name in names():
+    """The calibration of a profile: of its name, or of the one that it is like if its name is that one's and a suffix.
+
+    Other profiles like it are other displays, whose parameters mean something else. UserError: it has none.
+    """
+    for name in names():
+        if profile.name == name or (profile.like == name and profile.name.startswith(f"{name}-")):
             return typed(load(_folder() / f"{name}.yaml"), Calibration)
     raise UserError(f"profile '{profile.name}' is not fitted to anything; {suggest(profile.name, names())}")
 

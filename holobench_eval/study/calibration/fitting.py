@@ -50,26 +50,36 @@ def with_values(profile: Profile, values: Values) -> Profile:
 
 @dataclass(frozen=True)
 class Fitting:
-    """The fit of one profile that comes with the package. watch: of trainings; tell: called with a line a trial."""
+    """The fit of one profile.
 
+    source: its name or its file; watch: of trainings; tell: called with a line a trial.
+    """
+
+    source: str
     profile: Profile
     calibration: Calibration
     watch: Watch
     tell: Callable[[str], object]
 
     def fit(self) -> tuple[dict[str, float], float | None]:
-        """Values of all free parameters, three digits after the point, and the PSNR [dB] of the network with them."""
+        """Values of all free parameters, three digits after the point, and the PSNR [dB] of the network with them.
+
+        Of the trials whose figures are within the tolerance, that of the nearest prediction; if none is, that of the
+        nearest figures.
+        """
         wanted = self.calibration.prediction
         if wanted is None:
             return self._fit_figures({}), None
         low, high = self.calibration.free[wanted.parameter]
         trials: list[tuple[float, float, dict[str, float]]] = []  # value, error of the prediction, all values
+        off: list[float] = []  # of each trial, the largest error of a figure [dB]
         value = float(np.clip(self._own(wanted.parameter), low, high))
         for _ in range(TRAININGS):
             values = self._fit_figures({wanted.parameter: round(value, 3)})
             error = self.predicted(values) - wanted.psnr
             self.tell(f"{_listed(values)}: network {error + wanted.psnr:.2f} dB")
             trials.append((value, error, values))
+            off.append(max(abs(miss) for miss in self._missed(values).values()))
             if abs(error) < NEAR or (value == high if error < 0 else value == low):
                 break
             if len(trials) == 1:
@@ -78,7 +88,9 @@ class Fitting:
                 (a, at_a, _), (b, at_b, _) = sorted(trials, key=lambda trial: abs(trial[1]))[:2]
                 value = b if at_a == at_b else a - at_a * (b - a) / (at_b - at_a)
             value = float(np.clip(value, low, high))
-        _, error, values = min(trials, key=lambda trial: abs(trial[1]))
+        allowed = max(wanted.tolerance, min(off))
+        able = [trial for trial, most in zip(trials, off, strict=True) if most <= allowed]
+        _, error, values = min(able, key=lambda trial: abs(trial[1]))
         return values, wanted.psnr + error
 
     def captured(self, values: Values) -> dict[str, float]:
@@ -97,7 +109,8 @@ class Fitting:
         """Mean PSNR [dB] of the network's predictions of captures with these values."""
         wanted = self.calibration.prediction
         assert wanted is not None
-        candidate: dict[str, Any] = {"like": self.profile.name}
+        is_file = self.source.endswith((".yaml", ".yml"))
+        candidate: dict[str, Any] = {"like": str(Path(self.source).resolve()) if is_file else self.source}
         for name, value in values.items():
             stage, _, key = name.partition(".")
             candidate.setdefault(stage, {})[key] = value
@@ -135,15 +148,21 @@ class Fitting:
             }
 
         def errors(places: NDArray[np.float64]) -> list[float]:
-            psnr = self._quick(values(places))
-            self.tell(f"{_listed(values(places))}: " + ", ".join(f"{name} {is_:.2f} dB" for name, is_ in psnr.items()))
-            return [psnr[name] - published for name, published in self.calibration.figures.items()]
+            missed, figures = self._missed(values(places)), self.calibration.figures
+            told = (f"{name} {figures[name] + miss:.2f} dB" for name, miss in missed.items())
+            self.tell(f"{_listed(values(places))}: {', '.join(told)}")
+            return list(missed.values())
 
         own = [np.clip(1 + (self._own(name) - low) / (high - low), 1.05, 1.95) for name, (low, high) in ranges.items()]
         found = least_squares(
             errors, own, bounds=(1.0, 2.0), diff_step=[STEP] * len(own), xtol=1e-2, max_nfev=EVALUATIONS
         )
         return values(found.x)
+
+    def _missed(self, values: Values) -> dict[str, float]:
+        """By how much each figure is missed [dB] with these values, in quick pictures."""
+        psnr = self._quick(values)
+        return {name: psnr[name] - published for name, published in self.calibration.figures.items()}
 
     def _own(self, name: str) -> float:
         stage, _, key = name.partition(".")

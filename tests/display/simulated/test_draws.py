@@ -79,6 +79,12 @@ def test_a_draw_changes_the_stages_that_it_names_and_no_other(name):
         assert made.spec() == profile.spec()
 
 
+def test_a_source_that_is_no_laser_keeps_its_spectrum(profile):
+    broad = load_profile("leto-sled")
+    assert drawn(broad, 5).spectrum == broad.spectrum
+    assert drawn(profile, 5).spectrum != profile.spectrum
+
+
 def test_random_patterns_differ_between_draws(profile):
     seeds = {drawn(profile, index).seed for index in DRAWS} | {profile.seed}
     assert len(seeds) == len(DRAWS) + 1

@@ -101,3 +101,31 @@ def test_a_profile_like_none_or_like_itself_is_refused(tmp_path, text, message):
     (tmp_path / "mine.yaml").write_text(text)
     with pytest.raises(UserError, match=message):
         load_profile("mine.yaml", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("base", "place"),
+    [
+        ("like: ideal\ncrosstalk: {widht: 3}\n", r"/base.yaml:2:13: unknown key 'widht'"),
+        ("like: ideal\ncrosstalk: {width: wide}\n", r"/base.yaml:2:20: crosstalk.width"),
+        ("like: plm-4bit\npanel: {bits: 5}\n", r"/base.yaml:\d+:\d+: the table has 16 entries"),
+    ],
+)
+def test_a_fault_of_a_base_is_told_of_the_file_that_has_it(tmp_path, base, place):
+    (tmp_path / "base.yaml").write_text(base)
+    (tmp_path / "mine.yaml").write_text("like: base.yaml\nname: mine\n")
+    with pytest.raises(UserError, match=place):
+        load_profile("mine.yaml", tmp_path)
+
+
+def test_a_base_is_looked_for_beside_the_file_that_names_it_and_nowhere_else(tmp_path, monkeypatch):
+    (tmp_path / "mine.yaml").write_text("like: base.yaml\nname: mine\n")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "base.yaml").write_text("like: ideal\nname: base\n")
+    monkeypatch.chdir(elsewhere)
+    assert load_profile("base.yaml", tmp_path).name == "base"  # a study's own, by contrast, may be given from here
+    with pytest.raises(UserError, match=r"mine.yaml:1:7: profile 'base.yaml': no such file: .*/base.yaml"):
+        load_profile("mine.yaml", tmp_path)
+    with pytest.raises(UserError, match="no such file"):
+        load_profile("../mine.yaml")

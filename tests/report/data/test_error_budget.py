@@ -79,5 +79,14 @@ def test_noise_that_is_rounding_alone_sets_no_limit() -> None:
     assert budget.noise.share.mean == pytest.approx(0, abs=1e-12)
 
 
+def test_a_target_without_noise_is_left_out_of_what_noise_allows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(LEFT, "rocket", (*LEFT["rocket"][:5], 1e-17))
+    (budget,) = budgets(results())
+    left = np.array(list(LEFT.values()))[:2]
+    assert budget.noise.gain is not None
+    assert budget.noise.gain.mean == pytest.approx(10 * np.log10(left[:, 0] / left[:, 5]).mean())
+    assert (budget.noise.gain.n, budget.noise.share.n) == (2, 3)
+
+
 def test_a_display_without_all_scores_has_no_budget() -> None:
     assert budgets(results(missing="network")) == []

@@ -133,12 +133,14 @@ def test_a_difference_that_may_be_chance_is_not_shown():
     assert "of the study: not shown to differ: new." in text
 
 
-def test_a_lead_over_the_second_that_may_be_chance_is_not_shown():
+def test_a_lead_over_the_second_is_untested_and_one_that_may_be_chance_is_told():
     scores = {"old": psnr(15.0), "mid": psnr(18.0), "new": {"psnr_linear": 18.2 - NOISE}}
     text = sentences(results_of(scores))["bench"]
     assert "new ranks first of 3 methods" in text
     assert "It differs from the second, mid, by +0.10 dB [" in text
-    assert "], which is not shown." in text
+    assert "], untested, as the two were chosen by rank, and its interval holds zero." in text
+    clear = sentences(results_of(scores | {"new": {"psnr_linear": 19 + NOISE}}))["bench"]
+    assert "], untested, as the two were chosen by rank." in clear
 
 
 def test_targets_of_one_cluster_are_counted_as_one():

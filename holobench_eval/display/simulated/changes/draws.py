@@ -20,6 +20,7 @@ MODEL = (
     "is public of the panel stay"
 )
 
+LASER = 5e-9  # m: the widest line of a laser diode
 WIDE = 0.8  # of the band: the iris that ranges of aberrations are given for
 
 
@@ -100,7 +101,7 @@ def _zero_phase(profile: Profile, value: float) -> Profile:
 
 
 def _width(profile: Profile, value: float) -> Profile:
-    if not any(profile.spectrum.width):
+    if not 0 < max(profile.spectrum.width) <= LASER:  # no laser: what is drawn would be another kind of source
         return profile
     width = (value * 1e-9, value * 1e-9, value * 1e-9)
     return replace(profile, spectrum=replace(profile.spectrum, width=width))

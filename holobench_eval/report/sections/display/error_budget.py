@@ -36,7 +36,8 @@ HOW = (
     "target, for the best of its own prediction and of those above it: a bound, as if it were known which to believe. "
     "The last column is what a prediction leaves by itself; where it is more than the line above leaves, what was "
     "learned does not hold for some targets. Shares are those of a target's error, decibels those of its PSNR, and "
-    "both are means over targets. Temporal noise comes from a second capture of every hologram. Decibels are upper "
+    "both are means over targets, with intervals over their clusters. Temporal noise comes from a second capture of "
+    "every hologram, and what it allows is a mean over the targets that have any. Decibels are upper "
     "bounds: where light is missing, or a picture cannot be darker, no hologram removes what is explained, and a "
     "hologram that removes it is another one, whose rest may differ. A larger model, or more captures, may explain "
     "more."
@@ -60,7 +61,10 @@ def reading(budget: Budget, holograms: str) -> Markdown:
 
 def _limit(budget: Budget) -> str:
     gain = budget.noise.gain
-    return "There is no temporal noise." if gain is None else f"Temporal noise allows no more than {_decibel(gain)}."
+    if gain is None:
+        return "There is no temporal noise."
+    some = f" over the {gain.n} of {budget.targets} targets that have any" if gain.n < budget.targets else ""
+    return f"Temporal noise allows no more than {_decibel(gain)}{some}."
 
 
 def _table(budget: Budget) -> Markdown:
@@ -93,7 +97,7 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         yield (
             path,
             "The error budget. Left: parts of the squared error of the captures, by display, with their PSNR. Right: "
-            "what removing a part and all parts to its left would gain at most, with its 95 % interval over targets; "
+            "what removing a part and all parts to its left would gain at most, with its 95 % interval over clusters; "
             "for temporal noise, what captures with no other error would gain.",
         )
 

@@ -29,6 +29,14 @@ def test_a_display_without_noise_sets_no_limit() -> None:
     assert "There is no temporal noise." in str(reading(quiet, "wirtinger"))
 
 
+def test_noise_of_some_targets_is_said_to_be_theirs() -> None:
+    (budget,) = budgets(results())
+    assert "that have any" not in str(reading(budget, "wirtinger"))
+    assert budget.noise.gain is not None
+    some = replace(budget, noise=replace(budget.noise, gain=replace(budget.noise.gain, n=2)))
+    assert "over the 2 of 3 targets that have any." in str(reading(some, "wirtinger"))
+
+
 def test_a_report_has_the_budget_and_its_figure_before_all_else(tmp_path: Path) -> None:
     records = [record(label, target) for target in LEFT for label in METHODS]
     text = write_report(results().layout, records, tmp_path, {}, Description())[0].read_text()
