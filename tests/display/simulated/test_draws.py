@@ -85,6 +85,11 @@ def test_a_source_that_is_no_laser_keeps_its_spectrum(profile):
     assert drawn(profile, 5).spectrum != profile.spectrum
 
 
+def test_without_an_iris_aberrations_are_those_of_the_whole_band(profile):
+    none, whole = (drawn(replace(profile, panel=replace(profile.panel, pupil=pupil)), 5) for pupil in (None, 1.0))
+    assert none.propagation == whole.propagation
+
+
 def test_random_patterns_differ_between_draws(profile):
     seeds = {drawn(profile, index).seed for index in DRAWS} | {profile.seed}
     assert len(seeds) == len(DRAWS) + 1

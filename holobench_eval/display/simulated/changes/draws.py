@@ -87,7 +87,7 @@ def _coma(profile: Profile, value: float) -> Profile:
 
 def _aberration(profile: Profile, name: str, value: float, power: int) -> Profile:
     """The ranges are of a wide iris; through a smaller one the same lenses have less, by that power of its radius."""
-    waves = value * (profile.panel.pupil / WIDE) ** power
+    waves = value * ((profile.panel.pupil or 1.0) / WIDE) ** power
     way = profile.propagation
     return replace(profile, propagation=replace(way, aberration={**way.aberration, name: waves}))
 
