@@ -140,10 +140,11 @@ def run(
             forget(plan, store, Artifacts(artifacts))
         timed = cost.timed(study, plan)
         missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed, timed))
-        missing = starts.affected(plan, missing, store)
+        missing, outdated = starts.affected(plan, missing, store)
         if missing:
             refuse_unscored(study)
         refuse_unavailable(plan, missing, study.folder)
+        store.remove(outdated)  # at once, so that a run that is killed does not take them for new
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)
         if missing or described.get("config_sha256") != provenance.text_digest(study.text):
@@ -219,7 +220,7 @@ def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
         artifacts.remove(preparation)
     for cell in plan.cells:
         if cell.prepared:
-            store.path(cell.id).unlink(missing_ok=True)
+            store.remove((cell.id,))
 
 
 def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Preparation]:

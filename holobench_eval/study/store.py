@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -100,6 +100,11 @@ class Store:
         except (OSError, ValueError) as error:
             raise UserError(f"{path}: unreadable record ({error}); delete the file and run the study again") from error
         return _checked(path, identity, content)
+
+    def remove(self, identities: Iterable[str]) -> None:
+        """Remove the records of these cells, where there are any."""
+        for identity in identities:
+            self.path(identity).unlink(missing_ok=True)
 
     def load(self, plan: Plan) -> list[dict[str, Any]]:
         """A record for every cell of the plan, in its order, under the plan's labels.

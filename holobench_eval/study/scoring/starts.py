@@ -49,18 +49,17 @@ def _read(file: Path) -> Tensor:
     return torch.from_numpy(levels.astype(np.float32) * np.float32(math.tau / LEVELS))
 
 
-def affected(plan: Plan, missing: frozenset[str], store: Store) -> frozenset[str]:
-    """The cells to compute, by id, where those of ``missing`` have to be.
+def affected(plan: Plan, missing: frozenset[str], store: Store) -> tuple[frozenset[str], frozenset[str]]:
+    """The cells to compute where those of ``missing`` have to be, and those whose records hold no longer, by id.
 
-    A cell that starts from a missing one is computed again, since that one may have failed before; its record is
-    removed at once, so that a run that is killed does not take it for new. A start whose phase was not kept is computed
-    again.
+    A cell that starts from a missing one is computed again, since that one may have failed before; not so where that
+    one has a score and is only timed again, for its phase stays. A start whose phase was not kept is computed again.
     """
     followers = [cell for cell in plan.cells if cell.starts]
-    late = {cell.id for cell in followers if not missing.isdisjoint((cell.id, *cell.starts))}
-    for identity in late:
-        store.path(identity).unlink(missing_ok=True)
-    states = store.states(plan.cells) if late else {}
-    wanted = {identity for cell in followers if cell.id in late for identity in cell.starts}
+    states = store.states(plan.cells) if followers else {}
+    new = {identity for identity in missing if states.get(identity) != "done"}
+    outdated = frozenset(cell.id for cell in followers if not new.isdisjoint(cell.starts))
+    computed = missing | outdated
+    wanted = {identity for cell in followers if cell.id in computed for identity in cell.starts}
     unkept = {identity for identity in wanted if states[identity] == "done" and not path(store, identity).exists()}
-    return missing | late | unkept
+    return computed | unkept, outdated
