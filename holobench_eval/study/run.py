@@ -27,11 +27,10 @@ from .plan import Cell, Plan, Task
 from .scoring import starts
 from .scoring.cell import work
 from .scoring.job import Job, Setting
-from .store import Record, Store
+from .store import Record, Store, appears, late
 from .training import TrainingJob, train
 
 DRAWING, DRAWING_SECONDS = "", 3.0  # the label of drawings in the queue, and about what one takes
-LATE = 10.0  # s after which all machines should see a record on a shared disk
 Drawing = Callable[[], None]  # of a picture that the report needs and that needs no cell
 Step = TrainingJob | Job | Drawing
 Result = str | list[Record] | None  # of a training the reason of its failure, empty for success; of a task its records
@@ -269,15 +268,13 @@ def _watched(
 
 def _refuse_unseen(records: list[Record], store: Store) -> None:
     """UserError for records that a worker wrote to a folder that this process does not see."""
-    until = time.monotonic() + LATE
+    until = late()
     for record in records:
-        while not store.path(record.id).exists():
-            if time.monotonic() > until:
-                raise UserError(
-                    f"a worker has written a record that is not in {store.folder.absolute()}; workers have to see this "
-                    "folder under the same name"
-                )
-            time.sleep(0.1)
+        if not appears(store.path(record.id), until):
+            raise UserError(
+                f"a worker has written a record that is not in {store.folder.absolute()}; workers have to see this "
+                "folder under the same name"
+            )
 
 
 def _error(result: Result | Exception) -> Exception:

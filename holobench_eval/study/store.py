@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import sys
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
@@ -19,6 +20,7 @@ from .plan import Cell, Plan
 # ``missing``: a planned cell without a record; ``Store.load`` gives this state, and no file holds it.
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
 
+LATE = 10.0  # s after which all machines should see a file on a shared disk
 ADDED = frozenset({"alone", "memory_mib", "stopped"})  # entries that records of earlier versions lack
 
 
@@ -154,6 +156,20 @@ class Store:
             for left in self.folder.glob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
+
+
+def late() -> float:
+    """When all machines should see what has been written up to now, for ``appears``."""
+    return time.monotonic() + LATE
+
+
+def appears(path: Path, until: float) -> bool:
+    """Whether a file is there or appears until a time; another machine may just have written it."""
+    while not path.exists():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.1)
+    return True
 
 
 def _checked(path: Path, identity: str, content: Any) -> Record:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 import pytest
@@ -14,6 +16,7 @@ from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.report import build_report
 from holobench_eval.study import cost
 from holobench_eval.study import run as running
+from holobench_eval.study import store as storing
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial
 from holobench_eval.study.plan import Cell, Plan, plan
@@ -193,6 +196,41 @@ def test_a_follower_that_fails_while_it_is_timed_again_keeps_its_score(
     monkeypatch.setattr(starts, "of", fail)
     compute(timed_again, store.output, Serial())
     assert store.states(grid.cells) == before
+
+
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("file", [Store.path, starts.path])
+def test_a_start_that_another_machine_has_just_written_is_waited_for(tmp_path: Path, file: Callable[..., Path]) -> None:
+    grid, store = solved(tmp_path)
+    (follower,) = cells(grid, "oracle")
+    before = starts.of(store, follower)
+    late = file(store, follower.starts[0])
+    hidden = late.rename(tmp_path / "hidden")
+    writer = Timer(0.3, hidden.rename, (late,))
+    writer.start()
+    after = starts.of(store, follower)
+    writer.join()
+    assert torch.equal(torch.stack(after), torch.stack(before))
+
+
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("file", [Store.path, starts.path])
+def test_a_start_that_does_not_appear_is_an_error(
+    tmp_path: Path, file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grid, store = solved(tmp_path)
+    (follower,) = cells(grid, "oracle")
+    monkeypatch.setattr(storing, "LATE", 0.0)
+    file(store, follower.starts[0]).unlink()
+    with pytest.raises(CellError, match="of a method to start from is not there"):
+        starts.of(store, follower)
+
+
+def solved(folder: Path) -> tuple[Plan, Store]:
+    """A computed study of one target."""
+    config, store = write_config(folder, (POOR, GOOD, FOLLOWING), count=1), Store(folder / "out")
+    compute(config, store.output, Serial())
+    return planned(config), store
 
 
 def test_a_kept_phase_is_the_one_that_was_shown_to_a_tenth_of_a_milliradian(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from torch import Tensor
 from ...core.errors import CellError
 from ...core.io import write_atomically
 from ..plan import Cell, Plan
-from ..store import Store
+from ..store import Store, appears, late
 
 FOLDER = "starts"
 LEVELS = 2**16  # to a turn: steps of 0.1 mrad, a 256th of the finest that a panel of 8 bits shows
@@ -35,10 +35,24 @@ def keep(store: Store, identity: str, phase: Tensor) -> None:
 def of(store: Store, cell: Cell) -> list[Tensor]:
     """The phases ``(C, H, W)`` [rad] that a cell starts from, those of its ``starts`` that have a score.
 
-    CellError for a phase that is not there.
+    CellError for a record or a phase that does not appear: no start may be left out unseen.
     """
-    done = (identity for identity in cell.starts if (record := store.read(identity)) and record.state == "done")
-    return [_read(path(store, identity)) for identity in done]
+    until = late()
+    done = [identity for identity in cell.starts if _is_done(store, identity, until)]
+    return [_read(_seen(path(store, identity), until)) for identity in done]
+
+
+def _is_done(store: Store, identity: str, until: float) -> bool:
+    _seen(store.path(identity), until)
+    record = store.read(identity)
+    return record is not None and record.state == "done"
+
+
+def _seen(file: Path, until: float) -> Path:
+    """The file of a start; another machine may just have written it."""
+    if not appears(file, until):
+        raise CellError(f"{file} of a method to start from is not there; workers have to see this folder; run again")
+    return file
 
 
 def _read(file: Path) -> Tensor:
