@@ -144,6 +144,7 @@ def run(
             refuse_unscored(study)
         refuse_unavailable(plan, missing, study.folder)
         store.remove(outdated)  # at once, so that a run that is killed does not take them for new
+        starts.clean(plan, store)
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)
         if missing or described.get("config_sha256") != provenance.text_digest(study.text):

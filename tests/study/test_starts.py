@@ -13,6 +13,7 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.core.io import TEMPORARY
 from holobench_eval.report import build_report
 from holobench_eval.study import cost
 from holobench_eval.study import run as running
@@ -135,6 +136,29 @@ def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_
     monkeypatch.setattr(running, "_compute", lambda *_: None)  # as if it were killed at once
     compute(config, tmp_path / "out", Serial())
     assert not store.path(follower.id).exists()
+
+
+def kept(store: Store) -> set[str]:
+    return {file.name for file in (store.output / starts.FOLDER).iterdir()}
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_phases_that_no_cell_starts_from_any_more_are_removed_unless_another_run_uses_the_folder(
+    tmp_path: Path,
+) -> None:
+    first, store = solved(tmp_path)
+    assert kept(store) == names(first)
+    (store.output / starts.FOLDER / f"{TEMPORARY}half").touch()
+    changed = write_config(tmp_path, (POOR, GOOD.replace("value: 5", "value: 6"), FOLLOWING), count=1)
+    with store.locked(), pytest.raises(UserError, match="another run is using this folder"):
+        compute(changed, store.output, Serial())
+    assert kept(store) > names(first)
+    compute(changed, store.output, Serial())
+    assert kept(store) == names(planned(changed)) != names(first)
+
+
+def names(grid: Plan) -> set[str]:
+    return {f"{identity}.npy" for cell in cells(grid, "oracle") for identity in cell.starts}
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from ...core.errors import CellError
-from ...core.io import write_atomically
+from ...core.io import TEMPORARY, write_atomically
 from ..plan import Cell, Plan
 from ..store import Store, appears, late
 
@@ -61,6 +61,15 @@ def _read(file: Path) -> Tensor:
     except (OSError, ValueError) as error:
         raise CellError(f"the phase in {file} cannot be read ({error}); delete the file and run again") from error
     return torch.from_numpy(levels.astype(np.float32) * np.float32(math.tau / LEVELS))
+
+
+def clean(plan: Plan, store: Store) -> None:
+    """Remove the phases that no cell of a plan starts from, and files that were not finished; the folder is locked."""
+    folder = store.output / FOLDER
+    named = {path(store, identity) for cell in plan.cells for identity in cell.starts}
+    for file in (*folder.glob("*.npy"), *folder.glob(f"{TEMPORARY}*")):
+        if file not in named:
+            file.unlink()
 
 
 def affected(plan: Plan, missing: frozenset[str], store: Store) -> tuple[frozenset[str], frozenset[str]]:
