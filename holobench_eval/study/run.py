@@ -27,11 +27,10 @@ from .plan import Cell, Plan, Task
 from .scoring import starts
 from .scoring.cell import work
 from .scoring.job import Job, Setting
-from .store import Record, Store
+from .store import Record, Store, appears, late
 from .training import TrainingJob, train
 
 DRAWING, DRAWING_SECONDS = "", 3.0  # the label of drawings in the queue, and about what one takes
-LATE = 10.0  # s after which all machines should see a record on a shared disk
 Drawing = Callable[[], None]  # of a picture that the report needs and that needs no cell
 Step = TrainingJob | Job | Drawing
 Result = str | list[Record] | None  # of a training the reason of its failure, empty for success; of a task its records
@@ -140,10 +139,12 @@ def run(
             forget(plan, store, Artifacts(artifacts))
         timed = cost.timed(study, plan)
         missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed, timed))
-        missing = starts.affected(plan, missing, store)
+        missing, outdated = starts.affected(plan, missing, store)
         if missing:
             refuse_unscored(study)
         refuse_unavailable(plan, missing, study.folder)
+        store.remove(outdated)  # at once, so that a run that is killed does not take them for new
+        starts.clean(plan, store)
         watch.planned(len(plan.cells), len(missing))
         described = provenance.read(output)
         if missing or described.get("config_sha256") != provenance.text_digest(study.text):
@@ -219,7 +220,7 @@ def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
         artifacts.remove(preparation)
     for cell in plan.cells:
         if cell.prepared:
-            store.path(cell.id).unlink(missing_ok=True)
+            store.remove((cell.id,))
 
 
 def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Preparation]:
@@ -268,15 +269,13 @@ def _watched(
 
 def _refuse_unseen(records: list[Record], store: Store) -> None:
     """UserError for records that a worker wrote to a folder that this process does not see."""
-    until = time.monotonic() + LATE
+    until = late()
     for record in records:
-        while not store.path(record.id).exists():
-            if time.monotonic() > until:
-                raise UserError(
-                    f"a worker has written a record that is not in {store.folder.absolute()}; workers have to see this "
-                    "folder under the same name"
-                )
-            time.sleep(0.1)
+        if not appears(store.path(record.id), until):
+            raise UserError(
+                f"a worker has written a record that is not in {store.folder.absolute()}; workers have to see this "
+                "folder under the same name"
+            )
 
 
 def _error(result: Result | Exception) -> Exception:

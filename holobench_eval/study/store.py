@@ -5,7 +5,8 @@ from __future__ import annotations
 import fcntl
 import json
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -19,6 +20,7 @@ from .plan import Cell, Plan
 # ``missing``: a planned cell without a record; ``Store.load`` gives this state, and no file holds it.
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
 
+LATE = 10.0  # s after which all machines should see a file on a shared disk
 ADDED = frozenset({"alone", "memory_mib", "stopped"})  # entries that records of earlier versions lack
 
 
@@ -101,6 +103,11 @@ class Store:
             raise UserError(f"{path}: unreadable record ({error}); delete the file and run the study again") from error
         return _checked(path, identity, content)
 
+    def remove(self, identities: Iterable[str]) -> None:
+        """Remove the records of these cells, where there are any."""
+        for identity in identities:
+            self.path(identity).unlink(missing_ok=True)
+
     def load(self, plan: Plan) -> list[dict[str, Any]]:
         """A record for every cell of the plan, in its order, under the plan's labels.
 
@@ -149,6 +156,20 @@ class Store:
             for left in self.folder.glob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
+
+
+def late() -> float:
+    """When all machines should see what has been written up to now, for ``appears``."""
+    return time.monotonic() + LATE
+
+
+def appears(path: Path, until: float) -> bool:
+    """Whether a file is there or appears until a time; another machine may just have written it."""
+    while not path.exists():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.1)
+    return True
 
 
 def _checked(path: Path, identity: str, content: Any) -> Record:

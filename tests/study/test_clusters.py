@@ -14,6 +14,7 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import run as running
+from holobench_eval.study import store
 from holobench_eval.study.executors import Serial, clusters, executor
 from holobench_eval.study.executors.clusters import Address, Slurm
 from tests.study.test_executors import compute, untimed
@@ -85,7 +86,7 @@ def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("no_physics")
 def test_records_that_cannot_be_seen_end_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "LATE", 0.0)
+    monkeypatch.setattr(store, "LATE", 0.0)
 
     class Elsewhere(Serial):
         def map(self, function: Any, jobs: Any) -> Any:

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 import pytest
 import torch
 
+from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.core.io import TEMPORARY
 from holobench_eval.report import build_report
+from holobench_eval.study import cost
 from holobench_eval.study import run as running
+from holobench_eval.study import store as storing
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial
 from holobench_eval.study.plan import Cell, Plan, plan
@@ -116,15 +123,138 @@ def test_a_start_whose_phase_was_not_kept_is_solved_again_for_a_follower_and_giv
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_is_computed(tmp_path: Path) -> None:
+def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_is_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config, store = write_config(tmp_path, (POOR, FOLLOWING), count=2), Store(tmp_path / "out")
     compute(config, tmp_path / "out", Serial())
     grid = planned(config)
     first, follower = cells(grid, "poor")[0], cells(grid, "oracle")[0]
     store.path(first.id).unlink()
     missing = frozenset(cell.id for cell in store.missing(grid.cells))
-    assert starts.affected(grid, missing, store) == {first.id, follower.id}
+    assert starts.affected(grid, missing, store) == ({first.id, follower.id}, {follower.id})
+    monkeypatch.setattr(running, "_compute", lambda *_: None)  # as if it were killed at once
+    compute(config, tmp_path / "out", Serial())
     assert not store.path(follower.id).exists()
+
+
+def kept(store: Store) -> set[str]:
+    return {file.name for file in (store.output / starts.FOLDER).iterdir()}
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_phases_that_no_cell_starts_from_any_more_are_removed_unless_another_run_uses_the_folder(
+    tmp_path: Path,
+) -> None:
+    first, store = solved(tmp_path)
+    assert kept(store) == names(first)
+    (store.output / starts.FOLDER / f"{TEMPORARY}half").touch()
+    changed = write_config(tmp_path, (POOR, GOOD.replace("value: 5", "value: 6"), FOLLOWING), count=1)
+    with store.locked(), pytest.raises(UserError, match="another run is using this folder"):
+        compute(changed, store.output, Serial())
+    assert kept(store) > names(first)
+    compute(changed, store.output, Serial())
+    assert kept(store) == names(planned(changed)) != names(first)
+
+
+def names(grid: Plan) -> set[str]:
+    return {f"{identity}.npy" for cell in cells(grid, "oracle") for identity in cell.starts}
+
+
+@pytest.fixture
+def timed_again(tmp_path: Path) -> Path:
+    """The config of a computed study whose timed cells have to be computed again, since they were not timed alone."""
+    config, store = write_config(tmp_path, (POOR, GOOD, FOLLOWING)), Store(tmp_path / "out")
+    compute(config, store.output, Serial())
+    for cell in planned(config).cells:
+        if (record := store.read(cell.id)) is not None and record.alone:
+            store.write(replace(record, alone=False))
+    config.write_text(f"{config.read_text()}timing: alone\n")
+    return config
+
+
+def missing(config: Path, store: Store) -> frozenset[str]:
+    """The cells of a study that have to be computed, its timed ones among them."""
+    study, grid = load_study(config), planned(config)
+    return frozenset(cell.id for cell in store.missing(grid.cells, timed=cost.timed(study, grid)))
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_starts_that_are_only_timed_again_leave_the_records_of_their_followers(
+    tmp_path: Path, timed_again: Path
+) -> None:
+    store, grid = Store(tmp_path / "out"), planned(timed_again)
+    again = missing(timed_again, store)
+    assert len(again) == 3  # of each method the last target
+    assert starts.affected(grid, again, store) == (again, frozenset())
+    others = again - {cell.id for cell in cells(grid, "oracle")}
+    assert starts.affected(grid, others, store) == (others, frozenset())
+
+
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("refusal", ["refuse_unscored", "refuse_unavailable"])
+def test_a_run_that_is_refused_removes_no_record(tmp_path: Path, refusal: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: Any) -> None:
+        raise UserError("not here")
+
+    config, store = write_config(tmp_path, (POOR, GOOD, FOLLOWING)), Store(tmp_path / "out")
+    compute(config, store.output, Serial())
+    grid = planned(config)
+    store.remove((cells(grid, "poor")[0].id,))
+    before = store.states(grid.cells)
+    monkeypatch.setattr(running, refusal, refused)
+    with pytest.raises(UserError, match="not here"):
+        compute(config, store.output, Serial())
+    assert store.states(grid.cells) == before
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_follower_that_fails_while_it_is_timed_again_keeps_its_score(
+    tmp_path: Path, timed_again: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> None:
+        raise CellError("no light")
+
+    store, grid = Store(tmp_path / "out"), planned(timed_again)
+    before = store.states(grid.cells)
+    monkeypatch.setattr(starts, "of", fail)
+    compute(timed_again, store.output, Serial())
+    assert store.states(grid.cells) == before
+
+
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("file", [Store.path, starts.path])
+def test_a_start_that_another_machine_has_just_written_is_waited_for(tmp_path: Path, file: Callable[..., Path]) -> None:
+    grid, store = solved(tmp_path)
+    (follower,) = cells(grid, "oracle")
+    before = starts.of(store, follower)
+    late = file(store, follower.starts[0])
+    hidden = late.rename(tmp_path / "hidden")
+    writer = Timer(0.3, hidden.rename, (late,))
+    writer.start()
+    after = starts.of(store, follower)
+    writer.join()
+    assert torch.equal(torch.stack(after), torch.stack(before))
+
+
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("file", [Store.path, starts.path])
+def test_a_start_that_does_not_appear_is_an_error(
+    tmp_path: Path, file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grid, store = solved(tmp_path)
+    (follower,) = cells(grid, "oracle")
+    monkeypatch.setattr(storing, "LATE", 0.0)
+    file(store, follower.starts[0]).unlink()
+    with pytest.raises(CellError, match="of a method to start from is not there"):
+        starts.of(store, follower)
+
+
+def solved(folder: Path) -> tuple[Plan, Store]:
+    """A computed study of one target."""
+    config, store = write_config(folder, (POOR, GOOD, FOLLOWING), count=1), Store(folder / "out")
+    compute(config, store.output, Serial())
+    return planned(config), store
 
 
 def test_a_kept_phase_is_the_one_that_was_shown_to_a_tenth_of_a_milliradian(tmp_path: Path) -> None:

@@ -11,9 +11,9 @@ import torch
 from torch import Tensor
 
 from ...core.errors import CellError
-from ...core.io import write_atomically
+from ...core.io import TEMPORARY, write_atomically
 from ..plan import Cell, Plan
-from ..store import Store
+from ..store import Store, appears, late
 
 FOLDER = "starts"
 LEVELS = 2**16  # to a turn: steps of 0.1 mrad, a 256th of the finest that a panel of 8 bits shows
@@ -35,10 +35,24 @@ def keep(store: Store, identity: str, phase: Tensor) -> None:
 def of(store: Store, cell: Cell) -> list[Tensor]:
     """The phases ``(C, H, W)`` [rad] that a cell starts from, those of its ``starts`` that have a score.
 
-    CellError for a phase that is not there.
+    CellError for a record or a phase that does not appear: no start may be left out unseen.
     """
-    done = (identity for identity in cell.starts if (record := store.read(identity)) and record.state == "done")
-    return [_read(path(store, identity)) for identity in done]
+    until = late()
+    done = [identity for identity in cell.starts if _is_done(store, identity, until)]
+    return [_read(_seen(path(store, identity), until)) for identity in done]
+
+
+def _is_done(store: Store, identity: str, until: float) -> bool:
+    _seen(store.path(identity), until)
+    record = store.read(identity)
+    return record is not None and record.state == "done"
+
+
+def _seen(file: Path, until: float) -> Path:
+    """The file of a start; another machine may just have written it."""
+    if not appears(file, until):
+        raise CellError(f"{file} of a method to start from is not there; workers have to see this folder; run again")
+    return file
 
 
 def _read(file: Path) -> Tensor:
@@ -49,18 +63,26 @@ def _read(file: Path) -> Tensor:
     return torch.from_numpy(levels.astype(np.float32) * np.float32(math.tau / LEVELS))
 
 
-def affected(plan: Plan, missing: frozenset[str], store: Store) -> frozenset[str]:
-    """The cells to compute, by id, where those of ``missing`` have to be.
+def clean(plan: Plan, store: Store) -> None:
+    """Remove the phases that no cell of a plan starts from, and files that were not finished; the folder is locked."""
+    folder = store.output / FOLDER
+    named = {path(store, identity) for cell in plan.cells for identity in cell.starts}
+    for file in (*folder.glob("*.npy"), *folder.glob(f"{TEMPORARY}*")):
+        if file not in named:
+            file.unlink()
 
-    A cell that starts from a missing one is computed again, since that one may have failed before; its record is
-    removed at once, so that a run that is killed does not take it for new. A start whose phase was not kept is computed
-    again.
+
+def affected(plan: Plan, missing: frozenset[str], store: Store) -> tuple[frozenset[str], frozenset[str]]:
+    """The cells to compute where those of ``missing`` have to be, and those whose records hold no longer, by id.
+
+    A cell that starts from a missing one is computed again, since that one may have failed before; not so where that
+    one has a score and is only timed again, for its phase stays. A start whose phase was not kept is computed again.
     """
     followers = [cell for cell in plan.cells if cell.starts]
-    late = {cell.id for cell in followers if not missing.isdisjoint((cell.id, *cell.starts))}
-    for identity in late:
-        store.path(identity).unlink(missing_ok=True)
-    states = store.states(plan.cells) if late else {}
-    wanted = {identity for cell in followers if cell.id in late for identity in cell.starts}
+    states = store.states(plan.cells) if followers else {}
+    new = {identity for identity in missing if states.get(identity) != "done"}
+    outdated = frozenset(cell.id for cell in followers if not new.isdisjoint(cell.starts))
+    computed = missing | outdated
+    wanted = {identity for cell in followers if cell.id in computed for identity in cell.starts}
     unkept = {identity for identity in wanted if states[identity] == "done" and not path(store, identity).exists()}
-    return missing | late | unkept
+    return computed | unkept, outdated
