@@ -224,10 +224,6 @@ class Camera(Protocol):
 class Simulation(Protocol):
     """A bench as its registered camera sees it, without noise."""
 
-    def image(self, phase: Tensor) -> Tensor:
-        """Intensity ``(C, h, w)`` for a phase ``(C, H, W)`` [rad], differentiable; incident light is 1."""
-        ...
-
     @property
     def gains(self) -> tuple[float, ...]:
         """Phase gains of a frame, equal in weight, whose mean stands for that over flicker."""
@@ -236,8 +232,8 @@ class Simulation(Protocol):
     def expected(self, phase: Tensor, target: Tensor, gain: float = 1.0) -> tuple[Tensor, Tensor]:
         """Mean and variance of what is scored, over the noise of the camera; differentiable in the phase.
 
-        Unlike ``image``, it has all that a capture goes through: the sensor's pixels, their response and noise, and the
-        interpolation that rectifies it.
+        It has all that a capture goes through: the sensor's pixels, their response and noise, and the interpolation
+        that rectifies it.
 
         Parameters
         ----------

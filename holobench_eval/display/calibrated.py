@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -26,7 +24,7 @@ from .api import (
 from .metered import MethodHandles
 from .resampling import Resampling
 from .simulated.pipeline import BenchSession, SimulatedBench
-from .simulated.stages.relay import sample, sampling_grid
+from .simulated.stages.relay import sample
 
 
 @dataclass(frozen=True)
@@ -37,8 +35,6 @@ class RegisteredSimulation:
     ----------
     bench
         The bench.
-    grids
-        Per channel, where each pixel of the region lies on the panel's image, as ``sample`` takes it.
     resamplings
         Per channel, how frames of the sensor are rectified.
     response
@@ -46,15 +42,8 @@ class RegisteredSimulation:
     """
 
     bench: SimulatedBench
-    grids: tuple[Tensor, ...]
     resamplings: tuple[Resampling, ...]
     response: Tensor
-
-    def image(self, phase: Tensor) -> Tensor:
-        """Intensity ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; incident light is 1."""
-        samples = self.bench.image_samples
-        images = [self.bench.integrated(phase[channel], channel) for channel in range(phase.shape[0])]
-        return torch.stack([sample(image, grid, samples) for image, grid in zip(images, self.grids, strict=False)])
 
     @property
     def gains(self) -> tuple[float, ...]:
@@ -111,15 +100,10 @@ class CalibratedBench(MethodHandles):
     @cached_property
     def simulation(self) -> RegisteredSimulation:
         """The bench as the registered camera sees it, without noise."""
-        points = self.bench.points.numpy()
-        grids, resamplings = [], []
-        for warp in self.registration.warps:
-            x, y = warp.coordinates()
-            seen = cv2.remap(points, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
-            grids.append(sampling_grid(torch.from_numpy(seen), self.spec.shape).to(self.bench.device))
-            resamplings.append(Resampling(*(torch.from_numpy(at).to(self.bench.device) for at in (x, y))))
-        response = self.bench.response.to(self.bench.device)
-        return RegisteredSimulation(self.bench, tuple(grids), tuple(resamplings), response)
+        device = self.bench.device
+        coordinates = (warp.coordinates() for warp in self.registration.warps)
+        resamplings = tuple(Resampling(*(torch.from_numpy(at).to(device) for at in pair)) for pair in coordinates)
+        return RegisteredSimulation(self.bench, resamplings, self.bench.response.to(device))
 
     def _mean_capture(self, target: Tensor) -> Tensor:
         """Mean capture ``(C, Hs, Ws)`` of the holograms of the grid."""

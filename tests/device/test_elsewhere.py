@@ -113,11 +113,11 @@ def test_a_simulated_bench_and_its_gradient(name: str) -> None:
     place = bench(name)
     with Elsewhere():
         phase = torch.zeros(3, *PANEL, device=ELSEWHERE, requires_grad=True)
-        image = place.simulation.image(phase)
-        (gradient,) = torch.autograd.grad(image.sum(), phase)
+        mean, variance = place.simulation.expected(phase, picture(place))
+        (gradient,) = torch.autograd.grad(mean.sum() + variance.sum(), phase)
         capture = place.session(("t",), picture(place)).capture(phase.detach())
         shot = place.photograph(torch.zeros(3, *PANEL), picture(place, CPU), "t", 0)
-    assert image.device == gradient.device == ELSEWHERE
+    assert mean.device == variance.device == gradient.device == ELSEWHERE
     assert capture.frame.device == shot.image.device == CPU
 
 

@@ -116,10 +116,10 @@ def test_a_handle_gives_the_nominal_optics_and_nothing_of_the_bench(bench, targe
     assert refused == {"simulation", "learned", "starts"}
 
 
-def test_simulation_is_the_noise_free_capture_in_the_target_frame(target):
+def test_simulation_is_the_mean_capture_in_the_target_frame_and_tells_its_noise(target):
     aged = open_bench(load_profile("leto-aged"), PANEL)
     flat = torch.zeros(3, *PANEL)
-    light = white_irradiance(target, aged.spec)[:, None, None]
-    simulated = aged.simulation.image(flat) / light
+    simulated, variance = aged.simulation.expected(flat, target)
     captured = aged.photograph(flat, target, "t", 0).image
-    assert float((simulated - captured).norm() / captured.norm()) < 0.1
+    assert float((simulated - captured).norm() / captured.norm()) < 0.03
+    assert float((simulated - captured).square().sum()) == pytest.approx(float(variance.sum()), rel=0.05)

@@ -157,12 +157,14 @@ def _profile(name: str) -> dict[str, Tensor]:
     phase = _smooth(channels, bench.spec.shape, -9.0, 9.0)
     equal = bench.photograph(phase, target, "golden", 0)
     matched = bench.photograph(phase, target, "golden", 1, exposure="matched")
+    mean, variance = bench.simulation.expected(phase, target)
     where = [torch.tensor(warp.corners()) for warp in bench.registration.warps]
     return {
         "sensor": equal.capture.frame,
         "rectified": equal.image,
         "rectified at matched exposure": matched.image,
-        "without noise": bench.simulation.image(phase),
+        "expected": mean,
+        "variance": variance,
         "registered corners": torch.stack(where),
         "efficiency": torch.tensor(equal.efficiency),
     }

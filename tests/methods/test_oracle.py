@@ -15,7 +15,7 @@ from holobench_eval.study.opening import open_bench
 
 
 def bench_loss(phase, target, bench):
-    return intensity_l2(bench.simulation.image(phase), target)
+    return intensity_l2(bench.simulation.expected(phase, target)[0], target)
 
 
 def test_the_oracle_corrects_what_the_nominal_model_does_not_know(bench, scene):

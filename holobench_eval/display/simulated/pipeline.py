@@ -94,13 +94,11 @@ class SimulatedBench:
         self.lines = tuple(tuple(maps) for maps in lines)
         self.channels = tuple(lines[0] for lines in self.lines)
         self.drift_gain = profile.drift.phase_gain(geometry)
-        self.points = today.relay.panel_points(
-            panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape
-        )
-        self.grid = sampling_grid(self.points, panel.shape).to(device)
+        points = today.relay.panel_points(panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape)
+        self.grid = sampling_grid(points, panel.shape).to(device)
         fine = [self.image_samples * size for size in panel.shape]
         self.fine_grid = finer_grid(self.grid, fine, self.image_samples)
-        self.response = profile.sensor.response((self.points.shape[0], self.points.shape[1]), geometry)
+        self.response = profile.sensor.response((points.shape[0], points.shape[1]), geometry)
 
     def _lines(self, geometry: Geometry) -> list[tuple[float, Geometry]]:
         """Share of the power and geometry of every line of a channel's source."""
