@@ -63,6 +63,8 @@ class DisplayModel(nn.Module):
     camera's gain.
     """
 
+    ramp: Tensor | None
+
     def __init__(self, spec: DisplaySpec) -> None:
         super().__init__()
         channels = len(spec.wavelengths)
