@@ -61,7 +61,7 @@ def load_calibration(profile: Profile) -> Calibration:
     for name in names():
         if profile.name == name or (profile.like == name and profile.name.startswith(f"{name}-")):
             return typed(load(_folder() / f"{name}.yaml"), Calibration)
-    raise UserError(f"profile '{profile.name}' is not fitted to anything; {suggest(profile.name, names())}")
+    raise UserError(f"profile '{profile.name}' is not fitted to anything; these are: {', '.join(names())}")
 
 
 def _folder() -> Path:
