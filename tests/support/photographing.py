@@ -47,7 +47,7 @@ class Lab:
         for row in rows:
             channel = wavelengths.index(float(row["wavelength_nm"]))
             levels = cv2.imread(str(folder / row["show"]), cv2.IMREAD_UNCHANGED)
-            light = torch.zeros(self.bench.points.shape[:2])
+            light = torch.zeros(self.bench.response.shape)
             if row["laser"] == "on":
                 light = self._light(self._phase(levels, convention), channel) * float(row["relative_exposure"])
             if self.gain is None and row["laser"] == "on":

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from annotated_types import MinLen
 
-from ...core.errors import UserError, suggest
+from ...core.errors import UserError
 from ...core.schema import typed
 from ...core.yaml_source import load
 from ...display import Profile

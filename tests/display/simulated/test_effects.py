@@ -41,10 +41,15 @@ def test_no_effect_is_listed_twice(name: str) -> None:
     assert len(told) == len(set(told))
 
 
-def test_the_form_of_the_model_is_wrong_for_the_paper_like_display_and_more_so_for_the_dusty_one() -> None:
+def test_the_form_of_the_model_is_wrong_for_leto_aged_and_more_so_for_the_dusty_one() -> None:
     for name in ("leto-aged", "leto-dusty"):
         lacking = {effect for effect, _, modelled in listed(name) if not modelled}
         assert {"sub_pixel_field", "pixel_aperture", "flicker", "plane_dust", "roughness", "noise"} <= lacking
         assert {"look_up_table", "crosstalk", "zero_order", "defocus", "coma_x"}.isdisjoint(lacking)
     assert "trefoil_y" in {effect for effect, _, modelled in listed("leto-dusty") if not modelled}
-    assert "blaze" in {effect for effect, _, modelled in listed("pluto-offaxis") if not modelled}
+
+
+def test_the_model_meets_a_blaze_and_lacks_the_spectrum_and_the_stray_light_of_the_papers_display() -> None:
+    lacking = {effect for effect, _, modelled in listed("leto-2020") if not modelled}
+    assert {"spectrum", "stray_light"} <= lacking
+    assert "blaze" not in lacking
