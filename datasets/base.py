@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from importlib.resources import files
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -214,16 +213,6 @@ def named_digest(*names: object) -> str:
         SHA-256, hexadecimal.
     """
     return hashlib.sha256("\x1f".join(str(name) for name in names).encode()).hexdigest()
-
-
-def shipped(name: str, folder: str = "skimage/data") -> bytes | None:
-    """The contents of a data file inside a package (``folder``: package and folders); None where it has it not.
-
-    ``skimage.data`` looks in a cache first and downloads what it does not find.
-    """
-    package, *parts = folder.split("/")
-    source = files(package).joinpath(*parts, name)
-    return source.read_bytes() if source.is_file() else None
 
 
 def clusters_of(dataset: Any) -> dict[str, str]:

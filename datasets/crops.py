@@ -2,36 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
 import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, ClassVar, NamedTuple
 
-import numpy as np
 import torch
 from annotated_types import Interval
-from PIL import Image
 from torch import Tensor
 
 from ..core.errors import UserError
 from . import still_life
-from .base import chosen, from_srgb, known, named_digest, shipped, with_channels
-from .photographs import FILES as PHOTOGRAPHS
+from .base import chosen, known, named_digest, with_channels
+from .shipped import FILES, content_digest, decoded
 
 VERSION = 1  # part of every digest: raise it when another rule chooses the crops
 
-MATPLOTLIB = "matplotlib/mpl-data/sample_data"
-# name, file and folder; without those that have no crop of 208 pixels: text is smaller, and at its own resolution
-# retina is flat but for its black corners
-FILES = {name: (file, "skimage/data") for name, file in PHOTOGRAPHS.items() if name not in ("text", "retina")} | {
-    "motorcycle": ("motorcycle_left.png", "skimage/data"),
-    "coins": ("coins.png", "skimage/data"),
-    "moon": ("moon.png", "skimage/data"),
-    "ihc": ("ihc.png", "skimage/data"),
-    "grace_hopper": ("grace_hopper.jpg", MATPLOTLIB),
-}
+# without those that have no crop of 208 pixels: text is smaller, and at its own resolution retina is flat but for its
+# black corners
+NAMES = tuple(name for name in FILES if name not in ("text", "retina"))
 RENDERING = "still-life"
 
 # Smallest contrast of a crop, linear light (rms difference from its mean colour): a constant image would score
@@ -59,19 +48,19 @@ class Crops:
 
     size: pixels a side; 208 is the region that is scored on a panel of 256 x 256. A smaller region shows the middle
     of a crop, a larger one is refused: nothing is resized. each: crops of a photograph, at most. names: the
-    photographs, in this order (default: all of ``FILES``). renderings: how many.
+    photographs, in this order (default: all of ``NAMES``). renderings: how many.
     """
 
     size: Annotated[int, Interval(ge=32, le=4096)] = 208
     each: Annotated[int, Interval(ge=1, le=100)] = 2
-    names: tuple[str, ...] = tuple(FILES)
+    names: tuple[str, ...] = NAMES
     renderings: Annotated[int, Interval(ge=0, le=100)] = 2
 
     training: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """UserError for an unknown or repeated name."""
-        chosen("photograph", self.names, tuple(FILES))
+        chosen("photograph", self.names, NAMES)
 
     def items(self) -> list[str]:
         """``photograph-place``, photograph by photograph, then the renderings. UserError for one without a crop."""
@@ -97,8 +86,8 @@ class Crops:
         place = self._place(item)
         if place is None:
             return named_digest(item, still_life.VERSION)
-        content = hashlib.sha256(_content(place.photograph)).hexdigest()
-        return named_digest("crop", VERSION, content, place.top, place.left, self.size)
+        photograph = content_digest(place.photograph)
+        return named_digest("crop", VERSION, photograph, place.top, place.left, self.size)
 
     def cluster(self, item: str) -> str:
         """The photograph of a crop; one name for all renderings."""
@@ -116,7 +105,7 @@ class Crops:
 @lru_cache(maxsize=256)
 def _best(name: str, size: int, each: int) -> tuple[tuple[str, Crop], ...]:
     """Name and place of the crops of a photograph, row by row. UserError for a photograph without one."""
-    picture = _decoded(name)
+    picture = decoded(name)
     height, width = picture.shape[1:]
     rows, columns = height // size, width // size
     places = [(row, column) for row in range(rows) for column in range(columns)]
@@ -136,24 +125,9 @@ def _best(name: str, size: int, each: int) -> tuple[tuple[str, Crop], ...]:
 def _cut(crop: Crop, shape: tuple[int, int]) -> Tensor:
     """``(3, *shape)`` of a photograph."""
     rows, columns = slice(crop.top, crop.top + shape[0]), slice(crop.left, crop.left + shape[1])
-    return _decoded(crop.photograph)[:, rows, columns]
+    return decoded(crop.photograph)[:, rows, columns]
 
 
 def _contrast(picture: Tensor) -> float:
     """Root mean square of the difference from the mean colour, of ``(3, h, w)``."""
     return float((picture - picture.mean((1, 2), keepdim=True)).square().mean().sqrt())
-
-
-def _content(name: str) -> bytes:
-    file, folder = FILES[name]
-    content = shipped(file, folder)
-    if content is None:
-        package = folder.partition("/")[0].replace("skimage", "scikit-image")
-        raise UserError(f"photograph '{name}' is not in the installed {package}; leave it out of names")
-    return content
-
-
-@lru_cache(maxsize=32)
-def _decoded(name: str) -> Tensor:
-    with Image.open(io.BytesIO(_content(name))) as image:
-        return from_srgb(np.asarray(image))

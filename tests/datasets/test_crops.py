@@ -10,9 +10,9 @@ from PIL import Image
 
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
-from holobench_eval.datasets import crops
+from holobench_eval.datasets import crops, shipped
 from holobench_eval.datasets.base import clusters_of, from_srgb
-from holobench_eval.datasets.crops import FILES, FLAT, Crops
+from holobench_eval.datasets.crops import FLAT, NAMES, Crops
 from holobench_eval.display import load_profile
 
 
@@ -27,7 +27,7 @@ def test_what_the_default_scores_does_not_change_unnoticed():
     """A change here needs a new VERSION of the dataset, since committed studies score these crops."""
     places = Crops()._places()
     assert places["astronaut-1"] == ("astronaut", 48, 48)
-    chosen = {name: [int(item[-1]) for item in places if places[item].photograph == name] for name in FILES}
+    chosen = {name: [int(item[-1]) for item in places if places[item].photograph == name] for name in NAMES}
     assert {name: numbers for name, numbers in chosen.items() if numbers != [1, 2]} == {
         "rocket": [4, 5],
         "hubble_deep_field": [6, 7],
@@ -51,8 +51,8 @@ def test_a_smaller_region_shows_the_middle_of_a_crop():
 
 
 def test_crops_of_a_photograph_are_disjoint_and_inside_it():
-    for name in FILES:
-        height, width = crops._decoded(name).shape[1:]
+    for name in NAMES:
+        height, width = shipped.decoded(name).shape[1:]
         places = [crop for _, crop in crops._best(name, 208, 100)]
         assert all(0 <= top <= height - 208 and 0 <= left <= width - 208 for _, top, left in places)
         for one, other in itertools.combinations(places, 2):
@@ -101,6 +101,6 @@ def test_a_region_larger_than_a_crop_is_one_line():
 
 
 def test_a_photograph_missing_from_its_package_is_one_line(monkeypatch):
-    monkeypatch.setitem(FILES, "brick", ("no-such-file.png", "skimage/data"))
-    with pytest.raises(UserError, match="'brick' is not in the installed scikit-image; leave it out of names"):
-        crops._content("brick")
+    monkeypatch.setitem(shipped.FILES, "grace_hopper", ("no-such-file.png", shipped.MATPLOTLIB))
+    with pytest.raises(UserError, match="'grace_hopper' is not in the installed matplotlib; leave it out of names"):
+        shipped.content("grace_hopper")

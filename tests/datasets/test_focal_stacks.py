@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.datasets import base, focal_stacks
+from holobench_eval.datasets import focal_stacks, shipped
 from holobench_eval.datasets.defocus import blurred, defocus
 from holobench_eval.datasets.focal_stacks import BLUR, FocalStacks
 from holobench_eval.display import load_profile
@@ -138,7 +138,7 @@ def test_an_unknown_scene_is_refused():
 
 
 def test_a_motorcycle_that_is_not_there_is_said_to_be_missing(monkeypatch, tmp_path):
-    monkeypatch.setattr(base, "files", lambda _: tmp_path)
+    monkeypatch.setattr(shipped, "files", lambda _: tmp_path)
     message = refused(FocalStacks(("motorcycle",)).items)
     assert "motorcycle_left.png and motorcycle_disp.npz not in the installed scikit-image" in message
     assert "install scikit-image 0.26.0" in message

@@ -10,8 +10,8 @@ import torch
 
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
-from holobench_eval.datasets import photographs
-from holobench_eval.datasets.photographs import FILES, Photographs
+from holobench_eval.datasets import shipped
+from holobench_eval.datasets.photographs import NAMES, Photographs
 from holobench_eval.optics import srgb_decode
 
 
@@ -54,16 +54,16 @@ def test_every_file_ships_with_scikit_image_and_nothing_asks_for_a_download(monk
         raise AssertionError(f"asked scikit-image to fetch {names}")
 
     monkeypatch.setattr("skimage.data._fetchers._fetch", refuse)
-    photographs._decoded.cache_clear()
-    photographs._content_digest.cache_clear()
+    shipped.decoded.cache_clear()
+    shipped.content_digest.cache_clear()
     dataset = Photographs(count=None)
-    assert len({dataset.digest(item) for item in dataset.items()}) == len(FILES)
+    assert len({dataset.digest(item) for item in dataset.items()}) == len(NAMES)
     assert np.isfinite(dataset.load("grass", (16, 16)).numpy()).all()
 
 
 def test_a_file_missing_from_scikit_image_is_one_line(monkeypatch):
-    monkeypatch.setitem(FILES, "brick", "no-such-file.png")
-    photographs._content_digest.cache_clear()
+    monkeypatch.setitem(shipped.FILES, "brick", ("no-such-file.png", shipped.SKIMAGE))
+    shipped.content_digest.cache_clear()
     with pytest.raises(UserError, match="'brick' is not in the installed scikit-image"):
         Photographs().digest("brick")
 
