@@ -12,8 +12,10 @@ from .base import chosen, fit, known, with_channels
 from .shipped import content_digest, decoded
 
 # in the order in which `count` takes them: six in colour, then the gray ones
-NAMES = ("astronaut", "coffee", "chelsea", "rocket", "hubble_deep_field", "retina", "camera")
-NAMES += ("brick", "grass", "gravel", "text")
+NAMES = (
+    *("astronaut", "coffee", "chelsea", "rocket", "hubble_deep_field", "retina"),
+    *("camera", "brick", "grass", "gravel", "text"),
+)
 
 
 @dataclass(frozen=True)
