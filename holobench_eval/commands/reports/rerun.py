@@ -83,7 +83,7 @@ def rerun_in(folder: Path, count: int, seed: int, artifacts: Path, write: Callab
             continue
         for line in (str(verdict), *verdict.notes):
             write(f"{report}: {line}")
-        faults += [f"{report}: {fault}" for fault in verdict.faults]
+        faults += [" ".join(f"{report}: {fault}".split()) for fault in verdict.faults]
     return faults
 
 
@@ -125,7 +125,7 @@ def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, wh
         if number:
             verdict.notes.append(f"not rerun: {number} row{'s' * (number > 1)} of records.csv {what}")
     scored = [Planned(*each, rows[each[2]]) for each in cells if each[2] in rows and rows[each[2]]["state"] == DONE]
-    obstacles = _obstacles(report, study, plan, scored, artifacts)
+    obstacles = _obstacles(study, plan, scored, artifacts)
     verdict.notes += _notes(scored, obstacles)
     chosen = sample([each for each in scored if each.cell.id not in obstacles], count, seed)
     if chosen:
@@ -169,9 +169,10 @@ def _by_key(records: pd.DataFrame) -> dict[Key, dict[Any, Any]]:
     return {(row[CELL[0]], row[CELL[1]], row[CELL[2]], row[CELL[3]]): row for row in rows}
 
 
-def _obstacles(report: Path, study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Path) -> dict[str, str]:
+def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Path) -> dict[str, str]:
     """Why cells cannot be computed again, by their ids; nothing for those that can."""
-    from ...study.artifacts import Artifacts, training_records
+    from ...report.data.tables import SECONDS_COLUMN
+    from ...study.artifacts import Artifacts
     from ...study.run import refuse_unscored
 
     if study.display.real:
@@ -180,17 +181,16 @@ def _obstacles(report: Path, study: Study, plan: Plan, cells: Sequence[Planned],
         refuse_unscored(study)
     except UserError as error:
         return {each.cell.id: str(error) for each in cells}
-    store, trained = Artifacts(artifacts), training_records(report)
-    untrained = {name: training for name, training in plan.preparations().items() if not store.has(training)}
-    seconds = {name: float(trained[name].provenance.get("seconds", math.nan)) for name in untrained if name in trained}
+    store = Artifacts(artifacts)
+    untrained = {name for name, training in plan.preparations().items() if not store.has(training)}
     unavailable: dict[str, str] = {}
 
     def reason(each: Planned) -> str:
         if each.cell.starts:
             return "starts from the phases of all other methods, which records.csv has not"
-        if missing := [name for name in each.cell.prepared if name in untrained]:
-            minutes = sum(seconds.get(name, math.nan) for name in missing) / 60
-            length = "unknown length" if math.isnan(minutes) else f"about {max(1, round(minutes))} min"
+        if not untrained.isdisjoint(each.cell.prepared):
+            seconds = float(each.row.get(SECONDS_COLUMN, 0))
+            length = f"about {max(1, round(seconds / 60))} min" if 0 < seconds < math.inf else "unknown length"
             return f"needs training of {length}, and {artifacts} has no artifact of it"
         if each.task.label not in unavailable:
             unavailable[each.task.label] = _unavailable(each, study)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.commands.reports.rerun import Planned, Verdict, rerun, sample
+from holobench_eval.report.data.tables import csv_text, read_records
 from holobench_eval.study import executors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
@@ -131,19 +132,29 @@ def test_a_trained_method_needs_its_artifact(tmp_path: Path) -> None:
     verdict = made.check()
     assert verdict.cells == 5
     (note,) = verdict.notes
-    assert note.startswith("not rerun: Gain (1 cell): needs training of unknown length")
+    assert note.startswith("not rerun: Gain (1 cell): needs training of ")
     assert not (tmp_path / "artifacts").exists()
+
+
+def test_an_artifact_of_another_training_is_found(tmp_path: Path) -> None:
+    made = Committed(trained_study.write(tmp_path))
+    commit(made.config, made.report, trained_study.compute(made.config, "reports/study"))
+    path, artifact = made.report / "records.csv", trained_study.artifact_of(made.config)
+    sha256 = json.loads((artifact / "provenance.json").read_text())["sha256"]
+    path.write_text(path.read_text().replace(sha256, "f" * 64))
+    (fault,) = made.check().faults
+    assert fault.endswith(f"learned state was ffffffffffff, is {sha256[:12]}: another artifact")
 
 
 def test_the_length_of_a_training_is_as_it_was(tmp_path: Path) -> None:
     made = Committed(trained_study.write(tmp_path))
     commit(made.config, made.report, trained_study.compute(made.config, "reports/study"))
-    artifact = trained_study.artifact_of(made.config)
-    facts = json.loads((artifact / "provenance.json").read_text())
-    (made.report / "training").mkdir()
-    (made.report / "training" / "Gain.json").write_text(json.dumps({**facts, "seconds": 610}))
-    shutil.rmtree(artifact)
-    assert "needs training of about 10 min" in made.check().notes[0]
+    path = made.report / "records.csv"
+    frame = read_records(path.read_text())
+    frame.loc[frame["method"] == "Gain", "training_seconds"] = 610
+    path.write_text(csv_text(frame))
+    shutil.rmtree(trained_study.artifact_of(made.config))
+    assert "Gain (1 cell): needs training of about 10 min" in made.check().notes[0]
 
 
 def test_cells_are_drawn_evenly_over_methods_and_displays(tmp_path: Path) -> None:
