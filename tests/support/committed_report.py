@@ -12,11 +12,13 @@ from holobench_eval.study.run import Outcome
 
 
 def commit(config: Path, report: Path, outcome: Outcome) -> None:
-    """Write the tables of a finished run into its folder, and remove its records."""
+    """Write the tables of a finished run into its folder, empty texts beside them, and remove its records."""
     layout = layout_of(load_study(config))
     text = csv_text(records_frame(outcome.records, layout))
     (report / "records.csv").write_text(text)
     (report / "table.csv").write_text(recompute_table(text, layout))
+    for name in ("report.md", "details.md"):
+        (report / name).touch()
     shutil.rmtree(report / "records")
 
 
