@@ -10,7 +10,8 @@ import typer
 
 from ..core.errors import UserError
 
-# In the order of the help. Each is the name of a file in this folder and of the function, or group of functions, in it.
+# In the order of the help. Each is a file in this folder; its last name is that of the function, or group of functions,
+# in it.
 COMMANDS = (
     "score",
     "doctor",
@@ -21,6 +22,7 @@ COMMANDS = (
     "list_",
     "new_method",
     "check",
+    "reports.compare",
     "show",
     "conformance",
     "calibrate",
@@ -36,8 +38,9 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for _file in COMMANDS:
-    _name = _file.rstrip("_").replace("_", "-")
-    _command: Callable[..., None] | typer.Typer = getattr(import_module(f".{_file}", __name__), _file)
+    _function = _file.rpartition(".")[2]
+    _name = _function.rstrip("_").replace("_", "-")
+    _command: Callable[..., None] | typer.Typer = getattr(import_module(f".{_file}", __name__), _function)
     if isinstance(_command, typer.Typer):
         app.add_typer(_command, name=_name)
     else:

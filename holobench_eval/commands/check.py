@@ -1,4 +1,4 @@
-"""``holoeval check``: whether committed reports still follow from their studies, without computing a cell."""
+"""``holoeval check``: whether committed reports still follow from their studies, and from their methods."""
 
 from __future__ import annotations
 
@@ -9,14 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..core.errors import UserError
+from .options import Learned
+from .reports import committed
+from .reports.rerun import rerun_in
 
 if TYPE_CHECKING:
     from ..study.definition import Study
 
 
-def check(folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports")) -> None:
-    """Check that committed reports still follow from their records, configs and profiles."""
+def check(
+    folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports"),
+    rerun: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Solve, capture and score N cells of each report again.")
+    ] = 0,
+    seed: Annotated[int, typer.Option(help="Which cells are drawn for --rerun.")] = 0,
+    artifacts: Learned = Path("artifacts"),
+) -> None:
+    """Check that reports still follow from their records, configs and profiles; with --rerun, from their methods."""
     reports, problems = problems_in(folder)
+    if rerun:
+        problems += rerun_in(folder, rerun, seed, artifacts, print)
     for problem in problems:
         print(problem)
     print(f"{reports} report{'s' * (reports > 1)}, {len(problems)} problem{'s' * (len(problems) != 1)}")
@@ -39,15 +51,8 @@ def problems_in(folder: Path) -> tuple[int, list[str]]:
 
 
 def _problems(report: Path) -> Iterator[str]:
-    from ..study import provenance
-    from ..study.config import load_study
-
     try:
-        known = provenance.read(report)
-        lacking = [key for key in ("config", "config_sha256", "profiles") if key not in known]
-        if lacking:
-            raise UserError(f"{provenance.FILE} lacks {', '.join(lacking)}")
-        yield from _changes(report, load_study(report / str(known["config"])), known)
+        yield from _changes(report, *committed.read(report))
     except (UserError, OSError) as error:
         yield str(error)
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ..study.plan import Plan
     from ..study.store import Store
 
+FLOOR = "floor"  # the label of the row of floor cells
+
 
 def plan(
     config: Config,
@@ -117,20 +119,22 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
 def table(study: Study, rows: list[Row]) -> Table:
     """The rows as a table with a line of sums."""
     result = Table(title=escape(study.title), title_justify="left", show_footer=True)
-    result.add_column("method", footer="all", overflow="fold")
+    floors = sum(row.cells for row in rows if row.label == FLOOR)
+    result.add_column("method", footer=f"all, {floors} of them floors" if floors else "all", overflow="fold")
     numbers = ("conditions", "targets", "cells", "done", "failed", "missing")
     for name in numbers:
         total = str(sum(getattr(row, name) for row in rows)) if name in numbers[2:] else ""
         result.add_column(name, justify="right", footer=total)
     result.add_column("captures", justify="right")
     timed = [row.seconds for row in rows if row.seconds is not None]
-    untimed = any(row.seconds is None and row.label != "floor" for row in rows)
+    untimed = any(row.seconds is None and row.label != FLOOR for row in rows)
     solving = f"{'at least ' * untimed}{sum(timed):.3g}" if timed else ""
     result.add_column(escape("solving [s]"), justify="right", footer=solving)
     for row in rows:
         limit = "" if row.captures is None else str(row.captures)
-        seconds = "" if row.label == "floor" else "not timed" if row.seconds is None else f"{row.seconds:.3g}"
-        result.add_row(escape(row.label), *(str(getattr(row, name)) for name in numbers), limit, seconds)
+        seconds = "" if row.label == FLOOR else "not timed" if row.seconds is None else f"{row.seconds:.3g}"
+        name = "floor images, no method" if row.label == FLOOR else row.label
+        result.add_row(escape(name), *(str(getattr(row, name)) for name in numbers), limit, seconds)
     return result
 
 

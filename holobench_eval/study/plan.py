@@ -131,6 +131,11 @@ class Plan:
         """Every cell."""
         return tuple(cell for task in self.tasks for cell in task.cells)
 
+    @property
+    def floors(self) -> int:
+        """The number of floor cells, which no method makes."""
+        return sum(len(task.cells) for task in self.tasks if task.is_floor)
+
     def preparations(self) -> dict[str, Preparation]:
         """Everything that has to be learned before the cells can be computed, by its id."""
         trainings = [task.preparation for task in self.tasks]

@@ -93,7 +93,7 @@ class Bar:
         """Show the time left, ``-:--:--`` where it is not known."""
         self.progress.update(self.bar, left=seconds_left)
 
-    def planned(self, cells: int, missing: int) -> None:
+    def planned(self, cells: int, missing: int, floors: int) -> None:
         """Set the bar to the number of missing cells."""
         self.missing = missing
         self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
@@ -144,10 +144,11 @@ class Lines:
         """Write the time left in every line."""
         self.seconds_left = seconds_left
 
-    def planned(self, cells: int, missing: int) -> None:
-        """Write the number of cells to compute."""
+    def planned(self, cells: int, missing: int, floors: int) -> None:
+        """Write the number of cells to compute, and how many of the study's are of no method."""
         self.total = missing
-        self.write(f"{missing} of {cells} cells to compute")
+        aside = f" ({floors} of the {cells} are floor images, which no method made)" if floors else ""
+        self.write(f"{missing} of {cells} cells to compute{aside}")
 
     def training(self, names: list[tuple[str, Path]]) -> None:
         """Name the trainings, and follow their logs."""

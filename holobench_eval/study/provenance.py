@@ -19,6 +19,7 @@ from ..core.io import now, write_atomically
 from .cost import cpu_model
 from .definition import Study
 from .plan import Plan
+from .versions import HARNESS
 
 PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "scikit-image", "kornia", "torchmetrics")
 FILE = "provenance.json"
@@ -40,6 +41,7 @@ def describe(
     return {
         "package": __version__,
         **revision(),
+        "harness": HARNESS,
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),

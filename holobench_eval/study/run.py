@@ -39,8 +39,8 @@ Result = str | list[Record] | None  # of a training the reason of its failure, e
 class Watch(Protocol):
     """Sees a run's progress."""
 
-    def planned(self, cells: int, missing: int) -> None:
-        """The run begins: cells of the study, and those that have to be computed."""
+    def planned(self, cells: int, missing: int, floors: int) -> None:
+        """The run begins: cells of the study, those that have to be computed, and those of floor images."""
         ...
 
     def expects(self, seconds_left: Callable[[], float | None]) -> None:
@@ -145,7 +145,7 @@ def run(
         refuse_unavailable(plan, missing, study.folder)
         store.remove(outdated)  # at once, so that a run that is killed does not take them for new
         starts.clean(plan, store)
-        watch.planned(len(plan.cells), len(missing))
+        watch.planned(len(plan.cells), len(missing), plan.floors)
         described = provenance.read(output)
         if missing or described.get("config_sha256") != provenance.text_digest(study.text):
             gpu = gpu_name(find(device)) if isinstance(executor, Serial | Local) else ""  # else it is another machine's

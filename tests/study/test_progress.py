@@ -26,12 +26,12 @@ def test_plain_lines_come_at_most_every_few_seconds(tmp_path: Path) -> None:
     now = [0.0]
     lines: list[str] = []
     watch = Lines(lines.append, clock=lambda: now[0])
-    watch.planned(100, 60)
+    watch.planned(100, 60, 42)
     for task in tasks * 10:
         watch.started(task)
         now[0] += 1.0
         watch.finished([])
-    assert lines[0] == "60 of 100 cells to compute"
+    assert lines[0] == "60 of 100 cells to compute (42 of the 100 are floor images, which no method made)"
     assert len(lines) == 1 + 60 // 5 - 1
 
 
@@ -39,7 +39,7 @@ def test_a_failure_is_told_at_once_and_counted(tmp_path: Path) -> None:
     task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
     lines: list[str] = []
     watch = Lines(lines.append)
-    watch.planned(1, 1)
+    watch.planned(1, 1, 0)
     watch.finished(failed(task))
     assert lines[-1] == "failed: Toy · ideal · gray 2: no [light]"
     assert watch.failures == 1
@@ -50,7 +50,7 @@ def test_a_console_shows_failures_whatever_it_is(tmp_path: Path, terminal: bool)
     task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
     text = io.StringIO()
     with watching(Console(file=text, force_terminal=terminal, width=120)) as watch:
-        watch.planned(2, 1)
+        watch.planned(2, 1, 0)
         watch.started(task)
         watch.finished(failed(task))
     assert "gray 2: no [light]" in text.getvalue()
@@ -85,11 +85,20 @@ def test_the_table_of_a_preview_shows_sums_and_brackets(tmp_path: Path) -> None:
     )
 
 
+def test_the_table_of_a_preview_says_how_many_cells_are_floors(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    study, text = load_study(config), io.StringIO()
+    rows = preview(study, planning.plan(study), Store(tmp_path / "out"), threads=1, workers=1)
+    Console(file=text, width=160).print(table(study, rows))
+    assert "floor images, no method" in text.getvalue()
+    assert "all, 18 of them floors" in text.getvalue()
+
+
 def test_lines_and_bar_show_the_time_left_of_the_run(tmp_path: Path) -> None:
     task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
     now, left, lines = [0.0], [None, 90.0], list[str]()
     watch = Lines(lines.append, clock=lambda: now[0])
-    watch.planned(2, 2)
+    watch.planned(2, 2, 0)
     watch.expects(lambda: left[0])
     for _ in range(2):
         now[0] += 10
@@ -99,7 +108,7 @@ def test_lines_and_bar_show_the_time_left_of_the_run(tmp_path: Path) -> None:
     assert ", about 90 s left; now" in lines[-1]
     text = io.StringIO()
     with watching(Console(file=text, force_terminal=True, width=120)) as bar:
-        bar.planned(2, 2)
+        bar.planned(2, 2, 0)
         bar.expects(lambda: 90.0)
         bar.started(task)
     assert "0:01:30" in text.getvalue()

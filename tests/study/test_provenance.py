@@ -10,6 +10,7 @@ from holobench_eval.study import provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from holobench_eval.study.store import Store
+from holobench_eval.study.versions import HARNESS
 from tests.study.test_run import compute
 from tests.support.fake_study import write_config
 
@@ -23,6 +24,7 @@ def test_a_run_says_what_it_ran_on(tmp_path: Path) -> None:
     assert known["config"] == "../study.yaml"
     assert known["profiles"]["ideal"]["version"] == 1
     assert known["packages"]["torch"]
+    assert known["harness"] == HARNESS
     assert (known["threads"], known["workers"]) == (1, 1)
     assert known["started"] <= known["ended"]
     assert known["earlier"] == []

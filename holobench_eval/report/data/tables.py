@@ -25,7 +25,8 @@ from .text import FILES
 
 TEXT_COLUMNS = ("method", "name", "condition", "target", "state", "reason")
 LEARNED_COLUMN = "learned_sha256"
-TRAINING_COLUMNS = ("training_captures", "training_seconds", LEARNED_COLUMN)  # of studies that train a method
+SECONDS_COLUMN = "training_seconds"
+TRAINING_COLUMNS = ("training_captures", SECONDS_COLUMN, LEARNED_COLUMN)  # of studies that train a method
 MEMORY_COLUMN = "memory_mib"  # of studies that measured the memory of a solution
 STOPPED_COLUMN = "stopped"  # of studies in which the display stopped a method
 FELL_BACK_COLUMN = "fell_back"  # of studies in which a trained method fell back to Wirtinger holography

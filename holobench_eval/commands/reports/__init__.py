@@ -1,0 +1,1 @@
+"""Commands on finished reports, and what ``holoeval check`` needs besides its own file."""

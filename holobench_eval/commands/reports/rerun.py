@@ -1,0 +1,299 @@
+"""``holoeval check --rerun``: solve a sample of a report's cells again, and judge every number of theirs."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from ...core.errors import UserError
+from ..options import is_small, thread_count
+from . import committed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ...study.definition import Study
+    from ...study.executors import Executor
+    from ...study.plan import Cell, Plan, Task
+
+Key = tuple[str, str, str, float]  # method's label, display, target and repeat: they name a cell in records.csv
+
+# Largest difference of a number between two machines: PSNR in dB, other scores in their own unit. Of the 812 cells of
+# Table 3, computed on processors of two makers, the largest were 0.045 dB and 0.016; docs/compare.md lists them.
+TOLERANCE_DB, TOLERANCE = 0.05, 0.02
+# How a capture was matched with its target: no score, and where the match has several equal answers, not one number.
+MATCHES = ("scale_", "refine_")
+# Phase congruency of a flat image is made of rounding errors.
+FLAT, OF_EDGES = ("floor_constant", "floor_black"), ("fsim", "vsi")
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A cell that a config plans, with its task, its name in records.csv and the row of that name."""
+
+    task: Task
+    cell: Cell
+    key: Key
+    row: Mapping[Any, Any]
+
+    def __str__(self) -> str:
+        method, display, target, repeat = self.key
+        return f"{method} on {display}, {target}{f', repeat {repeat:g}' if repeat else ''}"
+
+
+@dataclass
+class Verdict:
+    """What a rerun found.
+
+    cells: computed again; reproduced, close: numbers with equal digits, and others within the tolerance; faults: a line
+    for every number that is neither; notes: what was not computed again, and why.
+    """
+
+    cells: int = 0
+    reproduced: int = 0
+    close: int = 0
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        return (
+            f"{self.cells} cells computed again: {self.reproduced} numbers reproduced, {self.close} within tolerance "
+            f"({TOLERANCE_DB:g} dB; {TOLERANCE:g} for other scores), {len(self.faults)} not"
+        )
+
+
+def rerun_in(folder: Path, count: int, seed: int, artifacts: Path, write: Callable[[str], None]) -> list[str]:
+    """Rerun ``count`` cells of every report in a folder; write what was found, and return a line for every fault."""
+    from ...study import provenance
+    from ...study.executors import executor
+
+    faults = []
+    for report in sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}")):
+        try:
+            study, _ = committed.read(report)
+            where = executor("auto", None, is_small(study.display.panel))
+            verdict = rerun(report, study, count, seed, artifacts, where)
+        except (UserError, OSError) as error:
+            write(f"{report}: not rerun: {error}")
+            continue
+        for line in (str(verdict), *verdict.notes):
+            write(f"{report}: {line}")
+        faults += [" ".join(f"{report}: {fault}".split()) for fault in verdict.faults]
+    return faults
+
+
+def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, where: Executor) -> Verdict:
+    """Compute a sample of a report's cells again, in a temporary folder and by the study's own run.
+
+    Parameters
+    ----------
+    report, study
+        Folder with records.csv, and the study of its config.
+    count, seed
+        Size of the sample, and what it is drawn by; see ``sample``.
+    artifacts
+        Folder of what methods learned; nothing is trained.
+    where
+        Computes the cells.
+
+    Returns
+    -------
+    Verdict
+        On every number of the sample.
+
+    Raises
+    ------
+    UserError
+        records.csv or an artifact is damaged.
+    """
+    from ...report.compare.runs import read_run
+    from ...report.data.tables import DONE, score_columns
+    from ...study.plan import plan as plan_cells
+
+    records, plan = read_run(report).records, plan_cells(study)
+    rows, verdict = _by_key(records), Verdict()
+    cells = [(task, cell, _key(task, cell)) for task in plan.tasks for cell in task.cells]
+    for number, what in (
+        (len(rows.keys() - {key for *_, key in cells}), "that the config does not plan"),
+        (int((records["state"] != DONE).sum()), "without a score"),
+    ):
+        if number:
+            verdict.notes.append(f"not rerun: {number} row{'s' * (number > 1)} of records.csv {what}")
+    scored = [Planned(*each, rows[each[2]]) for each in cells if each[2] in rows and rows[each[2]]["state"] == DONE]
+    obstacles = _obstacles(study, plan, scored, artifacts)
+    verdict.notes += _notes(scored, obstacles)
+    chosen = sample([each for each in scored if each.cell.id not in obstacles], count, seed)
+    if chosen:
+        verdict.cells = len(chosen)
+        _judge(chosen, _computed(study, chosen, artifacts, where), score_columns(records), verdict)
+    return verdict
+
+
+def sample(cells: Sequence[Planned], count: int, seed: int) -> list[Planned]:
+    """``count`` of the cells, evenly over methods and displays, which of their targets by lot.
+
+    Every next cell is of a method, then of a pair of method and display, then of a display with the fewest so far. The
+    floors count as one method.
+    """
+    from ...core.seeds import seed as seed_of
+
+    waiting = sorted(cells, key=lambda each: seed_of("check --rerun", seed, *each.key))
+    methods, pairs, displays = Counter[str](), Counter[tuple[str, str]](), Counter[str]()
+    chosen: list[Planned] = []
+    while waiting and len(chosen) < count:
+        fewest = min(
+            waiting,
+            key=lambda each: (methods[each.task.label], pairs[each.key[:2]], displays[each.key[1]]),
+        )
+        waiting.remove(fewest)
+        chosen.append(fewest)
+        methods[fewest.task.label] += 1
+        pairs[fewest.key[:2]] += 1
+        displays[fewest.key[1]] += 1
+    return chosen
+
+
+def _key(task: Task, cell: Cell) -> Key:
+    return (cell.method if task.is_floor else task.label), cell.condition, cell.target, cell.repeat
+
+
+def _by_key(records: pd.DataFrame) -> dict[Key, dict[Any, Any]]:
+    from ...report.compare.runs import CELL
+
+    rows = records.to_dict("records")
+    return {(row[CELL[0]], row[CELL[1]], row[CELL[2]], row[CELL[3]]): row for row in rows}
+
+
+def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Path) -> dict[str, str]:
+    """Why cells cannot be computed again, by their ids; nothing for those that can."""
+    from ...report.data.tables import SECONDS_COLUMN
+    from ...study.artifacts import Artifacts
+    from ...study.run import refuse_unscored
+
+    if study.display.real:
+        return {each.cell.id: "photographs of a real display" for each in cells}
+    try:
+        refuse_unscored(study)
+    except UserError as error:
+        return {each.cell.id: str(error) for each in cells}
+    store = Artifacts(artifacts)
+    untrained = {name for name, training in plan.preparations().items() if not store.has(training)}
+    unavailable: dict[str, str] = {}
+
+    def reason(each: Planned) -> str:
+        if each.cell.starts:
+            return "starts from the phases of all other methods, which records.csv has not"
+        if not untrained.isdisjoint(each.cell.prepared):
+            seconds = float(each.row.get(SECONDS_COLUMN, 0))
+            length = f"about {max(1, round(seconds / 60))} min" if 0 < seconds < math.inf else "unknown length"
+            return f"needs training of {length}, and {artifacts} has no artifact of it"
+        if each.task.label not in unavailable:
+            unavailable[each.task.label] = _unavailable(each, study)
+        return unavailable[each.task.label]
+
+    reasons = {each.cell.id: reason(each) for each in cells}
+    return {name: why for name, why in reasons.items() if why}
+
+
+def _unavailable(each: Planned, study: Study) -> str:
+    """Why a cell's method cannot run here; empty if it can."""
+    from ...study.plan import Plan
+    from ...study.run import refuse_unavailable
+
+    try:
+        refuse_unavailable(Plan((each.task,)), frozenset((each.cell.id,)), study.folder)
+    except UserError as error:
+        return str(error)
+    return ""
+
+
+def _notes(cells: Sequence[Planned], obstacles: Mapping[str, str]) -> Iterator[str]:
+    """A line for every reason, with the methods that it holds for."""
+    for why in dict.fromkeys(obstacles.values()):
+        kept = [each for each in cells if obstacles.get(each.cell.id) == why]
+        labels = ", ".join(dict.fromkeys(each.task.label for each in kept))
+        yield f"not rerun: {labels} ({len(kept)} cell{'s' * (len(kept) > 1)}): {why}"
+
+
+def _computed(study: Study, chosen: Sequence[Planned], artifacts: Path, where: Executor) -> dict[Key, dict[Any, Any]]:
+    """The rows of records.csv of the chosen cells, computed now.
+
+    The other cells of their tasks, which share a solution with them, are recorded as skipped beforehand.
+    """
+    from ...report.data.layout import layout_of
+    from ...report.data.tables import records_frame
+    from ...study.plan import Plan
+    from ...study.progress import Lines
+    from ...study.run import run
+    from ...study.store import Record, Store
+
+    wanted = {each.cell.id for each in chosen}
+    plan = Plan(tuple({each.task.cells[0].id: each.task for each in chosen}.values()))
+    with TemporaryDirectory(prefix="holoeval-check-") as folder:
+        store = Store(Path(folder))
+        for label, cell in plan.labelled():
+            if cell.id not in wanted:
+                store.write(Record(cell.description(), "skipped", label, "not in the sample"))
+        threads = thread_count(None, where.workers, study)
+        outcome = run(study, plan, store.output, where, Lines(lambda line: None), threads, artifacts)
+    return _by_key(records_frame(outcome.records, layout_of(study)))
+
+
+def _judge(
+    chosen: Sequence[Planned], again: Mapping[Key, Mapping[Any, Any]], scores: Sequence[str], verdict: Verdict
+) -> None:
+    """Count the numbers of the chosen cells that are reproduced, and note the others."""
+    from ...report.data.tables import DONE, LEARNED_COLUMN
+
+    others = sum(each.cell.id != each.row["cell"] for each in chosen)
+    if others:
+        verdict.notes.append(
+            f"{others} of the cells in records.csv have another identity: the study, a method, a display, the harness "
+            "or the metrics have changed since"
+        )
+    known = {name for row in again.values() for name, value in row.items() if value == value}  # NaN is not itself
+    lacking = [
+        name for name in scores if name not in known and any(each.row[name] == each.row[name] for each in chosen)
+    ]
+    if lacking:
+        verdict.notes.append(f"not rerun: {', '.join(lacking)}: not computed on this machine")
+    for each in chosen:
+        row = again[each.key]
+        if row["state"] != DONE:
+            verdict.faults.append(f"{each}: had a score, is {row['state']} now: {row['reason']}")
+            continue
+        learned = [str(cells.get(LEARNED_COLUMN, "")) for cells in (each.row, row)]
+        if learned[0] != learned[1]:
+            was, now = (sha256[:12] or "nothing" for sha256 in learned)
+            verdict.faults.append(f"{each}: learned state was {was}, is {now}: another artifact")
+        for name in scores:
+            if name not in lacking and _is_judged(each.cell, name):
+                _judge_number(each, name, row, verdict)
+
+
+def _is_judged(cell: Cell, name: str) -> bool:
+    from ...report.data.scores import parse
+
+    return not (name.startswith(MATCHES) or (cell.method in FLAT and parse(name).metric in OF_EDGES))
+
+
+def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Verdict) -> None:
+    from ...report.data.scores import parse
+    from ...report.data.tables import format_number
+
+    unit = parse(name).unit
+    then, now = float(each.row[name]), float(row.get(name, math.nan))
+    if math.isnan(then):
+        return
+    if format_number(then) == format_number(now):
+        verdict.reproduced += 1
+    elif abs(then - now) <= (TOLERANCE_DB if unit == "dB" else TOLERANCE):
+        verdict.close += 1
+    else:
+        shown = f"{name}{f' [{unit}]' if unit else ''}"
+        verdict.faults.append(f"{each}: {shown} was {format_number(then)}, is {format_number(now) or 'missing'}")

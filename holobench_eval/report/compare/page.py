@@ -1,0 +1,140 @@
+"""A comparison of two runs as tables: in Markdown, on a console, and in compare.csv."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from ..data.scores import Score
+from ..data.tables import csv_text
+from ..data.text import words
+from ..markdown import Markdown, blocks, heading
+from ..markdown import table as markdown_table
+from .paired import Comparison, Row
+from .runs import provenance_differences
+
+TARGETS = 10  # of the list of those that changed most
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how a text begins that a spreadsheet takes for a formula
+
+
+@dataclass(frozen=True)
+class Part:
+    """A table of a comparison: its title, a sentence, headings and rows of plain text, which may be none."""
+
+    title: str
+    sentence: str
+    headings: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+
+
+def parts(comparison: Comparison) -> Iterator[Part]:
+    """The tables of a comparison, the differences first."""
+    yield _differences(comparison)
+    yield _targets(comparison)
+    yield _unpaired(comparison)
+    yield _provenance(comparison)
+
+
+def markdown(comparison: Comparison) -> str:
+    """The text of compare.md."""
+    title = heading(Markdown("{} and {}").format(comparison.a.folder.name, comparison.b.folder.name), level=1)
+    return f"{blocks([title, *(block for part in parts(comparison) for block in _markdown(part))])}\n"
+
+
+def _markdown(part: Part) -> Iterator[object]:
+    yield heading(part.title)
+    yield part.sentence
+    if part.rows:
+        yield markdown_table(part.headings, part.rows)
+
+
+def csv(comparison: Comparison) -> str:
+    """The text of compare.csv: a row per method and display, in the order of the tables."""
+    score = comparison.score
+    rows = [
+        {
+            "method": _text(row.method),
+            "display_a": _text(row.displays[0]),
+            "display_b": _text(row.displays[1]),
+            "score": score.key,
+            "unit": score.unit,
+            "targets": row.change.n,
+            "clusters": row.change.clusters,
+            "mean_a": row.a.mean(),
+            "mean_b": row.b.mean(),
+            "difference": row.change.mean,
+            "difference_low": row.change.low,
+            "difference_high": row.change.high,
+            "p_adjusted": row.p,
+            "verdict": row.verdict,
+        }
+        for row in comparison.rows
+    ]
+    return csv_text(pd.DataFrame(rows))
+
+
+def _text(name: str) -> str:
+    """A name that no spreadsheet takes for a formula."""
+    return f"'{name}" if name.startswith(_FORMULA) else name
+
+
+def _differences(comparison: Comparison) -> Part:
+    score, rows = comparison.score, comparison.rows
+    counts = {
+        verdict: sum(row.verdict == verdict for row in rows) for verdict in dict.fromkeys(r.verdict for r in rows)
+    }
+    found = words([f"{count} {verdict}" for verdict, count in counts.items()])
+    same = "all" if comparison.unchanged == comparison.cells else f"{comparison.unchanged}"
+    sentence = (
+        f"A is {comparison.a.folder}, B is {comparison.b.folder}. Differences of {score.heading} are B - A over the "
+        f"targets with a score in both, with 95 % intervals over clusters of targets. Rows: {found}. Worse and better "
+        "mean that the interval is clear of zero, and not shown that it is not; intervals are not adjusted for the "
+        f"number of rows, the p values in compare.csv are. Of {comparison.cells} paired cells, {same} have one "
+        "identity in both runs: the same settings, target, display and declared versions of the code."
+    )
+    headings = ("method", "display", "targets", "A", "B", "B - A", "verdict")
+    return Part("Differences", sentence, headings, tuple(_difference(row, score) for row in rows))
+
+
+def _difference(row: Row, score: Score) -> tuple[str, ...]:
+    change = row.change
+    interval = "" if np.isnan(change.low) else f" [{_change(score, change.low)}, {_change(score, change.high)}]"
+    means = (score.number(float(values.mean())) for values in (row.a, row.b))
+    return (row.method, row.display, str(change.n), *means, f"{_change(score, change.mean)}{interval}", row.verdict)
+
+
+def _change(score: Score, value: float) -> str:
+    """A difference with its sign: runs may differ by less than the digits of a score show."""
+    digits = len(score.number(0.0).partition(".")[2]) + 1
+    return f"{value:+z.{digits}f}"
+
+
+def _targets(comparison: Comparison) -> Part:
+    score, most = comparison.score, comparison.moved(TARGETS)
+    headings = ("target", "method", "display", "A", "B", "B - A")
+    rows = (
+        (m.target, m.row.method, m.row.display, score.number(m.a), score.number(m.b), _change(score, m.b - m.a))
+        for m in most
+    )
+    sentence = f"The {len(most)} largest changes of a target." if most else "No target has changed."
+    return Part("Targets that changed most", sentence, headings, tuple(rows))
+
+
+def _unpaired(comparison: Comparison) -> Part:
+    headings = ("run", "method", "display", "cells", "in the other run")
+    rows = tuple((u.run, u.method, u.display, str(u.cells), u.why) for u in comparison.unpaired)
+    sentence = "Cells with a score in one run alone. They are in no mean above." if rows else "Nothing."
+    return Part("Only in one run", sentence, headings, rows)
+
+
+def _provenance(comparison: Comparison) -> Part:
+    a, b = comparison.a, comparison.b
+    lacking = [name for name, run in (("A", a), ("B", b)) if not run.provenance]
+    rows = tuple(provenance_differences(a, b))
+    sentence = "What the two runs were computed with, where it differs." if rows else "No recorded fact differs."
+    if lacking:
+        sentence = f"{words(lacking)} {'has' if len(lacking) == 1 else 'have'} no provenance.json. {sentence}"
+    return Part("Provenance", sentence, ("fact", "A", "B"), rows)

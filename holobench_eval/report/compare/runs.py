@@ -1,0 +1,69 @@
+"""A report as ``holoeval compare`` reads it: its records and its provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from ...core.errors import UserError
+from ...study import provenance
+from ..data.tables import read_records
+
+# What names a cell in records.csv whatever code computed it: the same in two runs of a study.
+CELL = ("method", "condition", "target", "repeat")
+# What the provenance of a run says about its numbers; packages and displays are listed one by one.
+_FACTS = ("package", "revision", "dirty", "harness", "config", "config_sha256", "python", "platform", "cpu", "device")
+_UNKNOWN = "not recorded"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A report: its folder, its records (``tables.read_records``) and its provenance (empty: there is none)."""
+
+    folder: Path
+    records: pd.DataFrame
+    provenance: Mapping[str, Any]
+
+
+def read_run(folder: Path) -> Run:
+    """Read a report. UserError: the folder holds no records.csv, or one that names a cell twice."""
+    path = folder / "records.csv"
+    try:
+        records = read_records(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(f"{folder}: no records.csv in this folder; expected the folder of a report") from None
+    except (UserError, ValueError) as error:
+        raise UserError(f"{folder}: {error}") from None
+    twice = records[records.duplicated(list(CELL))]
+    if len(twice):
+        named = ", ".join(str(twice.iloc[0][column]) for column in CELL[:3])
+        raise UserError(f"{path}: two rows for one cell ({named}); expected a row a cell")
+    return Run(folder, records, provenance.read(folder))
+
+
+def provenance_differences(a: Run, b: Run) -> list[tuple[str, str, str]]:
+    """(fact, in A, in B) for every fact of the two provenances that differs."""
+    facts = [dict(_facts(run.provenance)) for run in (a, b)]
+    names = dict.fromkeys([*facts[0], *facts[1]])
+    pairs = ((name, *(known.get(name, _UNKNOWN) for known in facts)) for name in names)
+    return [(name, first, second) for name, first, second in pairs if first != second]
+
+
+def _facts(known: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for name in (*_FACTS, "gpu", "threads"):
+        if known.get(name) is not None:
+            yield name.replace("_", " "), str(known[name])
+    for group, entries in (("package", known.get("packages")), ("display", known.get("profiles"))):
+        for name, value in entries.items() if isinstance(entries, Mapping) else ():
+            yield f"{group} {name}", _version(value)
+
+
+def _version(value: Any) -> str:
+    """A package's version, or the version and digest of a display's profile."""
+    if not isinstance(value, Mapping):
+        return str(value)
+    return f"version {value.get('version')}, sha256 {str(value.get('sha256'))[:12]}"

@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.commands.test_commands import holoeval
+from tests.support.records_on_disk import write_report
+
+BASE = [20.0, 21.0, 22.0, 23.0]
+
+
+@pytest.fixture
+def worse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two reports, ``a`` and ``b``, of which the second is 1 dB worse by one method."""
+    monkeypatch.chdir(tmp_path)
+    write_report(Path("a"), {("toy", "bench"): BASE, ("kept", "bench"): BASE}, {"revision": "one"})
+    write_report(Path("b"), {("toy", "bench"): [19.1, 19.9, 21.1, 21.9], ("kept", "bench"): BASE}, {"revision": "two"})
+
+
+@pytest.mark.usefixtures("worse")
+def test_differences_are_printed_and_written(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert holoeval(monkeypatch, "compare", "a", "b", "--output", "out") == 0
+    shown = capsys.readouterr().out
+    assert "-1.000" in shown
+    assert "revision" in shown
+    assert "| toy | bench | 4 | 21.50 | 20.50 | -1.000" in Path("out/compare.md").read_text()
+    assert (
+        Path("out/compare.csv")
+        .read_text()
+        .splitlines()[1]
+        .startswith("toy,bench,bench,psnr_linear,dB,4,4,21.5,20.5,-1")
+    )
+
+
+@pytest.mark.usefixtures("worse")
+@pytest.mark.parametrize(("limit", "code"), [(0.9, 1), (1.1, 0)])
+def test_a_regression_beyond_the_limit_is_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], limit: float, code: int
+) -> None:
+    assert holoeval(monkeypatch, "compare", "a", "b", "--fail-on-regression", limit) == code
+    assert ("worse by more than 0.9 dB: toy on bench" in capsys.readouterr().out) == (code == 1)
+
+
+@pytest.mark.usefixtures("worse")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("a", "nowhere"), "nowhere: no records.csv in this folder"),
+        (("a", "b", "--displays", "bench"), "--displays bench: expected a display of A and one of B"),
+        (("a", "b", "--displays", "bench=x"), "b has no display 'x'; allowed: bench"),
+        (("a", "b", "--displays", "bench=bench", "--displays", "bench=x"), "'bench' is paired already"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+) -> None:
+    assert holoeval(monkeypatch, "compare", *arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1

@@ -1,0 +1,221 @@
+"""``holoeval check --rerun``: what of a committed report is reproduced, and what is found that is not."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.commands.reports.rerun import Planned, Verdict, rerun, sample
+from holobench_eval.report.data.tables import csv_text, read_records
+from holobench_eval.study import executors
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from tests.commands.test_commands import holoeval
+from tests.study.test_run import compute
+from tests.support import trained_study
+from tests.support.committed_report import change, commit
+from tests.support.fake_study import solves, write_config
+
+ALL = 1000
+TWO = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: other, params: {value: 5}}')
+
+
+@dataclass(frozen=True)
+class Committed:
+    """A report in ``reports/`` and the config beside that it is of."""
+
+    config: Path
+    report: Path = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "report", self.config.parent / "reports" / "study")
+
+    def check(self, count: int = ALL, seed: int = 0) -> Verdict:
+        artifacts = self.config.parent / "artifacts"
+        return rerun(self.report, load_study(self.config), count, seed, artifacts, Serial())
+
+
+def committed(config: Path) -> Committed:
+    made = Committed(config)
+    commit(config, made.report, compute(config, made.report))
+    return made
+
+
+@pytest.fixture
+def toys(tmp_path: Path, no_physics: None) -> Committed:
+    return committed(write_config(tmp_path, TWO, count=2))
+
+
+def test_an_untouched_report_is_reproduced_to_the_digit_and_stays_untouched(toys: Committed) -> None:
+    before = {path: path.read_bytes() for path in toys.report.iterdir()}
+    verdict = toys.check()
+    floors, solved = 2 * 6, 2 * 2  # whose cells have two scores, and three
+    assert verdict == Verdict(cells=floors + solved, reproduced=2 * floors + 3 * solved)
+    assert {path: path.read_bytes() for path in toys.report.iterdir()} == before
+
+
+def test_a_sample_solves_no_more_than_its_cells(toys: Committed) -> None:
+    before = len(solves(toys.config.parent))
+    assert toys.check(count=3).cells == 3
+    assert len(solves(toys.config.parent)) == before + 2  # the third is a floor
+
+
+def test_a_number_that_was_changed_is_named(toys: Committed) -> None:
+    target = change(toys.config, toys.report, "other", 0.5)
+    (fault,) = toys.check().faults
+    named, _, numbers = fault.partition(" was ")
+    was, now = map(float, numbers.split(", is "))
+    assert named == f"other on ideal, {target}: psnr_linear [dB]"
+    assert was - now == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_difference_between_machines_is_within_tolerance(toys: Committed) -> None:
+    change(toys.config, toys.report, "other", 0.02)
+    verdict = toys.check()
+    assert (verdict.close, verdict.faults) == (1, [])
+
+
+def test_a_method_that_makes_other_phases_is_found(toys: Committed) -> None:
+    plugins = toys.config.with_name("plugins.py")
+    plugins.write_text(
+        plugins.read_text().replace("torch.full(shape, self.value)", "torch.full(shape, self.value + 9)")
+    )
+    verdict = toys.check()
+    assert {fault.split(":")[0] for fault in verdict.faults if "psnr_linear" in fault} == {
+        f"{label} on ideal, gray {index}" for label in ("Toy", "other") for index in range(2)
+    }
+    assert any("4 of the cells in records.csv have another identity" in note for note in verdict.notes)
+
+
+def test_a_method_that_fails_now_is_found(toys: Committed) -> None:
+    plugins = toys.config.with_name("plugins.py")
+    plugins.write_text(plugins.read_text().replace("time.sleep(self.pause)", 'raise ValueError("no light")'))
+    faults = toys.check().faults
+    assert len(faults) == 4
+    assert "Toy on ideal, gray 0: had a score, is failed now: ValueError: no light" in faults
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_method_that_follows_others_is_named_and_not_rerun(tmp_path: Path) -> None:
+    following = '{name: "plugins.py:Following", label: oracle}'
+    verdict = committed(write_config(tmp_path, (*TWO, following), count=2)).check()
+    assert verdict.cells == 2 * 6 + 2 * 2
+    assert verdict.notes == [
+        "not rerun: oracle (2 cells): starts from the phases of all other methods, which records.csv has not"
+    ]
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_row_that_the_config_does_not_plan_is_counted(toys: Committed) -> None:
+    toys.config.write_text(toys.config.read_text().replace("label: other", "label: renamed"))
+    verdict = toys.check()
+    assert verdict.notes == ["not rerun: 2 rows of records.csv that the config does not plan"]
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_row_without_a_score_is_counted(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no light"}}',), count=2)
+    assert committed(config).check().notes == ["not rerun: 1 row of records.csv without a score"]
+
+
+def test_a_trained_method_needs_its_artifact(tmp_path: Path) -> None:
+    made = Committed(trained_study.write(tmp_path))
+    outcome = trained_study.compute(made.config, "reports/study")
+    commit(made.config, made.report, outcome)
+    assert made.check().faults == []
+    shutil.rmtree(tmp_path / "artifacts")
+    verdict = made.check()
+    assert verdict.cells == 5
+    (note,) = verdict.notes
+    assert note.startswith("not rerun: Gain (1 cell): needs training of ")
+    assert not (tmp_path / "artifacts").exists()
+
+
+def test_an_artifact_of_another_training_is_found(tmp_path: Path) -> None:
+    made = Committed(trained_study.write(tmp_path))
+    commit(made.config, made.report, trained_study.compute(made.config, "reports/study"))
+    path, artifact = made.report / "records.csv", trained_study.artifact_of(made.config)
+    sha256 = json.loads((artifact / "provenance.json").read_text())["sha256"]
+    path.write_text(path.read_text().replace(sha256, "f" * 64))
+    (fault,) = made.check().faults
+    assert fault.endswith(f"learned state was ffffffffffff, is {sha256[:12]}: another artifact")
+
+
+def test_the_length_of_a_training_is_as_it_was(tmp_path: Path) -> None:
+    made = Committed(trained_study.write(tmp_path))
+    commit(made.config, made.report, trained_study.compute(made.config, "reports/study"))
+    path = made.report / "records.csv"
+    frame = read_records(path.read_text())
+    frame.loc[frame["method"] == "Gain", "training_seconds"] = 610
+    path.write_text(csv_text(frame))
+    shutil.rmtree(trained_study.artifact_of(made.config))
+    assert "Gain (1 cell): needs training of about 10 min" in made.check().notes[0]
+
+
+def test_cells_are_drawn_evenly_over_methods_and_displays(tmp_path: Path) -> None:
+    planned = candidates(tmp_path, displays=2, methods=3, targets=10)
+    drawn = sample(planned, 12, seed=0)
+    assert Counter(each.task.label for each in drawn) == {"floor": 3, "m0": 3, "m1": 3, "m2": 3}
+    displays = Counter(each.key[1] for each in drawn if each.task.label != "floor")
+    assert abs(displays["ideal"] - displays["leto-mild"]) <= 1
+
+
+def test_the_draw_depends_on_the_seed_alone(tmp_path: Path) -> None:
+    planned = candidates(tmp_path, displays=1, methods=1, targets=20)
+    first, again, other = (sample(cells, 5, seed) for cells, seed in ((planned, 0), (planned[::-1], 0), (planned, 1)))
+    assert first == again
+    assert first != other
+
+
+def candidates(folder: Path, displays: int, methods: int, targets: int) -> list[Planned]:
+    """The cells of a study that nobody computed."""
+    entries = tuple(f'{{name: "plugins.py:Toy", label: m{i}, params: {{value: {i}}}}}' for i in range(methods))
+    profiles = ", ".join(("ideal", "leto-mild")[:displays])
+    grid = plan(load_study(write_config(folder, entries, targets, profiles)))
+    return [
+        Planned(task, cell, (cell.method if task.is_floor else task.label, cell.condition, cell.target, 0.0), {})
+        for task in grid.tasks
+        for cell in task.cells
+    ]
+
+
+@pytest.mark.parametrize(("by", "code"), [(0.0, 0), (0.5, 1)])
+def test_the_command_says_what_it_found(
+    toys: Committed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], by: float, code: int
+) -> None:
+    monkeypatch.setattr(executors, "executor", lambda *_: Serial())
+    monkeypatch.chdir(toys.config.parent)
+    change(toys.config, toys.report, "Toy", by)
+    assert holoeval(monkeypatch, "check", "--rerun", ALL) == code
+    shown = capsys.readouterr().out
+    assert "reports/study: 16 cells computed again" in shown
+    assert ("reports/study: Toy on ideal, gray 0: psnr_linear [dB] was" in shown) == bool(code)
+    assert f"1 report, {code} problem" in shown
+
+
+def test_a_run_that_is_not_finished_is_said_to_be_so(
+    toys: Committed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(toys.config.parent)
+    for path in (toys.report / "records.csv", toys.report / "table.csv"):
+        path.unlink()
+    known = toys.report / "provenance.json"
+    text = known.read_text()
+    known.write_text(text[: text.index('"ended"')] + '"ended": null, "earlier": []}')
+    assert holoeval(monkeypatch, "check", "--rerun", 1) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        f"reports/study: {refused}a run into this folder is in progress, or was stopped before its end; "
+        "'holoeval run study.yaml' goes on with it"
+        for refused in ("not rerun: ", "")
+    ] + ["1 report, 1 problem"]
+    known.write_text(text)
+    assert holoeval(monkeypatch, "check") == 1
+    shown = capsys.readouterr().out
+    assert "reports/study: records.csv and table.csv missing; 'holoeval report' on its config writes them" in shown
+    assert "Errno" not in shown

@@ -1,0 +1,128 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.report.compare.paired import Comparison, Unpaired, compare
+from holobench_eval.report.compare.runs import read_run
+from holobench_eval.report.data.statistics import mean_interval
+from tests.support.records_on_disk import Scores, write_report
+
+BASE = [20.0, 21.0, 22.0, 23.0]
+
+
+def compared(folder: Path, a: Scores, b: Scores, **options: object) -> Comparison:
+    runs = [read_run(write_report(folder / name, scores)) for name, scores in (("a", a), ("b", b))]
+    return compare(*runs, **options)  # type: ignore[arg-type]
+
+
+def shifted(by: float, spread: float = 0.1) -> list[float]:
+    """``BASE`` with a mean change and a spread of it [dB]."""
+    return [value + by + spread * sign for value, sign in zip(BASE, (1, -1, 1, -1), strict=True)]
+
+
+def test_a_difference_is_b_minus_a_with_its_interval_over_clusters(tmp_path: Path) -> None:
+    row = compared(tmp_path, {("m", "d"): BASE}, {("m", "d"): shifted(0.5)}).rows[0]
+    assert row.change == mean_interval(np.subtract(shifted(0.5), BASE), ["t0", "t1", "t2", "t3"])
+    assert row.change.mean == pytest.approx(0.5, abs=1e-4)
+    assert row.verdict == "better"
+
+
+def test_regressions_come_first_the_largest_before_the_others(tmp_path: Path) -> None:
+    a = {(name, "d"): BASE for name in ("up", "noisy", "same", "down", "far down")}
+    changes = {"up": shifted(1), "noisy": shifted(-5, 90), "same": BASE, "down": shifted(-1), "far down": shifted(-3)}
+    comparison = compared(tmp_path, a, {(name, "d"): values for name, values in changes.items()})
+    assert [(row.method, row.verdict) for row in comparison.rows] == [
+        ("far down", "worse"),
+        ("down", "worse"),
+        ("noisy", "not shown"),
+        ("same", "equal"),
+        ("up", "better"),
+    ]
+
+
+def test_less_is_better_where_the_score_says_so(tmp_path: Path) -> None:
+    """FLIP of these records falls where PSNR rises."""
+    comparison = compared(tmp_path, {("m", "d"): BASE}, {("m", "d"): shifted(1)}, metric="flip_srgb")
+    assert comparison.rows[0].change.mean < 0
+    assert comparison.rows[0].verdict == "better"
+
+
+def test_a_regression_counts_beyond_its_limit_and_with_a_clear_interval_alone(tmp_path: Path) -> None:
+    a = {("down", "d"): BASE, ("noisy", "d"): BASE, ("up", "d"): BASE}
+    b = {("down", "d"): shifted(-1), ("noisy", "d"): shifted(-5, 90), ("up", "d"): shifted(2)}
+    comparison = compared(tmp_path, a, b)
+    assert [row.method for row in comparison.regressions(0.9)] == ["down"]
+    assert comparison.regressions(1.1) == []
+
+
+def test_two_clusters_give_no_verdict(tmp_path: Path) -> None:
+    comparison = compared(tmp_path, {("m", "d"): BASE[:2]}, {("m", "d"): [1.0, 1.0]})
+    assert comparison.rows[0].verdict == "too few clusters"
+    assert comparison.regressions(0) == []
+
+
+def test_displays_of_other_names_are_paired_where_they_are_stated(tmp_path: Path) -> None:
+    a = {("m", "old"): BASE, ("m", "kept"): BASE, ("floor", "reference"): BASE}
+    b = {("m", "new"): shifted(1), ("m", "kept"): BASE, ("floor", "reference"): BASE}
+    plain = compared(tmp_path, a, b)
+    assert {row.display for row in plain.rows} == {"kept", "reference"}
+    assert plain.unpaired == (Unpaired("A", "m", "old", 4, "no such row"), Unpaired("B", "m", "new", 4, "no such row"))
+    stated = compared(tmp_path, a, b, displays={"old": "new"})
+    assert {row.display for row in stated.rows} == {"old = new", "reference"}
+    assert stated.unpaired == ()
+
+
+def test_two_displays_of_one_report_can_be_compared(tmp_path: Path) -> None:
+    run = read_run(write_report(tmp_path, {("m", "x"): BASE, ("m", "y"): shifted(1)}))
+    rows = compare(run, run, displays={"x": "y"}).rows
+    assert [(row.display, row.verdict) for row in rows] == [("x = y", "better")]
+
+
+def test_a_cell_that_failed_in_one_run_is_in_no_mean_and_is_listed(tmp_path: Path) -> None:
+    comparison = compared(tmp_path, {("m", "d"): BASE}, {("m", "d"): [None, *BASE[1:]]})
+    assert comparison.rows[0].targets == ("t1", "t2", "t3")
+    assert comparison.rows[0].a.tolist() == BASE[1:]
+    assert comparison.unpaired == (Unpaired("A", "m", "d", 1, "failed: no light"),)
+
+
+def test_a_target_that_only_one_run_has_is_listed(tmp_path: Path) -> None:
+    comparison = compared(tmp_path, {("m", "d"): BASE[:3]}, {("m", "d"): BASE})
+    assert comparison.unpaired == (Unpaired("B", "m", "d", 1, "no such target or repeat"),)
+
+
+def test_the_targets_that_changed_most_come_first(tmp_path: Path) -> None:
+    comparison = compared(tmp_path, {("m", "d"): BASE}, {("m", "d"): [20.0, 21.5, 19.0, 23.1]})
+    assert [(moved.target, moved.a, moved.b) for moved in comparison.moved(2)] == [("t2", 22, 19), ("t1", 21, 21.5)]
+    assert len(comparison.moved(10)) == 3
+
+
+def test_cells_of_one_identity_are_counted(tmp_path: Path) -> None:
+    write_report(tmp_path / "b", {("m", "d"): BASE})
+    path = tmp_path / "b" / "records.csv"
+    path.write_text(path.read_text().replace("m d 3", "another version"))
+    comparison = compare(read_run(write_report(tmp_path / "a", {("m", "d"): BASE})), read_run(tmp_path / "b"))
+    assert (comparison.cells, comparison.unchanged) == (4, 3)
+
+
+@pytest.mark.parametrize(
+    ("b", "options", "message"),
+    [
+        ({("n", "d"): BASE}, {}, "no scored cell in common"),
+        ({("m", "d"): BASE}, {"metric": "psnr_liner"}, "did you mean 'psnr_linear'"),
+        ({("m", "d"): BASE}, {"displays": {"d": "e"}}, "has no display 'e'; allowed: d"),
+        ({("m", "d"): BASE}, {"displays": {"c": "d"}}, "has no display 'c'; allowed: d"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_line(tmp_path: Path, b: Scores, options: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message) as error:
+        compared(tmp_path, {("m", "d"): BASE}, b, **options)
+    assert "\n" not in str(error.value)
+
+
+def test_a_display_cannot_stand_for_two(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="two displays of A are paired with one of B"):
+        compared(tmp_path, {("m", "x"): BASE, ("m", "y"): BASE}, {("m", "x"): BASE}, displays={"x": "x", "y": "x"})
