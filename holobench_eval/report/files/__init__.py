@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pandas as pd
+
 from ...core.io import write_atomically
+from ..data.columns import File
 from ..data.results import Results
 from ..data.tables import csv_text
 from .dictionary import dictionary
@@ -16,7 +19,11 @@ from .tidy import tidy_records, tidy_table, tidy_tests
 def write_files(results: Results, output: Path) -> None:
     """Write records.csv, table.csv, tests.csv, columns.md, table.tex and, with pyarrow, records.parquet."""
     records = tidy_records(results.frame, results.layout)
-    files = {"records.csv": records, "table.csv": tidy_table(results), "tests.csv": tidy_tests(results)}
+    files: dict[File, pd.DataFrame] = {
+        "records.csv": records,
+        "table.csv": tidy_table(results),
+        "tests.csv": tidy_tests(results),
+    }
     for name, frame in files.items():
         write_atomically(output / name, csv_text(frame).encode())
     write_atomically(output / "columns.md", f"{dictionary(files)}\n".encode())

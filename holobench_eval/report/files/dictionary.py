@@ -21,7 +21,10 @@ def dictionary(files: Mapping[File, pd.DataFrame]) -> Markdown:
         "records.parquet, where it was written, holds the same as records.csv without these apostrophes.",
     ]
     for file, frame in files.items():
-        parts += [heading(file), table(["column", "meaning", "unit", "type"], [_row(file, name) for name in frame])]
+        parts += [
+            heading(file),
+            table(["column", "meaning", "unit", "type"], [_row(file, str(name)) for name in frame]),
+        ]
     return blocks(parts)
 
 

@@ -173,7 +173,8 @@ def _caption(results: Results, condition: str) -> Iterator[str]:
     names = [score.title if same else _named(score), *([_named(ssim)] if ssim else [])]
     n, clusters = len(results.targets), len(set(results.clusters))
     among = f"{n} targets in {clusters} clusters" if clusters != n else f"{n} targets"
-    yield escape(f"{words(names)} of {layout.text.scored}s on {condition} ({display}): means over {among}.")
+    compared = f"{layout.text.scored}s against {layout.text.truth}s"
+    yield escape(f"{words(names)} of {compared} on {condition} ({display}): means over {among}.")
     over = "clusters" if clusters != n else "targets"
     yield f"$\\pm$: half of the {100 * LEVEL:.0f}\\,\\% interval (Student's t over {over})."
     if _tests(results, condition):
