@@ -202,10 +202,8 @@ def column(file: File, name: str) -> Column | None:
         unit = name.removeprefix(stem).removeprefix("_")
         return Column(name, _DIFFERENCES[stem], "number", _unit(unit)) if stem in _DIFFERENCES else None
     if file == "table.csv" and stem.startswith(PUBLISHED):
-        metric = stem.removeprefix(PUBLISHED)
-        return Column(
-            name, f"Published {parse(metric).title}, of other hardware and images", "number", parse(metric).unit
-        )
+        unit = parse(stem.removeprefix(PUBLISHED)).unit
+        return Column(name, "Published figure of the metric, of other hardware and images", "number", unit)
     mean = "mean over targets" if file == "table.csv" else ""
     for suffix, meaning in _STATISTICS.items() if mean else ():
         if stem.endswith(suffix):

@@ -263,7 +263,7 @@ def csv_text(frame: pd.DataFrame) -> str:
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(frame.columns)
+    writer.writerow(map(_cell, frame.columns))
     for row in frame.itertuples(index=False):
         writer.writerow(map(_cell, row))
     return text.getvalue()

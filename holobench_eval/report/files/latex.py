@@ -17,7 +17,7 @@ from ..data.text import FILES, words
 _HEAD = """% The headline table of every display, with the numbers of table.csv and tests.csv.
 % In the preamble: \\usepackage{booktabs,siunitx}. A table is 84 mm wide at most, its type 7 pt (\\scriptsize at 10 pt).
 """
-_LABEL_MM = 25  # room for a method's label, which is broken into lines
+_LABEL_MM = 27  # room for a method's label, which is broken into lines
 _NONE = "{--}"
 _SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -64,7 +64,7 @@ def _table(results: Results, condition: str) -> str:
     return "\n".join(
         [
             r"\begin{table}",
-            r"  \centering\scriptsize\setlength{\tabcolsep}{2pt}",
+            r"  \centering\scriptsize\setlength{\tabcolsep}{2pt}\setlength{\belowcaptionskip}{4pt}",
             f"  \\caption{{{' '.join(_caption(results, condition))}}}",
             f"  \\label{{tab:{_slug(results.layout.study)}-{_slug(condition)}}}",
             f"  \\begin{{tabular}}{{@{{}}{' '.join(column.spec for column in columns)}@{{}}}}",

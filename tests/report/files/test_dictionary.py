@@ -24,6 +24,13 @@ def test_every_column_of_a_report_is_described_once_and_in_its_order(tmp_path: P
     assert results.headline.key in text
 
 
+def test_the_name_of_a_published_metric_stays_text() -> None:
+    name = "reported_<script>|[x](y)"
+    text = dictionary({"table.csv": pd.DataFrame({name: [1.0]})})
+    assert "| `reported_<script>\\|[x](y)` | Published figure of the metric" in text
+    assert text.count("script") == 1
+
+
 def test_a_column_without_an_entry_says_so_and_stays_text() -> None:
     frame = pd.DataFrame({"glare|<b>": [1.0]})
     assert "| `glare\\|<b>` | Not described |  | number |" in dictionary({"records.csv": frame})

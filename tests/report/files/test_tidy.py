@@ -214,6 +214,10 @@ def test_text_is_never_a_formula_and_comes_back_as_it_was(name: str) -> None:
     assert (cells["psnr_linear_db"], again["psnr_linear"]) == ("-1.5", -1.5)
 
 
+def test_the_name_of_a_column_is_never_a_formula() -> None:
+    assert csv_text(pd.DataFrame({"=1+1": [-1.5], "n": [2]})) == "'=1+1,n\n-1.5,2\n"
+
+
 def test_a_number_that_is_none_is_refused_by_the_name_of_its_column() -> None:
     found = results()
     text = csv_text(tidy_records(found.frame, found.layout))
