@@ -20,6 +20,7 @@ from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.imaging.align import Alignment
 from holobench_eval.metrics import score
+from holobench_eval.report import read_records
 from holobench_eval.study.folders import scoring as scored_pictures
 from holobench_eval.study.folders.files import read_folders
 from tests.support.photographed import captured, photograph, pose
@@ -115,6 +116,15 @@ def test_the_cleaner_pictures_score_higher(scored):
     table = pd.read_csv(scored[0] / "out" / "table.csv", index_col="label")
     assert table.loc["clean", "psnr_stored_db"] > table.loc["coarse", "psnr_stored_db"] + 1
     assert table.loc["clean", "n"] == 2
+
+
+def test_the_records_say_that_they_are_of_given_pictures_and_where(scored):
+    text = (scored[0] / "out" / "records.csv").read_text()
+    cells = pd.read_csv(io.StringIO(text))
+    assert set(cells["study"]) == {"out"}
+    assert set(cells["measure"]) == {"files"}
+    assert (cells["display"] == cells["condition"]).all()
+    assert (read_records(text)["profile"] == "").all()  # nobody knows the display
 
 
 def test_every_alignment_has_a_picture_in_the_report(scored):
