@@ -88,11 +88,11 @@ def score_folders(
         words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
         words += ["--baseline", baseline] if baseline else []
         description = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
-        layout = _layout(folders, scoring.domain, values, baseline)
+        layout = _layout(folders, scoring.domain, values, baseline, output.resolve().name)
         return write_report(layout, records, output, known, description)
 
 
-def _layout(folders: Folders, domain: str, values: str, baseline: str | None) -> Layout:
+def _layout(folders: Folders, domain: str, values: str, baseline: str | None, study: str) -> Layout:
     from ..report.data.layout import Layout
     from ..study.folders import FILES
     from ..study.folders.scoring import CONDITION
@@ -106,6 +106,7 @@ def _layout(folders: Folders, domain: str, values: str, baseline: str | None) ->
         note=" ".join(folders.notes),
         measure=FILES,
         values=values,
+        study=study,
     )
 
 

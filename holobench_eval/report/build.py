@@ -1,4 +1,4 @@
-"""report.md, table.csv, records.csv and the figures of a study, from its records."""
+"""report.md, the figures and the files of data of a study, from its records."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from .data.layout import Layout, layout_of
 from .data.results import Results
 from .data.tables import csv_text, read_records, records_frame
 from .description import Description, describe
+from .files import write_files
+from .files.tidy import tidy_table
 from .markdown import Markdown, blocks
 from .section import Report
 from .sections import sections
@@ -42,8 +44,7 @@ def write_report(
     """``build_report`` for a study that is given by its layout and description."""
     results = Results(records_frame(records, layout), layout)
     report = Report(results, records, output, provenance, description)
-    write_atomically(output / "records.csv", csv_text(results.frame).encode())
-    write_atomically(output / "table.csv", csv_text(results.table).encode())
+    write_files(results, output)
     for pattern in DRAWN:
         for old in report.figures.glob(pattern):
             old.unlink()
@@ -67,4 +68,4 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
 
 def recompute_table(records_csv: str, layout: Layout) -> str:
     """The text of table.csv computed anew from the text of records.csv; equal bytes mean that they belong together."""
-    return csv_text(Results(read_records(records_csv), layout).table)
+    return csv_text(tidy_table(Results(read_records(records_csv), layout)))

@@ -6,8 +6,8 @@ import pytest
 
 from holobench_eval.commands.check import problems_in
 from holobench_eval.core.errors import UserError
-from holobench_eval.report import layout_of, recompute_table
-from holobench_eval.report.data.tables import csv_text, records_frame
+from holobench_eval.report import csv_text, layout_of, recompute_table, records_frame
+from holobench_eval.report.files.tidy import tidy_records
 from holobench_eval.study.config import load_study
 from tests.study.test_run import compute
 from tests.support.fake_study import write_config
@@ -22,7 +22,7 @@ def report(tmp_path: Path) -> Path:
     folder = tmp_path / "reports" / "study"
     outcome = compute(config, folder)
     layout = layout_of(load_study(config))
-    text = csv_text(records_frame(outcome.records, layout))
+    text = csv_text(tidy_records(records_frame(outcome.records, layout), layout))
     (folder / "records.csv").write_text(text)
     (folder / "table.csv").write_text(recompute_table(text, layout))
     return folder
@@ -40,7 +40,7 @@ def test_a_report_that_follows_from_its_records_passes(report: Path) -> None:
 
 def test_a_changed_number_in_a_table_is_found(report: Path) -> None:
     table = report / "table.csv"
-    table.write_text(table.read_text().replace("Toy,ideal,2,", "Toy,ideal,3,"))
+    table.write_text(table.read_text().replace("Toy,open loop,,,,,2,", "Toy,open loop,,,,,3,"))
     assert ["does not follow from records.csv" in problem for problem in problems(report)] == [True]
 
 

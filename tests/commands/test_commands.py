@@ -85,7 +85,7 @@ def test_a_study_from_run_to_check(
     assert "Flat" in shown
     assert Path("reports/toy/report.md").exists()
     tables = [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")]
-    assert b"Blind,ideal,0,1" in tables[0]
+    assert b"Blind,open loop,,,,,0,1," in tables[0]
     assert b"1 values that are NaN" not in tables[1]
     assert b"values that are NaN or infinite" in tables[1]
 

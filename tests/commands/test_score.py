@@ -20,6 +20,7 @@ from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.imaging.align import Alignment
 from holobench_eval.metrics import score
+from holobench_eval.report import read_records
 from holobench_eval.study.folders import scoring as scored_pictures
 from holobench_eval.study.folders.files import read_folders
 from tests.support.photographed import captured, photograph, pose
@@ -106,15 +107,24 @@ def test_the_report_has_no_word_of_displays_that_were_not_there(scored):
 
 def test_scores_of_stored_values_are_never_called_linear(scored):
     columns = (scored[0] / "out" / "table.csv").read_text().splitlines()[0]
-    assert "psnr_stored" in columns
+    assert "psnr_stored_db" in columns
     assert "linear" not in columns
     assert "linear light [dB]" not in scored[1]
 
 
 def test_the_cleaner_pictures_score_higher(scored):
-    table = pd.read_csv(scored[0] / "out" / "table.csv", index_col="method")
-    assert table.loc["clean", "psnr_stored"] > table.loc["coarse", "psnr_stored"] + 1
+    table = pd.read_csv(scored[0] / "out" / "table.csv", index_col="label")
+    assert table.loc["clean", "psnr_stored_db"] > table.loc["coarse", "psnr_stored_db"] + 1
     assert table.loc["clean", "n"] == 2
+
+
+def test_the_records_say_that_they_are_of_given_pictures_and_where(scored):
+    text = (scored[0] / "out" / "records.csv").read_text()
+    cells = pd.read_csv(io.StringIO(text))
+    assert set(cells["study"]) == {"out"}
+    assert set(cells["measure"]) == {"files"}
+    assert (cells["display"] == cells["condition"]).all()
+    assert (read_records(text)["profile"] == "").all()  # nobody knows the display
 
 
 def test_every_alignment_has_a_picture_in_the_report(scored):
@@ -149,10 +159,10 @@ def test_an_interrupted_run_goes_on(pictures, monkeypatch, quick):
 
 def test_a_changed_capture_is_scored_anew(pictures, quick):
     path = pictures / "captures" / "coarse" / "coffee.png"
-    before = pd.read_csv(pictures / "out" / "records.csv").set_index(["method", "target"])["psnr_stored"]
+    before = pd.read_csv(pictures / "out" / "records.csv").set_index(["label", "target"])["psnr_stored_db"]
     Image.open(path).convert("L").convert("RGB").save(path)
     run(pictures)
-    after = pd.read_csv(pictures / "out" / "records.csv").set_index(["method", "target"])["psnr_stored"]
+    after = pd.read_csv(pictures / "out" / "records.csv").set_index(["label", "target"])["psnr_stored_db"]
     assert after["coarse", "coffee"] != before["coarse", "coffee"]
     assert after["clean", "astronaut"] == pytest.approx(before["clean", "astronaut"], abs=0.5)
 
@@ -169,7 +179,7 @@ def test_a_capture_of_another_picture_and_a_lacking_one_are_holes(pictures, quic
     cells = pd.read_csv(pictures / "out" / "records.csv")
     holes = cells[cells["state"] != "done"]
     assert sorted(holes["state"]) == ["failed", "missing"]
-    assert holes["psnr_stored"].isna().all()
+    assert holes["psnr_stored_db"].isna().all()
 
 
 def test_gray_and_colour_do_not_mix_and_gray_alone_is_scored(pictures, quick):
@@ -178,7 +188,7 @@ def test_gray_and_colour_do_not_mix_and_gray_alone_is_scored(pictures, quick):
     text = run(pictures)
     assert "the capture is gray and the target in colour" in text
     assert "match factor" in text
-    states = pd.read_csv(pictures / "out" / "records.csv").set_index(["method", "target"])["state"]
+    states = pd.read_csv(pictures / "out" / "records.csv").set_index(["label", "target"])["state"]
     assert states["clean", "astronaut"] == "done"
 
 
@@ -321,7 +331,7 @@ def test_three_published_captures_keep_their_order_and_their_scores(tmp_path, mo
     text = run(tmp_path, baseline="sgd-asm")
     assert "One shared alignment for 3 captures" in text
     assert "agrees within 0.2 dB on 3 captures" in text
-    found = pd.read_csv(tmp_path / "out" / "table.csv", index_col="method")["psnr_stored"][list(PUBLISHED)].to_dict()
+    found = pd.read_csv(tmp_path / "out" / "table.csv", index_col="label")["psnr_stored_db"][list(PUBLISHED)].to_dict()
     assert found == pytest.approx(PUBLISHED, abs=0.3)
     assert sorted(found, key=found.__getitem__) == list(PUBLISHED)
     for path in records(tmp_path):

@@ -66,7 +66,7 @@ def test_a_study_runs_on_devices_after_the_bench_was_checked(table):
     assert done.exit_code == 0, (done.output, done.exception)
     for line in ("exposure:", "dark:", "linearity:", "phase convention:", "phase.two_pi_level:"):
         assert line in done.output
-    scores = pd.read_csv(folder / "out" / "table.csv").set_index(["method", "condition"])["psnr_linear"]
+    scores = pd.read_csv(folder / "out" / "table.csv").set_index(["label", "condition"])["psnr_linear_db"]
     assert scores["wirtinger", "small-table"] > scores["double_phase", "small-table"] + 2
     assert "real bench" in (folder / "out" / "report.md").read_text()
 

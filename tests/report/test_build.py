@@ -67,8 +67,8 @@ def test_a_report_is_written_with_tables_and_every_figure(records, report):
         picture = imread(folder / name)
         assert min(picture.shape[:2]) > 200
         assert len({tuple(pixel) for pixel in picture[::5, ::5].reshape(-1, picture.shape[2])}) > 20
-    assert (folder / "table.csv").is_file()
-    assert (folder / "records.csv").is_file()
+    for name in ("records.csv", "table.csv", "tests.csv", "columns.md", "table.tex"):
+        assert (folder / name).is_file()
 
 
 def test_two_equal_runs_give_equal_bytes_whatever_the_order_of_the_records(records, tmp_path):

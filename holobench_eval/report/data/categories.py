@@ -9,6 +9,7 @@ CALIBRATED = "calibrated"
 ONLINE = "online"
 ORACLE = "ceiling"
 GIVEN = "given"
+FLOOR = "floor"  # in files, of rows that no method made
 
 # In the order of tables.
 CATEGORIES = (OPEN_LOOP, CALIBRATED, ONLINE, ORACLE, GIVEN)

@@ -67,7 +67,9 @@ class Layout:
     identities: labels of those whose network is the ideal image itself, which has nothing to learn.
     camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
     of others. real: whether the display exists. clusters: of every target, such as the photograph of a crop (empty:
-    each target is its own). metrics: names of those the study wants (None: all).
+    each target is its own). metrics: names of those the study wants (None: all). study: its name, the config's file
+    without the ending; params: every parameter of a method, by label; capture_limits: the most captures that a display
+    allows a method for a target, by label; panels: rows and columns of the panel of each display [px].
     """
 
     title: str
@@ -96,6 +98,10 @@ class Layout:
     real: bool = False
     clusters: Mapping[str, str] = field(default_factory=dict)
     values: str = ""
+    study: str = ""
+    params: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    capture_limits: Mapping[str, int] = field(default_factory=dict)
+    panels: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     def category(self, label: str) -> str:
         """The category that a method competes in."""
@@ -195,6 +201,10 @@ def layout_of(study: Study) -> Layout:
         real=study.display.real,
         clusters=clusters_of(study.dataset),
         stacked=labels_with("planes") if study.measure == "focus" else frozenset(),
+        study=study.name,
+        params={entry.label: entry.params for entry in study.methods},
+        capture_limits={entry.label: entry.captures for entry in study.methods if entry.captures is not None},
+        panels={condition.name: condition.spec.shape for condition in conditions.values()},
     )
 
 

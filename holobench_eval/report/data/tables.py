@@ -1,5 +1,6 @@
-"""records.csv, a row a cell, and table.csv, a row per method and condition, computed from the former alone.
+"""The records frame, a row a cell, and the table, a row per method and condition, computed from the former alone.
 
+Frames have the names of this module; files have those of ``columns``, and further columns from the study (``files``).
 Numbers are rounded to six significant digits once, when records become a frame; everything after is computed from the
 rounded numbers. So table.csv computed from a records.csv that was read back has the same bytes.
 """
@@ -8,7 +9,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,8 @@ import pandas as pd
 from ...core.errors import UserError
 from ...core.hashing import digest
 from ...study.plan import FLOORS, REFERENCE
-from .categories import ORACLE
+from .categories import FLOOR, ORACLE
+from .columns import file_name, frame_name
 from .layout import Layout
 from .scores import order_scores, parse
 from .statistics import mean_interval
@@ -41,7 +44,13 @@ IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol"
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
 _REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
+# Columns of records.csv that say what the study's config says, too; frames do without them.
+STUDY_COLUMNS = (
+    *("study", "measure", "parameters", "capture_limit", "panel_height_px", "panel_width_px"),
+    *("swept", "swept_value", "swept_unit", "swept_name", "seed"),
+)
 _NOT_SCORES = _REQUIRED | {
+    *STUDY_COLUMNS,
     *TRAINING_COLUMNS,
     MEMORY_COLUMN,
     ALONE_COLUMN,
@@ -51,6 +60,8 @@ _NOT_SCORES = _REQUIRED | {
 }
 DONE = "done"
 MEDIAN = "_median"  # of the headline, after its name
+# Text that a spreadsheet would run as a formula, after any apostrophes, which this module puts before it.
+_FORMULA = re.compile(r"'*\s*[=+\-@＝＋－＠]")
 
 
 def format_number(value: float) -> str:
@@ -115,15 +126,25 @@ def records_frame(records: Iterable[Mapping[str, Any]], layout: Layout) -> pd.Da
     frame = pd.DataFrame(rows)
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(column for column in frame.columns if column not in _NOT_SCORES) or [layout.headline]
-    grouped = [CLUSTER_COLUMN] if layout.clusters else []
-    columns = ["method", "name", "condition", "target", *grouped, "repeat", "state", "reason"]
-    known = [column for column in (MEMORY_COLUMN, ALONE_COLUMN) if frame[column].notna().any()]
-    measured = [*MEASURED_COLUMNS, *known]
-    training = TRAINING_COLUMNS if layout.trained else ()
-    notes = [column for column in NOTE_COLUMNS if frame[column].any()]
-    order = [*columns, *scores, *measured, *training, *notes, CATEGORY_COLUMN, *IDENTITY_COLUMNS]
-    frame = frame.reindex(columns=order)
-    return _sorted(frame, layout)
+    untrained = () if layout.trained else TRAINING_COLUMNS
+    unknown = [column for column in (MEMORY_COLUMN, ALONE_COLUMN) if frame[column].isna().all()]
+    silent = [column for column in NOTE_COLUMNS if not frame[column].any()]
+    left = frame.columns.drop([*untrained, *unknown, *silent, *_single(frame)])
+    return _sorted(frame.reindex(columns=_ordered(left, scores)), layout)
+
+
+def _ordered(columns: Iterable[str], scores: Sequence[str]) -> list[str]:
+    """Those of the columns of a records frame that there are, and its scores, in their order."""
+    present = set(columns)
+    before = ("method", "name", "condition", "target", CLUSTER_COLUMN, "repeat", "state", "reason")
+    measured = (*MEASURED_COLUMNS, MEMORY_COLUMN, ALONE_COLUMN, *TRAINING_COLUMNS, *NOTE_COLUMNS, CATEGORY_COLUMN)
+    first, last = ([name for name in names if name in present] for names in (before, (*measured, *IDENTITY_COLUMNS)))
+    return [*first, *scores, *last]
+
+
+def _single(frame: pd.DataFrame) -> list[str]:
+    """The column of clusters where each target is its own, which frames do without."""
+    return [CLUSTER_COLUMN] if (frame[CLUSTER_COLUMN] == frame["target"]).all() else []
 
 
 def row_order(frame: pd.DataFrame, layout: Layout) -> list[tuple[str, str]]:
@@ -237,22 +258,36 @@ def _ranked(table: pd.DataFrame, targets: int, layout: Layout) -> pd.DataFrame:
 
 
 def csv_text(frame: pd.DataFrame) -> str:
-    """The frame as CSV with fixed formatting: the same numbers give the same bytes."""
+    """The frame as CSV with fixed formatting: the same numbers give the same bytes.
+
+    Text that a spreadsheet would take for a formula has an apostrophe before it, which :func:`read_records` takes off.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(frame.columns)
+    writer.writerow(map(_cell, frame.columns))
     for row in frame.itertuples(index=False):
-        writer.writerow([value if isinstance(value, str) else format_number(value) for value in row])
+        writer.writerow(map(_cell, row))
     return text.getvalue()
 
 
+def _cell(value: Any) -> str:
+    if isinstance(value, str):
+        return f"'{value}" if _FORMULA.match(value) else value
+    return str(value) if isinstance(value, int | np.integer) else format_number(value)
+
+
 def read_records(text: str) -> pd.DataFrame:
-    """The records frame from the text of records.csv; inverse of :func:`csv_text` on such a frame."""
+    """The records frame from the text of records.csv, of this version or with the columns of frames, as it once had."""
     frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+    frame = frame.replace(f"^'({_FORMULA.pattern})", r"\1", regex=True)
+    written: Callable[[str], str] = str  # the name that a column has in the file
+    if "label" in frame:
+        frame, written = _translated(frame), file_name
     lacking = _REQUIRED - set(frame.columns)
     if lacking:
         raise UserError(
-            f"records.csv lacks the columns {', '.join(sorted(lacking))}; it was written by another version"
+            f"records.csv lacks the columns {', '.join(sorted(map(written, lacking)))}; "
+            "it was written by another version"
         )
     text_columns = {*TEXT_COLUMNS, *IDENTITY_COLUMNS, LEARNED_COLUMN, *NOTE_COLUMNS, CATEGORY_COLUMN, CLUSTER_COLUMN}
     for column in frame.columns:
@@ -260,5 +295,17 @@ def read_records(text: str) -> pd.DataFrame:
             try:
                 frame[column] = [float(value) if value else np.nan for value in frame[column]]
             except ValueError as error:
-                raise UserError(f"records.csv, column {column}: {error}") from error
+                raise UserError(f"records.csv, column {written(column)}: {error}") from error
     return frame
+
+
+def _translated(frame: pd.DataFrame) -> pd.DataFrame:
+    """A frame of text with the columns of records.csv as one with those of frames."""
+    frame = frame.drop(columns=list(STUDY_COLUMNS), errors="ignore").rename(columns=frame_name)
+    if CATEGORY_COLUMN in frame:
+        frame[CATEGORY_COLUMN] = frame[CATEGORY_COLUMN].replace(FLOOR, "")
+    if {"profile", "profile_version"} <= set(frame.columns):  # pictures from files have no profile
+        frame["profile"] = frame["profile"].where(frame["profile_version"] != "", "")
+    if {CLUSTER_COLUMN, "target"} <= set(frame.columns):
+        frame = frame.drop(columns=_single(frame))
+    return frame[_ordered(frame.columns, score_columns(frame))]

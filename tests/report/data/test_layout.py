@@ -5,6 +5,7 @@ import pytest
 from holobench_eval.report import layout_of
 from holobench_eval.report.description import describe
 from holobench_eval.study.config import load_study
+from holobench_eval.study.plan import plan
 
 PLUGINS = """
 from dataclasses import dataclass
@@ -39,7 +40,7 @@ targets: {dataset: "plugins.py:Cards"}
 methods:
   - {name: "plugins.py:Honest", label: honest}
   - {name: "plugins.py:Knowing", label: knowing, profiles: [leto-aged]}
-  - {name: "plugins.py:Seeing", label: seeing, profiles: [ideal]}
+  - {name: "plugins.py:Seeing", label: seeing, profiles: [ideal], captures: 12, params: {strength: 0.25}}
 headline: ssim_linear
 reported: {source: "a paper, table 3", rows: {honest: {psnr: 17.6}}}
 """
@@ -62,6 +63,19 @@ def test_a_layout_holds_what_the_config_orders(study):
     assert [layout.category(label) for label in layout.methods] == ["open loop", "ceiling", "online"]
     assert layout.reported_metrics == ("psnr",)
     assert layout.reported_source == "a paper, table 3"
+
+
+def test_a_layout_knows_how_every_cell_of_the_plan_is_made(study):
+    layout = layout_of(study)
+    cells = [(label, cell) for label, cell in plan(study).labelled() if label in layout.methods]
+    assert len(cells) == 8
+    for label, cell in cells:
+        assert layout.params[label] == cell.params
+        assert layout.capture_limits.get(label) == cell.captures
+        assert layout.panels[cell.profile] == cell.panel
+        assert layout.seed == cell.seed
+    assert layout.params["seeing"] == {"strength": 0.25}
+    assert (layout.study, layout.capture_limits) == ("study", {"seeing": 12})
 
 
 def test_the_clusters_of_targets_are_those_of_the_dataset(study):

@@ -1,0 +1,232 @@
+"""records.csv, table.csv and tests.csv: complete without the config, and the same numbers as the report's."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.report import Results, csv_text, layout_of, read_records, records_frame
+from holobench_eval.report.data.layout import Layout, Swept
+from holobench_eval.report.files.tidy import tidy_records, tidy_table, tidy_tests
+from holobench_eval.study.config import load_study
+from holobench_eval.study.plan import REFERENCE
+from tests.report.sections import test_sweeps as swept_study
+from tests.support import synthetic_study as synthetic
+
+ROOT = Path(__file__).parents[3]
+TARGETS = tuple(f"t{number}" for number in range(8))
+PARAMS = {"iterations": 200, "offset": None}
+
+
+def layout(**changes: object) -> Layout:
+    given = {
+        "pairs": (("wirtinger, 200", "leto-aged"), ("hil", "leto-aged")),
+        "targets": TARGETS,
+        "clusters": {target: f"photo {index // 2}" for index, target in enumerate(TARGETS)},
+        "baseline": "wirtinger, 200",
+        "privileged": frozenset(),
+        "reported": {},
+        "study": "toy",
+        "seed": 20_261_123,
+        "params": {"wirtinger, 200": PARAMS},
+        "capture_limits": {"hil": 25},
+        "panels": {"leto-aged": (192, 256)},
+    }
+    return synthetic.layout(**(given | changes))
+
+
+def records() -> list[synthetic.Record]:
+    names = {"wirtinger, 200": "wirtinger", "hil": "hil"}
+    found = [
+        synthetic.record(
+            label,
+            synthetic.cell(name, target, "leto-aged"),
+            {"psnr_linear": 17.0 + index + (label == "hil") * (0.4 * index - 0.5)},
+        )
+        for label, name in names.items()
+        for index, target in enumerate(TARGETS)
+    ]
+    floor = synthetic.cell("floor_constant", "t0", REFERENCE)
+    return [*found, synthetic.record("floor_constant", floor, {"psnr_linear": 9.0})]
+
+
+def results(**changes: object) -> Results:
+    return Results(records_frame(records(), layout(**changes)), layout(**changes))
+
+
+def read(frame: pd.DataFrame) -> pd.DataFrame:
+    return pd.read_csv(io.StringIO(csv_text(frame)))
+
+
+def test_a_record_says_what_it_is_without_the_config() -> None:
+    found = results()
+    row = read(tidy_records(found.frame, found.layout)).iloc[0]
+    expected = {
+        "study": "toy",
+        "measure": "picture",
+        "display": "leto-aged",
+        "condition": "leto-aged",
+        "method": "wirtinger",
+        "label": "wirtinger, 200",
+        "category": "open loop",
+        "panel_height_px": 192,
+        "panel_width_px": 256,
+        "target": "t0",
+        "cluster": "photo 0",
+        "repeat": 0,
+        "seed": 20_261_123,
+        "state": "done",
+        "psnr_linear_db": 17.0,
+    }
+    assert {name: row[name] for name in expected} == expected
+    assert json.loads(row["parameters"]) == PARAMS
+
+
+def test_a_limit_of_captures_and_the_floor_are_told_apart() -> None:
+    found = results()
+    cells = read(tidy_records(found.frame, found.layout)).set_index("label")
+    assert set(cells.loc["hil", "capture_limit"]) == {25}
+    assert cells.loc["wirtinger, 200", "capture_limit"].isna().all()
+    assert cells.loc["floor_constant", ["category", "condition"]].tolist() == ["floor", REFERENCE]
+
+
+def test_a_swept_quantity_is_a_number_with_a_unit_or_a_name() -> None:
+    made = swept_study.layout()
+    cells = read(tidy_records(records_frame(swept_study.records(), made), made))
+    points = cells.drop_duplicates("condition").set_index("condition")[["swept", "swept_value", "swept_unit"]]
+    assert points.loc["leto-aged, drift 30.0"].tolist() == ["drift", 30.0, "days"]
+    assert points.loc["leto-aged, camera_shift_x -20.0"].tolist() == ["camera_shift_x", -20.0, "mm"]
+    assert points.loc["leto-aged"].isna().all()
+    eyes = cells[cells["swept"] == "eye"]
+    assert eyes["swept_value"].isna().all()
+    assert set(eyes["swept_name"].str.removeprefix("'")) == {"-2"}
+    assert set(cells["display"]) == {"leto-aged"}
+
+
+def test_a_ratio_has_the_unit_one_and_a_draw_its_number() -> None:
+    sweeps = (
+        Swept("laser_power", "leto-aged", ((0.5, "leto-aged, laser power 0.5 of the nominal"),)),
+        Swept("draw", "leto-aged", (("7", "leto-aged, draw 7"),)),
+    )
+    conditions = [condition for sweep in sweeps for _, condition in sweep.points]
+    made = layout(sweeps=sweeps, pairs=tuple(("hil", condition) for condition in conditions))
+    found = [
+        synthetic.record("hil", synthetic.cell("hil", "t0", condition, profile="leto-aged"), {"psnr_linear": 1.0})
+        for condition in conditions
+    ]
+    cells = tidy_records(records_frame(found, made), made).set_index("swept")
+    assert cells.loc["laser_power", ["swept_value", "swept_unit"]].tolist() == [0.5, "1"]
+    assert cells.loc["draw", ["swept_value", "swept_unit"]].tolist() == [7.0, ""]
+
+
+def test_the_plane_of_a_focal_stack_is_a_swept_quantity() -> None:
+    made = layout(planes={target: ("scene", float(index)) for index, target in enumerate(TARGETS)}, measure="focus")
+    cells = tidy_records(records_frame(records(), made), made)
+    found = cells[cells["label"] == "hil"].set_index("target").loc["t3", ["swept", "swept_value", "swept_unit"]]
+    assert found.tolist() == ["plane", 3.0, "mm"]
+
+
+@pytest.mark.parametrize("report", ["table3", "table1", "error-budget"])
+def test_committed_records_become_tidy_and_come_back_without_a_loss(report: str) -> None:
+    text = (ROOT / "reports" / report / "records.csv").read_text()
+    made = layout_of(load_study(ROOT / "configs" / f"{report}.yaml"))
+    frame = read_records(text)
+    tidy = csv_text(tidy_records(frame, made))
+    assert text in (csv_text(frame), tidy)  # in the columns of earlier reports, or of this version
+    pd.testing.assert_frame_equal(read_records(tidy), frame)
+    assert csv_text(read_records(tidy)) == csv_text(frame)
+    assert len(frame) > 400
+
+
+def test_clusters_of_one_target_each_come_back_as_none() -> None:
+    found = results(clusters={})
+    tidy = tidy_records(found.frame, found.layout)
+    assert (tidy["cluster"] == tidy["target"]).all()
+    assert "cluster" not in read_records(csv_text(tidy))
+    assert read(tidy_table(found))["clusters"].iloc[0] == len(TARGETS)
+
+
+def test_the_table_leads_with_what_it_is_a_table_of() -> None:
+    table = read(tidy_table(results())).set_index("label")
+    assert table.loc["hil", ["study", "method", "display", "n", "clusters"]].tolist() == [
+        "toy",
+        "hil",
+        "leto-aged",
+        8,
+        4,
+    ]
+    assert table.loc["hil", "psnr_linear_db"] == pytest.approx(17 + 3.5 + 0.9)
+    assert table.loc["floor_constant", "category"] == "floor"
+
+
+def test_a_paired_test_has_the_numbers_of_the_report() -> None:
+    found = results()
+    (expected,) = found.against_baseline
+    tests = read(tidy_tests(found))
+    assert len(tests) == 1
+    row = tests.iloc[0]
+    assert row[["study", "display", "method", "label", "baseline", "metric"]].tolist() == [
+        *("toy", "leto-aged", "hil", "hil", "wirtinger, 200", "psnr_linear_db")
+    ]
+    assert row[["n", "clusters", "better"]].tolist() == [8, 4, 6]
+    numbers = row[["difference_db", "difference_lo_db", "difference_hi_db", "p_adjusted"]].astype(float).tolist()
+    estimate = expected.estimate
+    assert numbers == pytest.approx([estimate.mean, estimate.low, estimate.high, expected.p], rel=1e-5)
+    assert row["difference_median_db"] == pytest.approx(np.median(0.4 * np.arange(8) - 0.5))
+
+
+def test_the_tests_of_a_study_without_a_baseline_are_a_heading_alone() -> None:
+    assert len(csv_text(tidy_tests(results(baseline=None))).splitlines()) == 1
+
+
+HOSTILE = [
+    "=1+1",
+    "+cmd|' /C calc'!A0",
+    "-2",
+    "@SUM(A1)",
+    "\t=1",
+    "'=1",
+    "''@x",
+    "＝1",
+    "a|b",
+    "<script>alert(1)</script>",
+    'say "=x", please',
+    "'plain'",
+]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_text_is_never_a_formula_and_comes_back_as_it_was(name: str) -> None:
+    made = layout(pairs=((name, "leto-aged"),), targets=(name,), clusters={name: "="}, baseline=None)
+    found = [synthetic.record(name, synthetic.cell(name, name, "leto-aged"), {"psnr_linear": -1.5})]
+    text = csv_text(tidy_records(records_frame(found, made), made))
+    cells = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False).iloc[0]
+    written = [cells[column] for column in ("method", "label", "target", "cluster")]
+    assert not any(value.lstrip()[:1] in tuple("=+-@＝＋－＠") for value in written)
+    again = read_records(text).iloc[0]
+    assert again[["name", "method", "target", "cluster"]].tolist() == [name, name, name, "="]
+    assert (cells["psnr_linear_db"], again["psnr_linear"]) == ("-1.5", -1.5)
+
+
+def test_the_name_of_a_column_is_never_a_formula() -> None:
+    assert csv_text(pd.DataFrame({"=1+1": [-1.5], "n": [2]})) == "'=1+1,n\n-1.5,2\n"
+
+
+def test_a_number_that_is_none_is_refused_by_the_name_of_its_column() -> None:
+    found = results()
+    text = csv_text(tidy_records(found.frame, found.layout))
+    with pytest.raises(UserError, match=r"records.csv, column solving_s: could not convert"):
+        read_records(text.replace(",done,,17,0,,", ",done,,17,0,soon,"))
+
+
+def test_a_column_that_lacks_is_named_as_in_the_file() -> None:
+    found = results()
+    tidy = tidy_records(found.frame, found.layout).drop(columns="solving_s")
+    with pytest.raises(UserError, match="lacks the columns solving_s"):
+        read_records(csv_text(tidy))
