@@ -16,8 +16,7 @@ from ..markdown import table as markdown_table
 from .paired import Comparison, Row
 from .runs import provenance_differences
 
-TARGETS = 10  # of the list of those that changed most
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how a text begins that a spreadsheet takes for a formula
+TARGETS = 10  # that changed most, in the list
 
 
 @dataclass(frozen=True)
@@ -56,9 +55,9 @@ def csv(comparison: Comparison) -> str:
     score = comparison.score
     rows = [
         {
-            "method": _text(row.method),
-            "display_a": _text(row.displays[0]),
-            "display_b": _text(row.displays[1]),
+            "method": row.method,
+            "display_a": row.displays[0],
+            "display_b": row.displays[1],
             "score": score.key,
             "unit": score.unit,
             "targets": row.change.n,
@@ -74,11 +73,6 @@ def csv(comparison: Comparison) -> str:
         for row in comparison.rows
     ]
     return csv_text(pd.DataFrame(rows))
-
-
-def _text(name: str) -> str:
-    """A name that no spreadsheet takes for a formula."""
-    return f"'{name}" if name.startswith(_FORMULA) else name
 
 
 def _differences(comparison: Comparison) -> Part:
