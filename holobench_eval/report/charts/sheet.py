@@ -39,7 +39,7 @@ from .style import METADATA
 VERSION = 2  # of the drawing: sheets of another are drawn again
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1
-MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.045, "top": 0.92, "wspace": 0.5, "hspace": 0.38}
+MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.045, "top": 0.92, "wspace": 0.66, "hspace": 0.38}
 RAMP = 0.11  # cycles a pixel of the test ramp of a bench without a blaze
 # A PNG of so many colours of each kind, and of a cube for captures, is small enough to look at in a browser.
 SHADES = {"gray": 44, "viridis": 52, "magma": 40, "twilight": 40}
@@ -162,7 +162,8 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
     cycles = max(bench.profile.panel.blaze, key=abs)
     along = 0 if cycles and cycles == bench.profile.panel.blaze[0] else 1
     shape, count = bench.spec.shape, 30 * bench.samples
-    line = 2 * torch.pi * (cycles or RAMP) * torch.arange(shape[along], dtype=torch.float32)
+    turns = torch.remainder((cycles or RAMP) * torch.arange(shape[along], dtype=torch.float64), 1.0)
+    line = 2 * torch.pi * turns.float()
     ramp = (line[:, None] if along == 0 else line[None]).expand(shape)
     level = torch.remainder(torch.round(ramp / (2 * torch.pi) * 2**bench.spec.bits), 2**bench.spec.bits)
     phase = bench.profile.lut.phase(level, bench.spec.bits, bench.channels[GREEN].light.lut_gain, GREEN)
@@ -170,8 +171,7 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
     middle = bench.samples // 2
     seen = fine[:, middle, :, shape[1] // 2] if along == 0 else fine[middle, :, shape[0] // 2]
     places = (torch.arange(count) - (bench.samples - 1) / 2) / bench.samples
-    commanded = torch.remainder(line[:30], 2 * torch.pi) / torch.pi
-    axis.step(torch.arange(30), commanded, where="mid", label="commanded")
+    axis.step(torch.arange(30), 2 * turns[:30], where="mid", label="commanded")
     axis.plot(places, seen.T.reshape(-1)[:count] / torch.pi, label="on the panel")
     named = f"the blaze, {cycles:g} cycles / px" if cycles else f"a test ramp, {RAMP:g} cycles / px (no blaze here)"
     axis.set(title=named, xlabel=f"{('row', 'column')[along]} [px]", ylabel="phase [pi rad]")
@@ -285,7 +285,7 @@ def _effects(axis: Axes, bench: SimulatedBench) -> None:
     axis.set_axis_off()
     axis.set_title("effects, in the order of the light")
     half = -(-len(names) // 2)
-    for left, start in ((0.0, 0), (0.52, half)):
+    for left, start in ((-0.2, 0), (0.45, half)):
         numbered = enumerate(names[start : start + half], start=start + 1)
         words = "\n".join(f"{number}  {name}" for number, name in numbered)
         axis.text(left, 0.97, words, va="top", linespacing=1.3, parse_math=False, transform=axis.transAxes)
