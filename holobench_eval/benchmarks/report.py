@@ -12,7 +12,7 @@ from typing import Any
 
 from ..core.errors import UserError
 from ..core.io import write_atomically
-from ..report.charts.style import COLOURS, GREY, new_figure, save, style
+from ..report.charts.style import GREY, SHADES, new_figure, save, style
 from ..report.markdown import bullets, table
 
 
@@ -297,11 +297,11 @@ def chart(timings: Sequence[Timing], path: Path) -> None:
         longest = max(row.median_s / ours.median_s for rows, ours in compared for row in rows)
         for axis, (rows, ours) in zip(axes, compared, strict=True):
             ratios = [row.median_s / ours.median_s for row in rows]
-            axis.barh(range(len(rows)), ratios, color=[COLOURS[0] if row is ours else GREY for row in rows])
+            axis.barh(range(len(rows)), ratios, color=[SHADES[0] if row is ours else GREY for row in rows])
             axis.set_yticks(range(len(rows)), [row.version for row in rows])
             axis.invert_yaxis()
             axis.set_xscale("log")
-            axis.axvline(1, color=COLOURS[0], linewidth=0.8)
+            axis.axvline(1, color=SHADES[0], linewidth=0.8)
             axis.set_title(rows[0].group, loc="left")
             for position, (row, ratio) in enumerate(zip(rows, ratios, strict=True)):
                 words = f"{f'{ratio:.0f}' if ratio >= 10 else f'{ratio:.2g}'}  ({1e3 * row.median_s:.0f} ms)"

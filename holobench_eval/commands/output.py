@@ -22,13 +22,14 @@ def console() -> Console:
 
 def write_report(
     console: Console, study: Study, records: list[dict[str, object]], output: Path, known: dict[str, object]
-) -> None:
-    """Write a study's report and print its headline tables. known: its provenance."""
+) -> Results:
+    """Write a study's report, print its headline tables and return its numbers. known: its provenance."""
     from ..report import build_report
 
     written, results = build_report(study, records, output, known)
     print_headline(console, results)
     console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
+    return results
 
 
 def print_headline(console: Console, results: Results) -> None:

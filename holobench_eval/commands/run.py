@@ -153,9 +153,10 @@ class Sheet:
     def identity(self) -> str:
         """What the picture is drawn from."""
         from ..core.hashing import digest
+        from ..report.charts.sheet import VERSION
         from ..study.versions import HARNESS
 
-        return digest([self.display.digest, list(self.display.spec.shape), self.seed, HARNESS])
+        return digest([self.display.digest, list(self.display.spec.shape), self.seed, HARNESS, VERSION])
 
     def __call__(self) -> None:
         """Draw it, unless it is there."""

@@ -93,6 +93,10 @@ def test_a_study_from_run_to_check(
     assert holoeval(monkeypatch, "report", config) == 0
     assert [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
 
+    assert holoeval(monkeypatch, "report", config, "--print", "printed") == 0
+    assert Path("printed/single/quality-by-target.svg").exists()
+    assert "printed/double/quality-by-target.pdf" in capsys.readouterr().out
+
     another = config.with_name("another.yaml")
     another.write_text(f"{config.read_text()}\nseed: 99\n")
     assert holoeval(monkeypatch, "report", another, "--output", "reports/toy") == 2

@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.io import write_atomically
 from ...imaging.warp import Warp
+from .style import save_picture
 
 HEIGHT = 480  # pixels
 SQUARES = 8
-QUALITY = 90
 YELLOW = (0, 255, 255)  # blue first
 BLACK = (0, 0, 0)
 
@@ -36,10 +35,7 @@ def draw_alignment(path: Path, capture: Values, warp: Warp, matched: Values, tar
     board = np.where((row + column) % 2 == 0, target, matched)
     right = _levels(np.asarray(board, dtype=np.float32), (round(width * HEIGHT / height), HEIGHT))
     gap = np.full((HEIGHT, 12, 3), 255, dtype=np.uint8)
-    encoded, buffer = cv2.imencode(".jpg", np.hstack([left, gap, right]), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    if not encoded:
-        raise OSError(f"{path}: the picture of an alignment cannot be written")
-    write_atomically(path, buffer.tobytes())
+    save_picture(np.ascontiguousarray(np.hstack([left, gap, right])[..., ::-1]), path)
 
 
 def _levels(picture: Values, size: tuple[int, int]) -> NDArray[np.uint8]:

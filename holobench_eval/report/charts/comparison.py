@@ -1,7 +1,7 @@
 """The comparison figure: targets down, methods across, every capture at one to one or larger.
 
-Each tile is the capture, its scores, and below it the enlarged window (left) and the error map (right). Pictures are
-put together pixel by pixel before anything is drawn, so what is seen is what was scored.
+Each tile is the capture, its scores, and below it a window at four times its scale (left) and the error in that window
+(right). Pictures are put together pixel by pixel before anything is drawn, so what is seen is what was scored.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .gallery import Column, Picture, Tile, error_map, halved, most_detailed
+from .gallery import CROP_FRACTION, Column, Picture, Tile, error_map, most_detailed
 from .style import new_figure, save_picture, style
 
-SMALLEST_TILE = 192  # captures narrower than this many pixels are enlarged by a whole factor
+ZOOM = 4  # of the window, relative to its picture
+SMALLEST_TILE = 160  # captures narrower than this many pixels are enlarged by a whole factor
 
 GAP = 8
 CAPTION = 20
@@ -101,7 +102,7 @@ def draw_comparison(
     the pictures of the rows are.
     """
     tall, wide = tile_size(targets[0][1].shape)
-    row_height = tall + CAPTION + tall // 2 + 2 * GAP
+    row_height = tall + CAPTION + zoomed(targets[0][1].shape)[0] + 2 * GAP
     scale = Normalize(0, error_scale)
     with style():
         page = Page(SIDE + (1 + len(columns)) * (wide + GAP), HEADER + len(targets) * row_height + FOOTER)
@@ -120,30 +121,35 @@ def draw_comparison(
         page.save(path)
 
 
+def zoomed(shape: tuple[int, ...]) -> tuple[int, int]:
+    """(height, width) in figure pixels of the enlarged window of a capture of ``shape`` (h, w, ...)."""
+    tall, wide = tile_size(shape)
+    return tall // shape[0] * ZOOM * (shape[0] // CROP_FRACTION), wide // shape[1] * ZOOM * (shape[1] // CROP_FRACTION)
+
+
 def _draw_target(page: Page, corner: tuple[int, int], target: Picture) -> None:
     """The target, with a frame around the window that all tiles of its row enlarge."""
     left, top = corner
     tall, wide = tile_size(target.shape)
     page.paste(left, top, (tall, wide), target)
-    page.text(left + wide / 2, top + tall + CAPTION / 2, "frame: enlarged below", fontsize=8, ha="center", va="center")
+    words = f"frame: {ZOOM} x enlarged below"
+    page.text(left + wide / 2, top + tall + CAPTION / 2, words, fontsize=8, ha="center", va="center")
     crop, factor = most_detailed(target), wide // target.shape[1]
-    page.paste(left, top + tall + CAPTION, (tall // 2, wide // 2 - 1), crop.of(target))
+    page.paste(left, top + tall + CAPTION, zoomed(target.shape), crop.of(target))
     page.outline(left + crop.left * factor, top + crop.top * factor, (crop.height * factor, crop.width * factor))
 
 
 def _draw_tile(page: Page, corner: tuple[int, int], tile: Tile, target: Picture, scale: Normalize) -> None:
-    """A capture, its caption, the enlarged window and the error map; or why there is no capture."""
+    """A capture, its caption, the enlarged window and the error in it; or why there is no capture."""
     left, top = corner
     tall, wide = tile_size(target.shape)
     page.tile(left, top, (tall, wide), tile)
     if tile.picture is None:
         return
-    below, half = top + tall + CAPTION, (tall // 2, wide // 2 - 1)
-    page.paste(left, below, half, most_detailed(target).of(tile.picture))
-    error = error_map(tile.picture, target)
-    if tall == error.shape[0]:
-        error = halved(error)
-    page.paste(left + wide - half[1], below, half, _coloured(error, scale))
+    below, size, crop = top + tall + CAPTION, zoomed(target.shape), most_detailed(target)
+    page.paste(left, below, size, crop.of(tile.picture))
+    error = error_map(crop.of(tile.picture), crop.of(target))
+    page.paste(left + wide - size[1], below, size, _coloured(error, scale))
 
 
 def _coloured(error: NDArray[np.float64], scale: Normalize) -> Picture:
@@ -156,5 +162,6 @@ def _colour_bar(page: Page, scale: Normalize) -> None:
     box = (SIDE / width, (FOOTER - 22) / height, min(420, width - 2 * SIDE) / width, 14 / height)
     mappable = ScalarMappable(scale, ERROR_COLOURS)
     bar = page.figure.colorbar(mappable, cax=page.figure.add_axes(box), orientation="horizontal")
-    bar.set_label("absolute error, mean over R, G, B (sRGB value, full scale 1)", fontsize=8)
+    words = "absolute error, mean over R, G, B [share of full scale of sRGB values]"
+    bar.set_label(textwrap.fill(words, int(box[2] * width / 5.5)), fontsize=8)
     bar.ax.tick_params(labelsize=8)

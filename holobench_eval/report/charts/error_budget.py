@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Patch
 
 from ..data.error_budget import Budget, Part
-from .style import COLOURS, GREY, PALE, grid, new_figure, save, style
+from .look.medium import medium
+from .style import PALE, grid, new_figure, save, style
 
-WIDTH = 1040  # pixels
 ROW, HEADER, LEGEND = 110, 40, 110  # pixels: of a display, above and below all
 SHARES, GAINS = 0.6, 0.4  # of the width
 LEGIBLE = 4.0  # percent from which on a part carries its number
 REST, NOISE = PALE, "#333333"
-DARK = ("#0072B2", "#6A3D9A", "#7F5539", NOISE, GREY)  # colours on which white is legible
+NESTED = matplotlib.colormaps["cividis"]  # of nested models, from small to large: order is seen in gray too
+DARKEST, LIGHTEST = 0.1, 0.9  # of the part of it that is used
 
 
 def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
@@ -26,9 +29,13 @@ def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
         return
     colours = _colours(budgets)
     with style():
-        figure = new_figure(WIDTH, HEADER + ROW * len(budgets) + LEGEND)
+        height, narrow = HEADER + ROW * len(budgets), medium().narrow
+        figure = new_figure(medium().width, round(medium().scale * (height * (1 + narrow) + LEGEND * (1 + narrow))))
         figure.set_layout_engine("constrained")
-        left, right = figure.subplots(1, 2, sharey=True, width_ratios=[SHARES, GAINS])
+        if narrow:
+            left, right = figure.subplots(2, 1, sharey=True)
+        else:
+            left, right = figure.subplots(1, 2, sharey=True, width_ratios=[SHARES, GAINS])
         for row, budget in enumerate(budgets):
             _shares(left, row, budget, colours)
             _gains(right, row, budget, colours)
@@ -38,22 +45,29 @@ def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
         left.axvline(0, color="black", linewidth=0.8)
         left.set_xlabel("share of the squared error of the captures [%]")
         left.set_title("what explains the error", loc="left", weight="bold")
-        right.set_xlabel("PSNR gained if it were removed, with all to its left [dB]")
+        gained = "PSNR gained if it were removed, with all to its left [dB]"
+        right.set_xlabel(medium().wrap(gained, (0.7 if narrow else 0.9 * GAINS) * medium().width))
         right.set_title("what its removal is worth at most", loc="left", weight="bold")
         right.set_xlim(left=min(0.0, right.get_xlim()[0]))
         for axes in (left, right):
             axes.tick_params(axis="y", length=0)
             grid(axes, "x")
         handles = [Patch(facecolor=colour, label=label) for label, colour in colours.items()]
-        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+        figure.legend(handles=handles, loc="outside lower center", ncols=1 if narrow else 3, frameon=False)
         save(figure, path)
 
 
 def _colours(budgets: Sequence[Budget]) -> Mapping[str, str]:
     """Of every part by its label, in the order of the bars."""
     labels = dict.fromkeys(part.label for budget in budgets for part in budget.explained)
-    explained = {label: COLOURS[index % len(COLOURS)] for index, label in enumerate(labels)}
+    shades = np.linspace(DARKEST, LIGHTEST, len(labels))
+    explained = {label: to_hex(NESTED(shade)) for label, shade in zip(labels, shades, strict=True)}
     return explained | {budgets[0].rest.label: REST, budgets[0].noise.label: NOISE}
+
+
+def _is_dark(colour: str) -> bool:
+    """Whether white is legible on a colour."""
+    return float(np.dot(to_rgb(colour), (0.3, 0.6, 0.1))) < 0.5
 
 
 def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:
@@ -66,7 +80,7 @@ def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) ->
         colour = colours[part.label]
         axes.barh(row, share, left=start, height=0.5, color=colour, edgecolor="white", linewidth=0.5, hatch=hatch)
         if abs(share) >= LEGIBLE:
-            white = colour in DARK and share > 0
+            white = _is_dark(colour) and share > 0
             words = f"{share:.0f}"
             axes.text(start + share / 2, row, words, ha="center", va="center", color="white" if white else "black")
         right, left = (right + share, left) if share >= 0 else (right, left + share)
@@ -84,5 +98,10 @@ def _gains(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> 
         axes.errorbar(part.gain.mean, height, xerr=[[low], [high]], fmt="o", color=colour, markersize=5, capsize=2)
         end = part.gain.mean + high
         axes.annotate(
-            f"{part.gain.mean:z.1f}", (end, height), (5, 0), textcoords="offset points", va="center", fontsize=8
+            f"{part.gain.mean:z.1f}",
+            (end, height),
+            (5, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=medium().note,
         )

@@ -1,41 +1,46 @@
 """Charts of quality against what it cost: captures of the camera, or seconds.
 
-One panel per display. The baseline is a horizontal line, the floor of what a camera must be worth; the privileged
-method is another, the oracle. Marks are named where they stand, and rows of one registered method are joined. Pale
-steps show the best quality for a cost, apart for methods with and without the camera for the scored image.
+One panel per display. The baseline is a horizontal line, what a camera must be worth; the privileged method and the
+constant image are others. Marks are named where they stand, and the rows of one method that differ in their captures
+are joined. Pale steps show the best quality for a cost, apart for methods with and without the camera for the scored
+image.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
-from ..data.categories import CALIBRATED, CATEGORIES, OFFLINE, ONLINE, OPEN_LOOP
-from .labels import Names
-from .style import COLOURS, GREY, PALE, grid, save, stacked, style
+from ..data.categories import OFFLINE, ONLINE
+from .labels import CROWDED, Names
+from .look.medium import medium
+from .look.methods import Look
+from .style import PALE, grid, save, stacked, style
 
 PANEL = 370
-FOOTER = 50
-MARKERS = {OPEN_LOOP: "o", CALIBRATED: "s", ONLINE: "D"}
+FOOTER = 20
 # Widths relative to that of the logarithmic part: between zero and the smallest cost, and between marks without any
 # cost, which stand side by side so that none hides another.
 ZERO_GAP = 0.14
 SPREAD = 0.02
-# Up to so many marks of a method each get a name; more are a curve, and the method's name stands at its end.
-NAMED_EACH = 2
+# From so many rows of a method on, no two with the same captures, they are a curve, named at its end; fewer, or rows
+# that differ in something else, are marks of their own.
+SHORTEST_CURVE = 3
+MOST_CROWDED = 3  # rows of one method that stand side by side and have names each; of more, their number is named
 
 
 @dataclass(frozen=True)
 class Mark:
     """A row of the study: ``cost`` along the axis, mean quality and its interval (NaN: none).
 
-    group: the registered method, whose rows are joined by a line and share its name; category: which marker.
+    group: the registered method; captures: all of the row; category: whether it competes for a frontier with others.
     """
 
     label: str
@@ -45,11 +50,12 @@ class Mark:
     quality: float
     low: float
     high: float
+    captures: float
 
 
 @dataclass(frozen=True)
 class Line:
-    """A horizontal line: the baseline or the oracle; ``low`` and ``high`` bound its band (NaN: none)."""
+    """A horizontal line with its name; ``low`` and ``high`` bound its band (NaN: none)."""
 
     label: str
     quality: float
@@ -64,8 +70,15 @@ class Frontier:
     condition: str
     marks: tuple[Mark, ...]
     higher: bool = True
-    floor: Line | None = None
+    baseline: Line | None = None
     oracle: Line | None = None
+    constant: Line | None = None
+
+    @property
+    def lines(self) -> list[tuple[Line, tuple[float, float]]]:
+        """The horizontal lines that there are, with their dashes."""
+        lines = ((self.baseline, (6, 3)), (self.oracle, (1.5, 2)), (self.constant, (3, 3)))
+        return [(line, dashes) for line, dashes in lines if line is not None]
 
 
 @dataclass(frozen=True)
@@ -151,23 +164,19 @@ def _break(axes: Axes, position: float) -> None:
         )
 
 
-def draw_frontiers(path: Path, panels: Sequence[Frontier], axis: str, cost: str) -> None:
+def draw_frontiers(path: Path, panels: Sequence[Frontier], axis: str, cost: str, looked: Mapping[str, Look]) -> None:
     """Draw a panel per display.
 
-    axis: name of the quality with its unit; cost: of what it is drawn against, with its unit.
+    axis: name of the quality with its unit; cost: of what it is drawn against, with its unit; looked: the look of every
+    label.
     """
     costs = Costs.of([mark for panel in panels for mark in panel.marks])
-    groups = list(dict.fromkeys(mark.group for panel in panels for mark in panel.marks))
-    colours = {group: COLOURS[index % len(COLOURS)] for index, group in enumerate(groups)}
-    categories = {mark.category for panel in panels for mark in panel.marks}
     with style():
         figure, drawn = stacked([panel.condition for panel in panels], [PANEL] * len(panels), FOOTER)
         for axes, panel in zip(drawn, panels, strict=True):
-            _draw_frontier(axes, panel, costs, colours)
+            _draw_frontier(axes, panel, costs, looked)
             axes.set_ylabel(axis.replace(", of ", "\nof "))
-        drawn[-1].set_xlabel(cost)
-        keys = [_key(category) for category in CATEGORIES if category in categories]
-        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), frameon=False)
+        drawn[-1].set_xlabel(medium().wrap(cost, 0.85 * medium().width))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # names are placed by the pixel, so that nothing may move any more
         for axes, panel in zip(drawn, panels, strict=True):
@@ -175,14 +184,15 @@ def draw_frontiers(path: Path, panels: Sequence[Frontier], axis: str, cost: str)
         save(figure, path)
 
 
-def _key(category: str) -> Line2D:
-    return Line2D([], [], linestyle="", marker=MARKERS[category], color=GREY, label=f"{category} track")
-
-
-def _joined(panel: Frontier) -> list[list[Mark]]:
+def _groups(panel: Frontier) -> list[list[Mark]]:
     """The marks of each registered method, by their costs."""
     groups = dict.fromkeys(mark.group for mark in panel.marks)
     return [sorted((m for m in panel.marks if m.group == group), key=lambda m: m.cost) for group in groups]
+
+
+def _is_curve(marks: Sequence[Mark]) -> bool:
+    """Whether the rows of a method are its quality at several budgets."""
+    return len({mark.captures for mark in marks}) == len(marks) >= SHORTEST_CURVE
 
 
 def _front(panel: Frontier, categories: Sequence[str], costs: Costs) -> list[tuple[float, float]]:
@@ -196,18 +206,18 @@ def _front(panel: Frontier, categories: Sequence[str], costs: Costs) -> list[tup
     return corners
 
 
-def _draw_frontier(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str, str]) -> None:
-    for line, dashes in ((panel.floor, (6, 3)), (panel.oracle, (1.5, 2))):
-        if line is not None:
-            axes.axhline(line.quality, color="black", linewidth=1.1, dashes=dashes, zorder=1)
-            if np.isfinite(line.low):
-                axes.axhspan(line.low, line.high, color="black", alpha=0.07, linewidth=0, zorder=0)
+def _draw_frontier(axes: Axes, panel: Frontier, costs: Costs, looked: Mapping[str, Look]) -> None:
+    for line, dashes in panel.lines:
+        axes.axhline(line.quality, color="black", linewidth=1.1, dashes=dashes, zorder=1)
+        if np.isfinite(line.low):
+            axes.axhspan(line.low, line.high, color="black", alpha=0.07, linewidth=0, zorder=0)
     for categories in (OFFLINE, (ONLINE,)):
         steps = _front(panel, categories, costs)
         axes.plot([x for x, _ in steps], [y for _, y in steps], color=PALE, linewidth=2.2, zorder=1)
-    for marks in _joined(panel):
-        positions, colour = [costs.position(mark) for mark in marks], colours[marks[0].group]
-        if len(set(positions)) > 1:
+    for marks in _groups(panel):
+        positions = [costs.position(mark) for mark in marks]
+        if _is_curve(marks):
+            colour = looked[marks[0].label].colour
             axes.plot(positions, [mark.quality for mark in marks], color=colour, linewidth=1.4, zorder=2)
         for position, mark in zip(positions, marks, strict=True):
             offsets = np.nan_to_num([[mark.quality - mark.low], [mark.high - mark.quality]])
@@ -215,11 +225,12 @@ def _draw_frontier(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str,
                 position,
                 mark.quality,
                 yerr=offsets,
-                fmt=MARKERS[mark.category],
-                color=colour,
+                fmt=looked[mark.label].marker,
+                color=looked[mark.label].face,
+                ecolor=looked[mark.label].colour,
                 markersize=6.5,
-                markeredgecolor="white",
-                markeredgewidth=0.6,
+                markeredgecolor=looked[mark.label].colour,
+                markeredgewidth=1.0,
                 elinewidth=1.0,
                 capsize=2.5,
                 zorder=3,
@@ -230,25 +241,38 @@ def _draw_frontier(axes: Axes, panel: Frontier, costs: Costs, colours: dict[str,
 
 
 def _name_all(axes: Axes, panel: Frontier, costs: Costs) -> None:
-    names, joined = Names(axes), _joined(panel)
-    lines = [line for line in (panel.floor, panel.oracle) if line is not None]
-    for marks in joined:
-        names.keep_clear_line([(costs.position(mark), mark.quality) for mark in marks])
+    names, groups = Names(axes), _groups(panel)
+    for marks in groups:
+        if _is_curve(marks):
+            names.keep_clear_line([(costs.position(mark), mark.quality) for mark in marks])
         for mark in marks:
             position = costs.position(mark)
-            names.keep_clear(position, mark.quality, 11)
+            names.keep_clear_mark(position, mark.quality, 11)
             if np.isfinite(mark.low):
                 names.keep_clear_line([(position, mark.low), (position, mark.high)])
     for categories in (OFFLINE, (ONLINE,)):
         names.keep_clear_line(_front(panel, categories, costs))
-    for line in lines:
+    for line, _ in panel.lines:
         names.keep_clear_line([(end, line.quality) for end in axes.get_xlim()], width=2)
-    for line in lines:
+    for line, _ in panel.lines:
         names.along(line.label, line.quality)
-    for marks in sorted(joined, key=len, reverse=True):
+    for marks in sorted(groups, key=len, reverse=True):
         last = marks[-1]
-        if len(marks) > NAMED_EACH and last.cost > marks[0].cost:
+        if _is_curve(marks) and last.cost > marks[0].cost:
             names.beside(last.group.rpartition(":")[2], costs.position(last), last.quality)
             continue
-        for mark in marks:
-            names.beside(mark.label, costs.position(mark), mark.quality)
+        for crowd in _crowds(marks, [names.pixel(costs.position(mark), mark.quality) for mark in marks]):
+            named = [(mark.label, mark) for mark in crowd]
+            if len(crowd) > MOST_CROWDED:
+                named = [(f"{last.group.rpartition(':')[2]}, {len(crowd)} variants", crowd[len(crowd) // 2])]
+            for name, mark in named:
+                names.beside(name, costs.position(mark), mark.quality)
+
+
+def _crowds(marks: Sequence[Mark], pixels: Sequence[tuple[float, float]]) -> list[list[Mark]]:
+    """The marks of a method in groups whose members stand side by side."""
+    crowds: list[list[int]] = []
+    for index, here in enumerate(pixels):
+        near = [crowd for crowd in crowds if any(math.dist(here, pixels[other]) < CROWDED for other in crowd)]
+        crowds = [crowd for crowd in crowds if crowd not in near] + [[*itertools.chain(*near), index]]
+    return [[marks[index] for index in crowd] for crowd in crowds]

@@ -13,7 +13,7 @@ from skimage.io import imread
 
 Picture = NDArray[np.float64]
 
-CROP_FRACTION = 4  # the enlarged window is a quarter of the picture in each direction
+CROP_FRACTION = 9  # of a side of the picture: four times enlarged, two windows fit below it
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,13 @@ def load_picture(path: Path) -> Picture | None:
     return picture[..., :3]
 
 
-def most_detailed(target: Picture) -> Crop:
-    """The window of ``target`` with the largest summed gradient magnitude; the first one where windows tie."""
+def most_detailed(target: Picture, fraction: int = CROP_FRACTION) -> Crop:
+    """The window of ``target`` with the largest summed gradient magnitude; the first one where windows tie.
+
+    fraction: how many times smaller than the picture's its sides are.
+    """
     height, width = target.shape[:2]
-    rows, columns = max(1, height // CROP_FRACTION), max(1, width // CROP_FRACTION)
+    rows, columns = max(1, height // fraction), max(1, width // fraction)
     vertical, horizontal = np.gradient(target.mean(axis=2))
     detail = np.hypot(vertical, horizontal)
     summed = np.pad(detail.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
@@ -73,14 +76,6 @@ def error_map(capture: Picture, target: Picture) -> NDArray[np.float64]:
     """``(h, w)`` absolute difference of sRGB values, mean over the three channels, in [0, 1]."""
     error: NDArray[np.float64] = np.abs(capture - target).mean(axis=2)
     return error
-
-
-def halved(picture: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over 2 x 2 blocks, ``(h, w) -> (h // 2, w // 2)``, so that a map drawn at half size keeps its mean."""
-    height, width = picture.shape[0] // 2, picture.shape[1] // 2
-    blocks = picture[: 2 * height, : 2 * width].reshape(height, 2, width, 2)
-    means: NDArray[np.float64] = blocks.mean(axis=(1, 3))
-    return means
 
 
 def error_limit(errors: Sequence[NDArray[np.float64]]) -> float:

@@ -1,153 +1,127 @@
-"""Charts of the headline metric: quality with intervals, and every target's value."""
+"""The headline metric of every method: a dot a target, the mean with its interval, the floor as a line."""
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from ..data.layout import Layout
-from ..data.scores import Score
-from .style import COLOURS, GREY, PALE, WIDTH, grid, save, stacked, style
+from ..data.results import Results
+from ..data.statistics import Array, Estimate
+from .look.medium import medium
+from .look.methods import Look, looks
+from .style import GREY, grid, save, stacked, style
 
-METHOD_WIDTH = 115  # pixels that a method's name has below the per-target chart
-LABELLED_TARGETS = 14  # lines of the per-target chart carry their target's name up to this many; more would overlap
+ROW, LINE, FRAME = 27, 16, 62  # pixels: of a method, of a line of text, of a panel's title and axis
+SPREAD = 0.3  # of a row to either side of its middle: targets keep their place in it from row to row
+DOT, FEW = 9, 12  # size of a target's dot [square points], twice that for so few targets
+NAMES = 0.28  # of the width, for the names of the methods
+DASHES = ("--", ":", "-.")  # of floors, in their order
 
 
 @dataclass(frozen=True)
-class Chart:
-    """What all charts share.
+class Row:
+    """A method: its name with marks, its ``(targets,)`` values (NaN: none), their mean, and what is written beside."""
 
-    score: the headline metric; methods: labels in order; floors: what the floor scores, by its description.
-    """
-
-    score: Score
-    layout: Layout
-    methods: tuple[str, ...]
-    floors: Mapping[str, float]
-
-    @property
-    def axis(self) -> str:
-        """The metric's title, domain and unit, for an axis."""
-        return f"{self.score.axis}{self.layout.text.axis}"
-
-    def is_oracle(self, label: str) -> bool:
-        """Whether a method may differentiate through the bench."""
-        return label in self.layout.privileged
-
-    def colour(self, label: str) -> str:
-        """The method's colour, the same in every chart; oracles are grey."""
-        competitors = [method for method in self.methods if not self.is_oracle(method)]
-        return GREY if self.is_oracle(label) else COLOURS[competitors.index(label) % len(COLOURS)]
+    name: str
+    values: Array
+    estimate: Estimate
+    look: Look
+    words: str
 
 
-def _offsets(rows: pd.DataFrame, score: str) -> NDArray[np.float64]:
-    """``(2, n)`` distances from the mean to its interval; zero where there is no interval."""
-    mean, low, high = (rows[key].to_numpy(dtype=np.float64) for key in (score, f"{score}_lo", f"{score}_hi"))
-    offsets: NDArray[np.float64] = np.nan_to_num(np.vstack([mean - low, high - mean]), nan=0.0)
-    return offsets
-
-
-def quality_bars(path: Path, table: pd.DataFrame, chart: Chart) -> None:
-    """Mean of the headline metric with its interval, a panel per condition, floors as vertical lines."""
-    score = chart.score.key
-    rows = table[table["method"].isin(chart.methods) & np.isfinite(table[score])]
-    conditions = list(dict.fromkeys(rows["condition"]))
-    groups = {condition: rows[rows["condition"] == condition] for condition in conditions}
-    with style():
-        heights = [60 + 30 * len(groups[condition]) for condition in conditions]
-        figure, panels = stacked(conditions, heights, footer=90)
-        limit = float(np.nanmax(rows[[score, f"{score}_hi"]].to_numpy())) * 1.3
-        for axes, condition in zip(panels, conditions, strict=True):
-            _bars(axes, groups[condition], chart)
-            for (_, value), dash in zip(chart.floors.items(), ("--", ":"), strict=False):
-                axes.axvline(value, color="black", linestyle=dash, linewidth=1.2)
-            axes.set_xlim(0, limit)
-        panels[-1].set_xlabel(f"{chart.axis}; mean over targets, 95 % interval")
-        for (name, value), dash in zip(chart.floors.items(), ("--", ":"), strict=False):
-            panels[-1].plot(
-                [], [], color="black", linestyle=dash, label=f"floor: {name}, {chart.score.with_unit(value)}"
-            )
-        if chart.floors:
-            figure.legend(loc="outside lower center", ncols=2, frameon=False)
-        save(figure, path)
-
-
-def _bars(axes: Axes, rows: pd.DataFrame, chart: Chart) -> None:
-    score = chart.score.key
-    labels, heights = list(rows["method"]), np.arange(len(rows))
-    offsets = _offsets(rows, score)
-    bars = axes.barh(heights, rows[score], height=0.62, color=[chart.colour(label) for label in labels])
-    for bar, label in zip(bars, labels, strict=True):
-        if chart.is_oracle(label):
-            bar.set(facecolor="white", edgecolor=GREY, hatch="////")
-    axes.errorbar(rows[score], heights, xerr=offsets, fmt="none", ecolor="black", elinewidth=1.2, capsize=3)
-    for height, (mean, low, high, end) in enumerate(
-        zip(rows[score], rows[f"{score}_lo"], rows[f"{score}_hi"], rows[score] + offsets[1], strict=True)
-    ):
-        words = chart.score.interval(mean, low, high)
-        axes.annotate(words, (end, height), (7, 0), textcoords="offset points", va="center", fontsize=8)
-    axes.set_yticks(heights, [chart.layout.marked(label) for label in labels], parse_math=False)
-    axes.invert_yaxis()
-    axes.tick_params(axis="y", length=0)
-
-
-def target_dots(path: Path, values: Mapping[str, pd.DataFrame], chart: Chart) -> None:
-    """Every target's headline value, a line per target across the methods, so that the spread is seen.
-
-    values: by condition, a frame with targets down and method labels across; NaN where there is no score.
-    """
-    with style():
-        width = max(WIDTH, 150 + METHOD_WIDTH * max(frame.shape[1] for frame in values.values()))
-        figure, panels = stacked(list(values), [340] * len(values), footer=20, width=width)
-        for axes, frame in zip(panels, values.values(), strict=True):
-            _dots(axes, frame, chart)
-        save(figure, path)
-
-
-def _dots(axes: Axes, frame: pd.DataFrame, chart: Chart) -> None:
-    columns = np.arange(frame.shape[1])
-    for _, row in frame.iterrows():
-        axes.plot(columns, row.to_numpy(), color=PALE, linewidth=0.9, zorder=1)
-    for column, label in zip(columns, frame.columns, strict=True):
-        values = frame[label].dropna()
-        face = "white" if chart.is_oracle(label) else chart.colour(label)
-        axes.scatter(np.full(len(values), column), values, s=26, color=face, edgecolor=chart.colour(label), zorder=2)
-        if len(values):
-            axes.hlines(values.mean(), column - 0.22, column + 0.22, color="black", linewidth=2.2, zorder=3)
-    names = [textwrap.fill(chart.layout.marked(str(label)), 16, break_long_words=False) for label in frame.columns]
-    axes.set_xticks(columns, names, parse_math=False)
-    axes.set_ylabel(chart.axis.replace(", of ", "\nof "))
-    grid(axes, "y")
-    axes.set_xlim(-0.5, len(columns) - 0.5)
-    if len(frame) <= LABELLED_TARGETS:
-        _name_lines(axes, frame)
-
-
-def _name_lines(axes: Axes, frame: pd.DataFrame) -> None:
-    """Targets' names at the right end of their lines, pushed apart to at least a line of text."""
-    last = frame.ffill(axis=1).iloc[:, -1].dropna().sort_values()
-    low, high = axes.get_ylim()
-    step = (high - low) / 17
-    heights: list[float] = []
-    for value in last:
-        heights.append(max(float(value), heights[-1] + step if heights else -np.inf))
-    excess = max(0.0, heights[-1] - high) if heights else 0.0
-    edge = frame.shape[1] - 0.5
-    for (name, value), height in zip(last.items(), heights, strict=True):
-        axes.annotate(
-            str(name),
-            (frame.shape[1] - 1, value),
-            (edge, height - excess),
-            va="center",
-            fontsize=8,
-            annotation_clip=False,
-            parse_math=False,
-            arrowprops={"arrowstyle": "-", "color": PALE, "linewidth": 0.7},
+def draw_rows_of_dots(axes: Axes, rows: Sequence[Row]) -> None:
+    """Draw rows from above to below, with their names to the left and their numbers to the right of the axes."""
+    for height, row in enumerate(rows):
+        offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
+        size = DOT if len(row.values) > FEW else 2 * DOT
+        axes.scatter(row.values, height + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
+        mean, low, high = row.estimate.mean, row.estimate.low, row.estimate.high
+        reach = np.nan_to_num([[mean - low], [high - mean]])
+        axes.errorbar(mean, height, xerr=reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4)
+        axes.plot(
+            mean,
+            height,
+            marker=row.look.marker,
+            markersize=7 * medium().scale ** 2,
+            color=row.look.face,
+            markeredgecolor=row.look.colour,
+            markeredgewidth=1,
+            zorder=5,
         )
+        axes.annotate(
+            row.words,
+            (1, height),
+            (6, 0),
+            xycoords=axes.get_yaxis_transform(),
+            textcoords="offset points",
+            va="center",
+            fontsize=medium().note,
+            annotation_clip=False,
+        )
+    names = [medium().wrap(row.name, NAMES * medium().width) for row in rows]
+    axes.set_yticks(range(len(rows)), names, parse_math=False, fontsize=medium().note)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    grid(axes, "x")
+
+
+def height_of(rows: Sequence[Row]) -> int:
+    """Of a panel [pixels of the screen]: all rows are as high as the one whose name has most lines."""
+    lines = max(medium().wrap(row.name, NAMES * medium().width).count("\n") + 1 for row in rows)
+    return FRAME + len(rows) * max(ROW, LINE * lines)
+
+
+def footer_of(axis: str, labels: Sequence[str]) -> int:
+    """Of the lines below the panels [pixels of the screen]: those of the axis, and those of the legend."""
+    return LINE * (axis.count("\n") + sum(label.count("\n") + 1 for label in labels) + 1)
+
+
+def best_first(rows: Iterable[Row], higher: bool) -> list[Row]:
+    """Rows by their means."""
+    return sorted(rows, key=lambda row: row.estimate.mean, reverse=higher)
+
+
+def draw_quality(path: Path, results: Results, floors: Mapping[str, float]) -> None:
+    """Draw a panel per display, best method first; UserError where no record has the headline.
+
+    floors: what the floor scores, by its description.
+    """
+    score, panels = results.headline, {}
+    for condition in results.conditions:
+        if rows := best_first(_rows(results, condition), score.higher_is_better):
+            panels[condition] = rows
+    if not panels:
+        return
+    axis = f"{score.axis}{results.layout.text.axis}; dots: targets; mean with 95 % interval"
+    axis = medium().wrap(axis, 0.6 * medium().width)
+    labels = [
+        medium().wrap(f"floor: {name}, {score.with_unit(value)}", 0.8 * medium().width)
+        for name, value in floors.items()
+    ]
+    with style():
+        heights = [height_of(rows) for rows in panels.values()]
+        figure, drawn = stacked(list(panels), heights, footer_of(axis, labels))
+        for axes, rows in zip(drawn, panels.values(), strict=True):
+            draw_rows_of_dots(axes, rows)
+            for value, label, dashes in zip(floors.values(), labels, DASHES, strict=False):
+                axes.axvline(value, color=GREY, linestyle=dashes, linewidth=1.1, zorder=1, label=label)
+        drawn[-1].set_xlabel(axis)
+        if floors:
+            figure.legend(*drawn[0].get_legend_handles_labels(), loc="outside lower center", frameon=False)
+        save(figure, path)
+
+
+def _rows(results: Results, condition: str) -> Iterable[Row]:
+    """A row for every method with a score."""
+    score, looked = results.headline, looks(results.names)
+    for label in results.methods(condition):
+        values = results.values(label, condition)
+        estimate = results.estimate(values)
+        if estimate.n:
+            name = results.layout.marked(label)
+            yield Row(name, values, estimate, looked[label], score.estimate(estimate))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -12,22 +11,29 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from ..data.ranks import Ranks
-from .style import COLOURS, GREY, WIDTH, grid, new_figure, save, style
+from .look.medium import medium
+from .style import GREY, PALE, grid, new_figure, save, style
 
-ROW, FRAME = 34, 125
-NAME = 34  # characters of a method's name in a line, of which there are two at most
+ROW, FRAME, AGREEMENT = 34, 125, 240  # pixels: of a method, around all, and of what stands below
+NAMES = 0.27  # of the width, for the names of the methods
 NARROWEST = 0.05  # of a bar on the axis of Kendall's tau
-SHADES = LinearSegmentedColormap.from_list("shares", [(0.0, "white"), (0.75, COLOURS[0]), (1.0, "#003A5D")])
-DARK = 0.45  # share from which on figures in a cell are white
+SHADES = LinearSegmentedColormap.from_list("shares", [(0.0, "white"), (1.0, "#222222")])
+DARK = 0.55  # share from which on figures in a cell are white
 
 
 def draw_ranks(path: Path, ranks: Ranks) -> None:
     """Draw the places of the methods and the agreement of the draws side by side."""
     with style():
-        figure = new_figure(WIDTH, FRAME + ROW * max(4, len(ranks.methods)))
+        height = FRAME + ROW * max(4, len(ranks.methods))
+        figure = new_figure(medium().width, round(medium().scale * (height + AGREEMENT * medium().narrow)))
         figure.set_layout_engine("constrained", w_pad=0.08)
-        left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": [5, 3]})
-        figure.suptitle(ranks.swept.before, x=0.01, ha="left", weight="bold", fontsize=10, parse_math=False)
+        if medium().narrow:
+            left, right = figure.subplots(2, 1, height_ratios=[height, AGREEMENT])
+        else:
+            left, right = figure.subplots(1, 2, width_ratios=[5, 3])
+        figure.suptitle(
+            ranks.swept.before, x=0.01, ha="left", weight="bold", fontsize=medium().text + 1, parse_math=False
+        )
         _shares(left, ranks)
         _agreement(right, ranks)
         save(figure, path)
@@ -44,8 +50,8 @@ def _shares(axes: Axes, ranks: Ranks) -> None:
         axes.add_patch(
             Rectangle((position - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
         )
-    names = [textwrap.fill(label, NAME, max_lines=2, placeholder="...") for label in ranks.methods]
-    axes.set_yticks(range(count), names, parse_math=False, fontsize=8)
+    names = [medium().wrap(label, NAMES * medium().width) for label in ranks.methods]
+    axes.set_yticks(range(count), names, parse_math=False, fontsize=medium().note)
     axes.set_xticks(range(count), [str(rank) for rank in range(1, count + 1)])
     axes.set_xticks(np.arange(count + 1) - 0.5, minor=True)
     axes.set_yticks(np.arange(count + 1) - 0.5, minor=True)
@@ -62,7 +68,7 @@ def _agreement(axes: Axes, ranks: Ranks) -> None:
         return
     mean, step = ranks.tau, max(NARROWEST, 4 / (len(ranks.methods) * (len(ranks.methods) - 1)))
     steps, draws = np.unique(((1 - ranks.taus) / step).round(), return_counts=True)
-    axes.bar(1 - step * steps, draws, width=min(0.8 * step, 0.1), color=COLOURS[0])
+    axes.bar(1 - step * steps, draws, width=min(0.8 * step, 0.1), color=PALE)
     top = 1.22 * draws.max()
     ends = np.nan_to_num([[mean.mean - mean.low], [mean.high - mean.mean]])
     axes.errorbar([mean.mean], [0.93 * top], xerr=ends, fmt="o", color=GREY, markersize=5, capsize=3, elinewidth=1.2)

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import io
+import itertools
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import torch
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from ...core.errors import UserError
@@ -24,10 +33,20 @@ from ...metrics import match, score
 from ...optics import srgb_encode
 from ...optics.convolution import iris
 from ...study.opening import open_bench
+from .look.medium import DPI
+from .style import METADATA
 
+VERSION = 2  # of the drawing: sheets of another are drawn again
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1
-MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.05, "top": 0.92, "wspace": 0.46, "hspace": 0.27}
+MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.045, "top": 0.92, "wspace": 0.66, "hspace": 0.38}
+RAMP = 0.11  # cycles a pixel of the test ramp of a bench without a blaze
+# A PNG of so many colours of each kind, and of a cube for captures, is small enough to look at in a browser.
+SHADES = {"gray": 44, "viridis": 52, "magma": 40, "twilight": 40}
+LINES = (*COLOURS, "tab:orange", "tab:cyan")
+CUBE = (0, 85, 170, 255)
+AT_IRIS = ("horizontal [cycles / px]", "vertical [cycles / px]")
+SMALLEST_SHARE = 0.001  # of the light, from which on a zero order is drawn
 STEPS = 60  # of the hologram of the chart: it shows what the bench does, not what the method can
 
 
@@ -56,17 +75,44 @@ def save_sheet(workbench: CalibratedBench, note: str, path: Path, source: str = 
     """
     bench = workbench.bench
     with plt.rc_context({"font.size": 9, "axes.titlesize": 10}):
-        figure, axes = plt.subplots(3, 6, figsize=(25, 12))
+        figure, axes = plt.subplots(4, 5, figsize=(17, 13))
         figure.subplots_adjust(**MARGINS)  # a layout engine draws everything once more
         _panel_stages(axes.flat[:6], bench)
         _field_stages(axes.flat[6:14], bench)
-        _chart(axes.flat[14:], workbench)
+        _chart(axes.flat[14:19], workbench)
+        _effects(axes.flat[19], bench)
     figure.suptitle(f"{bench.profile.name}, version {bench.profile.version}: {bench.profile.description}\n{note}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    known = {"Software": None, **({"Description": source} if source else {})}
-    figure.savefig(path, dpi=100, metadata=known if path.suffix == ".png" else None)
+    if path.suffix == ".png":
+        _save_small(figure, path, source)
+    else:
+        figure.savefig(path, metadata=METADATA[path.suffix])
     plt.close(figure)
     return path
+
+
+def _save_small(figure: Figure, path: Path, source: str) -> None:
+    """A PNG of few colours, with a note of what it is drawn from."""
+    drawn, known = io.BytesIO(), PngInfo()
+    figure.savefig(drawn, format="png", dpi=DPI)
+    if source:
+        known.add_text("Description", source)
+    few = _of_few_colours(np.asarray(Image.open(drawn).convert("RGB")))
+    few.save(path, optimize=True, dpi=(DPI, DPI), pnginfo=known)
+
+
+def _of_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
+    """Pixels ``(h, w, 3)``, each with the nearest of the colours that all sheets share."""
+    ramps = (matplotlib.colormaps[name](np.linspace(0, 1, count))[:, :3] for name, count in SHADES.items())
+    named = np.round(255 * np.concatenate([*ramps, [to_rgb(colour) for colour in LINES]]))
+    palette = np.concatenate([named, [*itertools.product(CUBE, repeat=3)]]).astype(np.uint8)
+    packed = pixels.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
+    colours, places = np.unique(packed, return_inverse=True)
+    levels = np.stack([colours >> 16, colours >> 8 & 255, colours & 255], axis=1)
+    nearest = np.asarray(KDTree(palette).query(levels)[1], dtype=np.uint8)
+    picture = Image.fromarray(nearest[places].reshape(packed.shape))  # gray, until it has a palette
+    picture.putpalette(palette.tobytes())
+    return picture
 
 
 def _picture(
@@ -112,18 +158,23 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
 
 
 def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
-    """A linear phase ramp as commanded and as it stands on the panel, along one row of sub-samples."""
-    height, width = bench.spec.shape
-    ramp = (2 * torch.pi * 0.11 * torch.arange(width, dtype=torch.float32)).expand(height, width)
+    """A ramp as commanded and as it stands on the panel, along a line of sub-samples: the bench's blaze, if any."""
+    cycles = max(bench.profile.panel.blaze, key=abs)
+    along = 0 if cycles and cycles == bench.profile.panel.blaze[0] else 1
+    shape, count = bench.spec.shape, 30 * bench.samples
+    turns = torch.remainder((cycles or RAMP) * torch.arange(shape[along], dtype=torch.float64), 1.0)
+    line = 2 * torch.pi * turns.float()
+    ramp = (line[:, None] if along == 0 else line[None]).expand(shape)
     level = torch.remainder(torch.round(ramp / (2 * torch.pi) * 2**bench.spec.bits), 2**bench.spec.bits)
     phase = bench.profile.lut.phase(level, bench.spec.bits, bench.channels[GREEN].light.lut_gain, GREEN)
-    fine = bench.profile.crosstalk.apply(phase, bench.crosstalk)[:, height // 2]
-    row = fine.reshape(bench.samples, bench.samples, width)[bench.samples // 2].T.reshape(-1)
-    count = 30 * bench.samples
-    columns = (torch.arange(count) - (bench.samples - 1) / 2) / bench.samples
-    axis.step(torch.arange(30), torch.remainder(ramp[0, :30], 2 * torch.pi) / torch.pi, where="mid", label="commanded")
-    axis.plot(columns, row[:count] / torch.pi, label="on the panel")
-    axis.set(title="a blaze after look-up table and crosstalk", xlabel="column [px]", ylabel="phase [pi rad]")
+    fine = bench.profile.crosstalk.apply(phase, bench.crosstalk).view(bench.samples, bench.samples, *shape)
+    middle = bench.samples // 2
+    seen = fine[:, middle, :, shape[1] // 2] if along == 0 else fine[middle, :, shape[0] // 2]
+    places = (torch.arange(count) - (bench.samples - 1) / 2) / bench.samples
+    axis.step(torch.arange(30), 2 * turns[:30], where="mid", label="commanded")
+    axis.plot(places, seen.T.reshape(-1)[:count] / torch.pi, label="on the panel")
+    named = f"the blaze, {cycles:g} cycles / px" if cycles else f"a test ramp, {RAMP:g} cycles / px (no blaze here)"
+    axis.set(title=named, xlabel=f"{('row', 'column')[along]} [px]", ylabel="phase [pi rad]")
     axis.legend(fontsize=8)
 
 
@@ -149,7 +200,7 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
         "aberration in the iris, green",
         "waves",
         extent=(-0.5, 0.5, 0.5, -0.5),
-        axes=("horizontal [cycles / px]", "vertical [cycles / px]"),
+        axes=AT_IRIS,
     )
     _veil(axes[5], bench)
     _picture(axes[6], bench.response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
@@ -176,7 +227,7 @@ def _veil(axis: Axes, bench: SimulatedBench) -> None:
 
 
 def _chart(axes: list[Axes], workbench: CalibratedBench) -> None:
-    """A flat phase (zero order and fringes), sensor noise, and a capture of a chart beside its target."""
+    """A flat phase, a chart's light in the plane of the iris, sensor noise, and its capture beside its target."""
     spec, bench = workbench.spec, workbench.bench
     flat = torch.zeros(3, *spec.shape)
     with torch.no_grad():
@@ -188,21 +239,53 @@ def _chart(axes: list[Axes], workbench: CalibratedBench) -> None:
     patch = torch.ones(40, 40)
     normal = torch.randn(patch.shape, generator=draw)
     noise = [float(sensor.expose(patch * level, sensor.full_well, patch, normal).std()) for level in levels]
-    axes[1].plot(levels * sensor.full_well, noise)
-    axes[1].set(title="sensor noise", xlabel="signal [electrons]", ylabel="standard deviation [DN]")
+    axes[2].plot(levels * sensor.full_well, noise)
+    axes[2].set(title="sensor noise", xlabel="signal [electrons]", ylabel="standard deviation [DN]")
     chart = Charts(names=("tv_lines",))
     target = chart.load("tv_lines", spec.region.shape)
     method = Wirtinger(iterations=STEPS)
     phase = method.solve(target[None], workbench.for_method(method, "wirtinger", target, "chart", 0))[0]
+    _zero_order(axes[1], bench, phase[GREEN])
     shot = workbench.photograph(phase, target, "chart", 0)
     psnr = score(shot.image, target, metrics=("psnr",))["psnr_linear"]
     for axis, image, title in (
-        (axes[2], target, "chart: target"),
-        (
-            axes[3],
-            match(shot.image, target)[0],
-            f"chart: capture, {STEPS} steps of Wirtinger holography, {psnr:.1f} dB",
-        ),
+        (axes[3], target, "chart: target"),
+        (axes[4], match(shot.image, target)[0], f"chart: capture, {STEPS} steps of Wirtinger, {psnr:.1f} dB"),
     ):
         axis.imshow(srgb_encode(torch.as_tensor(image)).permute(1, 2, 0).float().numpy(), interpolation="nearest")
         axis.set(title=title, xlabel="column [px]", ylabel="row [px]")
+
+
+def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
+    """The power of a hologram's light in the plane of the iris, with the iris and the place of the zero order.
+
+    phase: ``(H, W)`` [rad]. The picture is centred, so that a blaze moves the zero order to its negative.
+    """
+    profile, pitch = bench.profile, bench.spec.pitch
+    with torch.no_grad():
+        field = bench.channels[GREEN].light.in_torch(phase, 1.0).mean((0, 1))
+    power = torch.fft.fftshift(torch.fft.fft2(field)).abs() ** 2
+    decibels = 10 * torch.log10((power / power.max()).clamp(min=1e-5))
+    _picture(axis, decibels, "", "power / its peak [dB]", "gray", (-0.5, 0.5, 0.5, -0.5), AT_IRIS)
+    if profile.panel.pupil:
+        axis.add_patch(Circle((0, 0), profile.panel.pupil / 2, fill=False, edgecolor="tab:orange"))
+    share = float(bench.unmodulated.mean().abs() ** 2)
+    up, across = (-cycles for cycles in profile.panel.blaze)
+    if share < SMALLEST_SHARE:
+        axis.set_title("light in the iris plane: no zero order")
+        return
+    passed = float(iris(torch.tensor(up / pitch), torch.tensor(across / pitch), pitch, profile.panel.pupil)) > 0.5
+    axis.plot(across, up, marker="o", markersize=14, markerfacecolor="none", markeredgecolor="tab:cyan")
+    axis.set_title(f"zero order, {100 * share:.0f} %: {'passes' if passed else 'stopped by'} the iris")
+
+
+def _effects(axis: Axes, bench: SimulatedBench) -> None:
+    """Every effect of the bench, in the order in which light meets them."""
+    names = [effect.name.replace("_", " ") for effect in bench.profile.effects()]
+    axis.set_axis_off()
+    axis.set_title("effects, in the order of the light")
+    half = -(-len(names) // 2)
+    for left, start in ((-0.2, 0), (0.45, half)):
+        numbered = enumerate(names[start : start + half], start=start + 1)
+        words = "\n".join(f"{number}  {name}" for number, name in numbered)
+        axis.text(left, 0.97, words, va="top", linespacing=1.3, parse_math=False, transform=axis.transAxes)

@@ -1,7 +1,11 @@
-"""One look for every figure: size in pixels, colours that colour-blind readers can tell apart, repeatable bytes."""
+"""The form that all figures share: sizes, fonts, lines behind the data, repeatable bytes.
+
+Colours and markers of methods are in ``look.methods``, sizes of the screen and of print in ``look.medium``.
+"""
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,14 +20,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-DPI = 100
-WIDTH = 900  # pixels of most figures
-QUALITY = 82  # of a JPEG
+from .look.medium import DPI, medium
 
-# Okabe & Ito's palette without its yellow, which is too faint for marks on white.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6A3D9A", "#7F5539")
+QUALITIES = (92, 88, 84, 80, 76, 72, 68, 64, 60, 55, 50, 45, 40)  # of a JPEG: the first that is small enough
+LARGEST = 300_000  # bytes of a page of pictures
+
 GREY = "#666666"
 PALE = "#BBBBBB"
+# Of what is no method: quantities that are learned, packages that are timed.
+SHADES = ("#000000", "#777777", "#AAAAAA")
 
 
 @contextmanager
@@ -33,11 +38,15 @@ def style() -> Iterator[None]:
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(
             {
-                "font.size": 9,
-                "axes.titlesize": 10,
+                "font.size": medium().text,
+                "axes.titlesize": medium().text + (medium().text > medium().note),
                 "axes.spines.top": False,
                 "axes.spines.right": False,
                 "hatch.linewidth": 0.6,
+                # Text stays text in print, and the names of its parts do not depend on chance.
+                "pdf.fonttype": 42,
+                "svg.fonttype": "none",
+                "svg.hashsalt": "holobench_eval",
             }
         )
         yield
@@ -50,12 +59,10 @@ def new_figure(width: int, height: int) -> Figure:
     return figure
 
 
-def stacked(
-    titles: Sequence[str], heights: Sequence[int], footer: int, width: int = WIDTH
-) -> tuple[Figure, list[Axes]]:
-    """A column of panels with their titles; ``heights``, ``footer`` and ``width`` in pixels."""
+def stacked(titles: Sequence[str], heights: Sequence[int], footer: int) -> tuple[Figure, list[Axes]]:
+    """A column of panels with their titles; ``heights`` and ``footer`` in pixels of the screen."""
     ratios = list(heights) if len(set(heights)) > 1 else None
-    figure = new_figure(width, sum(heights) + footer)
+    figure = new_figure(medium().width, round(medium().scale * (sum(heights) + footer)))
     figure.set_layout_engine("constrained")
     panels = figure.subplots(len(titles), 1, squeeze=False, height_ratios=ratios)[:, 0]
     for axes, title in zip(panels, titles, strict=True):
@@ -69,22 +76,32 @@ def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     axes.set_axisbelow(True)
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write the figure without the version stamp, so that equal figures have equal bytes.
+METADATA = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 
-    As PNG, or as JPEG where the name says so: pages of speckle are ten times as large as PNG.
-    """
+
+def save(figure: Figure, path: Path) -> None:
+    """Write the figure as every file of the medium, without dates and versions: equal figures have equal bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    if path.suffix == ".jpg":
-        figure.savefig(path, dpi=DPI, pil_kwargs={"quality": QUALITY})
-    else:
-        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    for suffix in medium().suffixes:
+        figure.savefig(path.with_suffix(suffix), dpi=DPI, metadata=METADATA[suffix])
 
 
 def save_picture(pixels: NDArray[np.uint8], path: Path) -> None:
-    """Write pixels ``(h, w, 3)`` as ``save`` writes a figure, without drawing them first."""
+    """Write pixels ``(h, w, 3)``: as PNG, or as JPEG where the name says so.
+
+    A JPEG keeps colours at full resolution (4:4:4) and has the best of ``QUALITIES`` that makes it small enough.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(pixels).save(path, quality=QUALITY, dpi=(DPI, DPI))
+    picture = Image.fromarray(pixels)
+    if path.suffix == ".png":
+        picture.save(path, dpi=(DPI, DPI), optimize=True)
+        return
+    for quality in QUALITIES:
+        encoded = io.BytesIO()
+        picture.save(encoded, "JPEG", quality=quality, subsampling=0, dpi=(DPI, DPI))
+        if encoded.tell() <= LARGEST:
+            break
+    path.write_bytes(encoded.getvalue())
 
 
 def slugs(names: Sequence[str]) -> dict[str, str]:

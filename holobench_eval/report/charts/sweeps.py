@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from .style import COLOURS, GREY, grid, save, stacked, style
+from .labels import at_right
+from .look.medium import medium
+from .look.methods import Look
+from .style import GREY, grid, save, stacked, style
 
-PANEL, FOOTER = 330, 60
-MARKS = "osD^vP*X"
+PANEL, FOOTER = 330, 10
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class Curve:
     label: str
     mean: tuple[float, ...]
     reach: tuple[tuple[float, float], ...]
+    look: Look
     dashed: bool = False
 
 
@@ -31,7 +33,7 @@ class Panel:
     """A sweep on one display.
 
     positions: of the points on the axis; ticks: their names where they are no numbers (None: numbers); nominal: where
-    nothing is changed, for a vertical line.
+    nothing is changed, for a vertical line; floor: mean of a constant image, for a horizontal one.
     """
 
     title: str
@@ -40,29 +42,24 @@ class Panel:
     curves: tuple[Curve, ...]
     ticks: tuple[str, ...] | None = None
     nominal: float | None = None
+    floor: float | None = None
 
 
 def draw_sweep(path: Path, panels: Sequence[Panel], quality: str) -> None:
     """Draw a panel per display. quality: name of the headline metric with its unit."""
-    labels = list(dict.fromkeys(curve.label for panel in panels for curve in panel.curves))
-    looks = {label: (COLOURS[i % len(COLOURS)], MARKS[i % len(MARKS)]) for i, label in enumerate(labels)}
-    rows = -(-len(labels) // 4)
     with style():
-        figure, drawn = stacked([panel.title for panel in panels], [PANEL] * len(panels), FOOTER + 16 * rows)
-        legend: dict[str, Artist] = {}
+        figure, drawn = stacked([panel.title for panel in panels], [PANEL] * len(panels), FOOTER)
         for axes, panel in zip(drawn, panels, strict=True):
-            _draw_curves(axes, panel, looks)
+            _draw_curves(axes, panel)
             axes.set_ylabel(quality.replace(", of ", "\nof "))
-            handles, names = axes.get_legend_handles_labels()
-            legend |= dict(zip(names, handles, strict=True))
-        figure.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=4, frameon=False)
         save(figure, path)
 
 
-def _draw_curves(axes: Axes, panel: Panel, looks: dict[str, tuple[str, str]]) -> None:
+def _draw_curves(axes: Axes, panel: Panel) -> None:
+    """The curves, and their names to the right at the height of their last points."""
     spread = np.ptp(panel.positions) / 250 if len(panel.positions) > 1 else 0.0
+    ends: list[tuple[str, float]] = []
     for index, curve in enumerate(panel.curves):
-        colour, mark = looks[curve.label]
         positions = np.array(panel.positions) + (index - (len(panel.curves) - 1) / 2) * (
             spread if panel.ticks is None else 0.07
         )
@@ -70,20 +67,26 @@ def _draw_curves(axes: Axes, panel: Panel, looks: dict[str, tuple[str, str]]) ->
             positions,
             curve.mean,
             yerr=np.nan_to_num(np.array(curve.reach).T),
-            color=GREY if curve.dashed else colour,
-            marker=mark,
-            markersize=5,
-            markeredgecolor="white",
-            markeredgewidth=0.5,
+            color=curve.look.colour,
+            marker=curve.look.marker,
+            markersize=6.5 * medium().scale ** 2,
+            markerfacecolor=curve.look.face,
+            markeredgecolor=curve.look.colour,
             linewidth=1.5 if panel.ticks is None else 0,
             linestyle="--" if curve.dashed else "-",
             elinewidth=0.8,
             capsize=2,
-            label=curve.label,
         )
+        known = [value for value in curve.mean if np.isfinite(value)]
+        ends += [(curve.label, known[-1])] if known else []
+    if panel.floor is not None:
+        axes.axhline(panel.floor, color=GREY, linewidth=1.1, linestyle=(0, (3, 3)), zorder=1)
+        ends.append(("constant image", panel.floor))
     if panel.nominal is not None:
         axes.axvline(panel.nominal, color="black", linewidth=0.8, linestyle=":")
     if panel.ticks is not None:
         axes.set_xticks(panel.positions, panel.ticks, parse_math=False)
-    axes.set_xlabel(panel.axis)
+    axes.set_xlabel(medium().wrap(panel.axis, 0.6 * medium().width))
+    axes.margins(x=0.03)
     grid(axes)
+    at_right(axes, ends, medium().scale * (PANEL - 70))

@@ -13,18 +13,19 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from ...study.artifacts import Round
-from .style import COLOURS, PALE, WIDTH, grid, new_figure, save, style
+from .look.medium import medium
+from .style import PALE, SHADES, grid, new_figure, save, style
 
 Rounds = tuple[str, tuple[Round, ...]]  # a training's name and its rounds
 
 COLUMNS = 3
 A_PAGE = 6
-CHARACTER = 8.5  # width in pixels of an average character of a panel's title
+NARROWEST = 200  # pixels of a panel
 CURVES = 12  # up to so many trainings have a panel each; more are rows of one chart of their last rounds
 LINES = (
-    ("predicted", "predicted picture, against the target", COLOURS[0], "o"),
-    ("captured", "captured picture, against the target", COLOURS[1], "s"),
-    ("fidelity", "prediction, against the capture (fidelity)", COLOURS[2], "^"),
+    ("predicted", "predicted picture, against the target", SHADES[0], "o"),
+    ("captured", "captured picture, against the target", SHADES[1], "s"),
+    ("fidelity", "prediction, against the capture (fidelity)", SHADES[2], "^"),
 )
 
 
@@ -70,10 +71,10 @@ def _limits(trainings: Sequence[Rounds]) -> _Limits:
 
 def curves(path: Path, trainings: Sequence[Rounds], limits: _Limits) -> None:
     """A panel per training: the three figures against the captures taken, a mark per round."""
-    columns = min(COLUMNS, len(trainings))
+    columns = min(COLUMNS, len(trainings), medium().width // NARROWEST)
     rows = -(-len(trainings) // columns)
     with style():
-        figure = new_figure(WIDTH, 60 + 270 * rows)
+        figure = new_figure(medium().width, round(medium().scale * (60 + 270 * rows)))
         figure.set_layout_engine("constrained")
         panels = figure.subplots(rows, columns, squeeze=False, sharey=True)
         for index, axes in enumerate(panels.flat):
@@ -84,7 +85,7 @@ def curves(path: Path, trainings: Sequence[Rounds], limits: _Limits) -> None:
             _curve(axes, steps, limits)
             title = textwrap.fill(
                 name,
-                int(WIDTH / columns / CHARACTER),
+                medium().characters(0.85 * medium().width / columns),
                 max_lines=2,
                 placeholder="...",
                 break_on_hyphens=False,
@@ -112,7 +113,7 @@ def last_rounds(path: Path, trainings: Sequence[Rounds]) -> None:
     """A row per training with the three figures after its last round."""
     heights = np.arange(len(trainings))
     with style():
-        figure = new_figure(WIDTH, 110 + 26 * len(trainings))
+        figure = new_figure(medium().width, round(medium().scale * (110 + 26 * len(trainings))))
         figure.set_layout_engine("constrained")
         axes = figure.subplots()
         last = [rounds[-1] for _, rounds in trainings]

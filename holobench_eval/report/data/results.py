@@ -79,6 +79,12 @@ class Results:
         return list(dict.fromkeys([*self.layout.targets, *self.frame["target"]]))
 
     @cached_property
+    def names(self) -> dict[str, str]:
+        """The registered name of every method, or its file and class, by label."""
+        rows = self.frame.drop_duplicates("method")
+        return {str(label): str(name) for label, name in zip(rows["method"], rows["name"], strict=True)}
+
+    @cached_property
     def clusters(self) -> NDArray[np.str_]:
         """``(targets,)`` names: targets of one cluster, such as crops of one photograph, are not independent."""
         known = clusters_in(self.frame)

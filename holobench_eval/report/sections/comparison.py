@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..charts.comparison import draw_comparison, tile_size
-from ..charts.gallery import Column, chunks, error_limit, error_map, spread
+from ..charts.comparison import ZOOM, draw_comparison, tile_size
+from ..charts.gallery import Column, chunks, error_limit, error_map, most_detailed, spread
 from ..charts.style import slugs
+from ..data.categories import OFFLINE, ONLINE
 from ..data.results import Results
 from ..markdown import heading
 from ..section import Blocks, Figures, Report, Section
 
-TARGETS_SHOWN = 4
+TARGETS_SHOWN = 2
 TARGETS_A_PAGE = 4
-METHODS_A_PAGE = 8
-PIXELS = 5e6  # of all comparison pages of a condition, at most: full-panel captures are drawn for fewer targets
+METHODS_A_PAGE = 4
+PIXELS = 1e6  # of a page, about: of full-panel captures a single target is drawn
 ABSENT_NAMED = 6
 
 
@@ -38,11 +39,16 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
 
 def _comparison(report: Report, condition: str, stem: str) -> Iterator[tuple[Path, str]]:
     results, thumbnails, text = report.results, report.thumbnails, report.layout.text
-    targets, methods = thumbnails.targets, results.methods(condition)
+    targets, methods = thumbnails.targets, _best_first(results, condition)
     sheets = pages_of_targets(report, condition)
     drawn = [target for sheet in sheets for target in sheet]
     tiles = {(name, target): thumbnails.tile(name, condition, target) for name in methods for target in drawn}
-    errors = [error_map(tile.picture, targets[key[1]]) for key, tile in tiles.items() if tile.picture is not None]
+    windows = {target: most_detailed(targets[target]) for target in drawn}
+    errors = [
+        error_map(windows[target].of(tile.picture), windows[target].of(targets[target]))
+        for (_, target), tile in tiles.items()
+        if tile.picture is not None
+    ]
     if not errors:
         return
     pages = [(rows, labels) for rows in sheets for labels in chunks(methods, METHODS_A_PAGE)]
@@ -55,12 +61,23 @@ def _comparison(report: Report, condition: str, stem: str) -> Iterator[tuple[Pat
         yield path, _caption(results, condition, page, len(drawn))
 
 
+def _best_first(results: Results, condition: str) -> list[str]:
+    """The methods of a display: the best, the baseline and the oracle, which share the first page, then the others."""
+    first = [
+        *results.ranking(condition, categories=(*OFFLINE, ONLINE))[:1],
+        results.layout.baseline,
+        results.oracle(condition),
+    ]
+    methods = results.methods(condition)
+    return list(dict.fromkeys([*(label for label in first if label in methods), *methods]))
+
+
 def _caption(results: Results, condition: str, page: str, drawn: int) -> str:
     total, text = len(results.targets), results.layout.text
     chosen = "every target" if drawn == total else f"{drawn} of {total} targets, evenly spaced from worst to best"
     return (
         f"{text.scored.capitalize()}s on {condition}{page}: {chosen}. {text.picture}; below, the most detailed window "
-        f"of the {text.truth} at twice the scale, and the absolute error against the {text.truth} in sRGB."
+        f"of the {text.truth} at {ZOOM} times the scale, and in it the absolute error against the {text.truth} in sRGB."
     )
 
 
@@ -86,8 +103,8 @@ def _selection(report: Report, condition: str) -> list[str]:
     """All targets if they fit; else evenly spaced ones from worst to best by their mean over methods."""
     targets = report.thumbnails.targets
     tall, wide = tile_size(next(iter(targets.values())).shape)
-    row = 1.5 * tall * wide * (1 + len(report.results.methods(condition)))
-    most = int(min(TARGETS_SHOWN, max(2, PIXELS // row)))
+    row = 1.5 * tall * wide * (1 + min(METHODS_A_PAGE, len(report.results.methods(condition))))
+    most = int(min(TARGETS_SHOWN, max(1, PIXELS // row)))
     if len(targets) <= most:
         return list(targets)
     return spread(report.thumbnails.by_quality(condition), most)

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ...study.plan import REFERENCE
 from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
+from ..charts.look.methods import looks
 from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
-from ..data.marks import marked
+from ..data.marks import CONSTANT, marked
 from ..data.results import Results
 from ..data.tables import DONE, MEMORY_COLUMN, total_captures
 from ..data.text import number, percent, words
@@ -126,7 +128,8 @@ def draw(results: Results, folder: Path) -> Iterator[tuple[Path, str]]:
         panels = [panel for condition in results.conditions if (panel := _frontier(results, condition, cost)).marks]
         if panels and wanted(results, [mark for panel in panels for mark in panel.marks]):
             path = folder / cost.file
-            draw_frontiers(path, panels, f"{results.headline.axis}{results.layout.text.axis}", cost.axis)
+            axis = f"{results.headline.axis}{results.layout.text.axis}"
+            draw_frontiers(path, panels, axis, cost.axis, looks(results.names))
             yield path, _caption(results, panels, cost)
 
 
@@ -150,14 +153,14 @@ def _times_enough(_: Results, marks: list[Mark]) -> bool:
 
 def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
     """A display's panel; a method that lacks a target has no mean to compare, and is not in it."""
-    registered = results.frame.drop_duplicates("method").set_index("method")["name"]
     marks = tuple(
         Mark(
             label=name,
-            group=str(registered[name]),
+            group=results.names[name],
             category=results.layout.category(name),
             cost=spent,
             quality=float(results.values(name, condition).mean()),
+            captures=_captures(results, name, condition),
             **_ends(results, name, condition),
         )
         for name in results.methods(condition)
@@ -165,13 +168,15 @@ def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
         if np.isfinite(spent := cost.spent(results, name, condition))
     )
     baseline, oracle = results.layout.baseline, results.oracle(condition)
-    floor = baseline if baseline in results.methods(condition) and results.is_complete(baseline, condition) else None
+    known = baseline in results.methods(condition) and results.is_complete(str(baseline), condition)
+    has_constant = CONSTANT in results.floors and results.has_floor(condition)
     return Frontier(
         condition,
         marks,
         higher=results.headline.higher_is_better,
-        floor=_line(results, floor, condition, "baseline", band=False) if floor else None,
+        baseline=_line(results, str(baseline), condition, "baseline", band=False) if known else None,
         oracle=_line(results, oracle, condition, "ceiling", band=True) if oracle else None,
+        constant=_constant(results) if has_constant else None,
     )
 
 
@@ -193,15 +198,21 @@ def _line(results: Results, name: str, condition: str, role: str, band: bool) ->
     return Line(f"{role}: {name}, {results.headline.with_unit(mean)}", mean, **ends)
 
 
+def _constant(results: Results) -> Line:
+    """The floor: the mean of a constant image."""
+    mean = float(results.row(CONSTANT, REFERENCE)[results.headline.key])
+    return Line(f"constant image, {results.headline.with_unit(mean)}", mean)
+
+
 def _caption(results: Results, panels: list[Frontier], cost: Cost) -> str:
     """What is drawn, what the bars are, and who is missing."""
     online = ", separately for methods with and without the camera for the scored image"
     sentences = [
         f"{results.headline.axis}{results.layout.text.axis}, against {cost.words}.",
-        "Lines join the rows of one registered method.",
+        "Lines join rows of one method that differ in their captures.",
         f"Pale steps: the best quality for a cost{online * (ONLINE in results.categories)}.",
     ]
-    if any(panel.floor for panel in panels):
+    if any(panel.baseline for panel in panels):
         sentences.append(
             "Bars: 95 % interval of the paired mean difference to the baseline; a bar clear of the baseline's line is "
             "a difference. The tables hold the intervals of the means themselves."

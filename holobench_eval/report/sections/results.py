@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from ...study.plan import REFERENCE
-from ..charts.quality import Chart, quality_bars, target_dots
+from ..charts import paired
+from ..charts.quality import draw_quality
+from ..charts.style import slugs
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.tables import DONE, MEDIAN, STOPPED_COLUMN
@@ -136,34 +137,24 @@ def _floors(results: Results) -> Markdown:
 
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
-    results, conditions = report.results, report.results.conditions
-    score, text = results.headline, report.layout.text
-    rows = results.table[results.table["condition"].isin(conditions)]
-    if score.key not in rows or not np.isfinite(rows[score.key]).any():
+    results, text = report.results, report.layout.text
+    if results.done.empty:
         return
+    for condition, stem in slugs(results.conditions).items():
+        path = report.figures / f"quality-paired-{stem}.png"
+        if paired.draw(results, condition, path):
+            yield path, paired.caption(results, condition)
     floors = {
-        text.floor_name(name): float(results.row(name, REFERENCE)[score.key])
+        text.floor_name(name): float(results.row(name, REFERENCE)[results.headline.key])
         for name in ("floor_constant", "floor_speckle")
-        if name in results.floors and all(map(results.has_floor, conditions))
-    }
-    chart = Chart(score, report.layout, tuple(dict.fromkeys(rows["method"])), floors)
-    path = report.figures / "quality-bars.png"
-    quality_bars(path, rows, chart)
-    lines = f"{' Vertical lines: the floor.' * bool(floors)}{' Hatched: the oracle.' * bool(report.layout.privileged)}"
-    yield path, f"{chart.axis}, by method and display. Mean over targets with its 95 % interval.{lines}"
-
-    frames = {
-        condition: pd.DataFrame(
-            {name: results.values(name, condition) for name in results.methods(condition)}, index=results.targets
-        ).dropna(axis=1, how="all")
-        for condition in conditions
+        if name in results.floors and all(map(results.has_floor, results.conditions))
     }
     path = report.figures / "quality-by-target.png"
-    target_dots(path, {condition: frame for condition, frame in frames.items() if not frame.empty}, chart)
+    draw_quality(path, results, floors)
     yield (
         path,
-        f"{chart.axis}, of every target. Dots are targets, lines join a target across methods (a gap is a hole), bars "
-        "are means.",
+        f"{results.headline.axis}{text.axis}, by method and display. Small dots: targets, at the same height in every "
+        "row; marks and bars: mean and its 95 % interval over clusters of targets; vertical lines: the floor.",
     )
 
 

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...study.plan import REFERENCE
+from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..charts.sweeps import Curve, Panel, draw_sweep
 from ..data.categories import OFFLINE, ONLINE
+from ..data.marks import CONSTANT
 from ..data.results import Results
 from ..data.statistics import Estimate
 from ..data.sweeps import SMALL, Sweep
@@ -243,11 +246,12 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
 
 def _panel(sweep: Sweep) -> Panel:
     kind, points = sweep.kind, sweep.named_points
-    curves = []
+    results, looked, curves = sweep.results, looks(sweep.results.names), []
     for label in sweep.methods:
         means = tuple(sweep.mean(label, condition).mean for _, condition in points)
         reaches = tuple(_reach(sweep, label, condition) for _, condition in points)
-        curves.append(Curve(label, means, reaches, dashed=label == sweep.results.layout.baseline))
+        curves.append(Curve(label, means, reaches, looked[label], dashed=label == results.layout.baseline))
+    has_floor = CONSTANT in results.floors and results.has_floor(sweep.swept.before)
     return Panel(
         title=sweep.swept.before,
         axis=f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}",
@@ -255,6 +259,7 @@ def _panel(sweep: Sweep) -> Panel:
         curves=tuple(curves),
         ticks=None if kind.numeric else tuple(value_text(value) for value, _ in points),
         nominal=kind.nominal,
+        floor=float(results.row(CONSTANT, REFERENCE)[results.headline.key]) if has_floor else None,
     )
 
 
@@ -286,9 +291,8 @@ def _chosen(sweep: Sweep) -> list[str]:
     """At most ``MOST_ROWS`` methods: the baseline, the paper's, then the best of the others on the display before the
     change, without the oracle."""
     results, before = sweep.results, sweep.swept.before
-    registered = results.frame.drop_duplicates("method").set_index("method")["name"]
     first = [label for label in sweep.methods if label == results.layout.baseline]
-    paper = [label for label in sweep.methods if registered[label] == "hil"]
+    paper = [label for label in sweep.methods if results.names[label] == "hil"]
     ranked = results.ranking(before, categories=(*OFFLINE, ONLINE))
     others = [label for label in ranked if label in sweep.methods]
     return list(dict.fromkeys([*first, *paper, *others]))[:MOST_ROWS]

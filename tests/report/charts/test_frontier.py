@@ -1,3 +1,5 @@
+from collections import defaultdict
+
 import matplotlib.axes
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from skimage.io import imread
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.charts.frontier import Costs, Frontier, Mark, draw_frontiers
 from holobench_eval.report.charts.labels import Names
+from holobench_eval.report.charts.look.methods import look
 from holobench_eval.report.charts.style import new_figure
 from holobench_eval.report.sections.leaderboard import draw
 from tests.support import budget_study as budget
@@ -14,8 +17,12 @@ from tests.support import budget_study as budget
 NAN = float("nan")
 
 
-def mark(label, cost, quality, category="calibrated", group=""):
-    return Mark(label, group or label, category, cost, quality, quality - 0.5, quality + 0.5)
+LOOKED = defaultdict(lambda: look("sgd"))
+
+
+def mark(label, cost, quality, category="calibrated", group="", captures=None):
+    spent = cost if captures is None else captures
+    return Mark(label, group or label, category, cost, quality, quality - 0.5, quality + 0.5, spent)
 
 
 @pytest.fixture(scope="module")
@@ -70,22 +77,42 @@ def test_rows_of_one_method_are_joined_by_their_captures_and_named_once(tmp_path
     )
     same = [mark(str(cost), cost, quality, group="m.py:Same") for cost, quality in ((100, 22), (10, 20), (30, 21))]
     marks = (*same, mark("other", 10, 21))
-    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "captures")
+    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "captures", LOOKED)
     assert [text for text, *_ in drawn] == ["Same", "other"]
     joined = [given for given in lines if list(given[1]) == [20, 21, 22]]
     assert len(joined) == 1
     assert joined[0][0] == pytest.approx([1, 1.4771, 2], rel=1e-4)
 
 
+def test_variants_that_differ_in_something_else_than_captures_are_not_joined(tmp_path, drawn, monkeypatch):
+    lines = []
+    plot = matplotlib.axes.Axes.plot
+    monkeypatch.setattr(
+        matplotlib.axes.Axes, "plot", lambda self, *given, **k: lines.append(given) or plot(self, *given, **k)
+    )
+    seconds = {"no L1": (3, 20), "no L2": (10, 22), "no start": (30, 21)}
+    marks = tuple(mark(label, *where, group="hil", captures=88) for label, where in seconds.items())
+    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "seconds", LOOKED)
+    assert not [given for given in lines if list(given[1]) == [20, 22, 21]]
+    assert sorted(text for text, *_ in drawn) == sorted(seconds)
+
+
+def test_variants_that_stand_side_by_side_share_a_name(tmp_path, drawn):
+    crowd = [mark(f"variant {number}", 10 + number / 50, 20, group="hil", captures=88) for number in range(6)]
+    marks = (*crowd, mark("apart", 100, 15, group="hil", captures=88))
+    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "seconds", LOOKED)
+    assert sorted(text for text, *_ in drawn) == ["apart", "hil, 6 variants"]
+
+
 def test_two_rows_of_one_method_are_each_named(tmp_path, drawn):
     marks = (mark("wirtinger", 3, 17, group="w"), mark("wirtinger, no offset", 2.9, 19, group="w"))
-    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "seconds")
+    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "seconds", LOOKED)
     assert sorted(text for text, *_ in drawn) == ["wirtinger", "wirtinger, no offset"]
 
 
 def test_rows_of_one_method_that_cost_the_same_are_each_named(tmp_path, drawn):
     marks = (mark("short", 0, 20, group="w"), mark("long", 0, 21, group="w"), mark("other", 10, 21))
-    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "captures")
+    draw_frontiers(tmp_path / "x.png", [Frontier("bench", marks)], "PSNR [dB]", "captures", LOOKED)
     assert sorted(text for text, *_ in drawn) == ["long", "other", "short"]
 
 
@@ -127,7 +154,7 @@ def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_p
     assert np.isnan(marks["wirtinger"].low)
     assert "oracle" not in marks
     assert seen[0][0].oracle.label.startswith("ceiling: oracle, ")
-    assert seen[0][0].floor.label.startswith("baseline: wirtinger, ")
+    assert seen[0][0].baseline.label.startswith("baseline: wirtinger, ")
 
 
 def test_a_method_that_lacks_a_target_is_omitted_and_named(tmp_path, monkeypatch):

@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from matplotlib import colormaps
+from PIL import Image
 
 from holobench_eval.report.charts.comparison import HEADER, SIDE, draw_comparison, tile_size
 from holobench_eval.report.charts.gallery import (
@@ -7,12 +9,11 @@ from holobench_eval.report.charts.gallery import (
     Tile,
     error_limit,
     error_map,
-    halved,
     load_picture,
     most_detailed,
     spread,
 )
-from holobench_eval.report.charts.style import slugs
+from holobench_eval.report.charts.style import LARGEST, save_picture, slugs
 from tests.support import synthetic_study as synthetic
 
 
@@ -22,13 +23,13 @@ def noise(size, seed=0):
 
 def test_the_enlarged_window_is_the_most_detailed_one():
     target = np.full((64, 64, 3), 0.5)
-    target[40:52, 8:20] = noise(12)
+    target[40:45, 8:13] = noise(5)
     crop = most_detailed(target)
-    assert (crop.height, crop.width) == (16, 16)
+    assert (crop.height, crop.width) == (7, 7)
     assert crop.top <= 40
-    assert crop.top + 16 >= 52
+    assert crop.top + 7 >= 45
     assert crop.left <= 8
-    assert crop.left + 16 >= 20
+    assert crop.left + 7 >= 13
 
 
 def test_of_equally_detailed_windows_the_first_is_taken():
@@ -36,10 +37,24 @@ def test_of_equally_detailed_windows_the_first_is_taken():
     assert (crop.top, crop.left) == (0, 0)
 
 
-def test_an_error_map_drawn_at_half_size_keeps_its_mean():
-    error = error_map(noise(32), noise(32, seed=1))
-    assert halved(error).shape == (16, 16)
-    assert halved(error).mean() == pytest.approx(error.mean())
+def test_the_window_is_drawn_at_four_times_the_scale_with_its_own_error_beside(tmp_path):
+    target, capture = noise(207), noise(207, seed=1)
+    draw_comparison(tmp_path / "page.png", "bench", [("noise", target)], [Column("method", (Tile(capture, "x"),))], 0.5)
+    page, crop = load_picture(tmp_path / "page.png"), most_detailed(target)
+    left, top, side = SIDE + 207 + 8, HEADER + 207 + 20, 4 * 23
+    enlarged = crop.of(capture).repeat(4, axis=0).repeat(4, axis=1)
+    assert np.abs(page[top : top + side, left : left + side] - enlarged).max() < 1 / 255
+    drawn = page[top : top + side, left + 207 - side : left + 207]
+    colours = colormaps["magma"](np.minimum(error_map(crop.of(capture), crop.of(target)) / 0.5, 1))[..., :3]
+    assert np.abs(drawn - colours.repeat(4, axis=0).repeat(4, axis=1)).max() < 2 / 255
+
+
+def test_a_page_of_speckle_keeps_colours_at_full_resolution_and_stays_small(tmp_path):
+    pixels = np.random.default_rng(0).integers(0, 256, size=(500, 500, 3), dtype=np.uint8)
+    save_picture(pixels, tmp_path / "page.jpg")
+    assert (tmp_path / "page.jpg").stat().st_size <= LARGEST
+    with Image.open(tmp_path / "page.jpg") as picture:
+        assert {layer[1:3] for layer in picture.layer} == {(1, 1)}
 
 
 def test_the_error_scale_is_a_round_number_above_most_errors():
