@@ -2,26 +2,47 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 from ..core.errors import UserError
 from .options import Config, Output, output_folder
 from .output import console, write_report
 
+if TYPE_CHECKING:
+    from ..study.definition import Study
+    from ..study.plan import Plan
+
 
 def report(config: Config, output: Output = None) -> None:
-    """Write the report of a study again from its records."""
+    """Write the report of a study again from its records, or from a committed records.csv."""
     from ..study import provenance
     from ..study.config import load_study
     from ..study.plan import plan
     from ..study.store import Store
 
     study = load_study(config)
-    folder = output_folder(study, output)
-    store = Store(folder)
-    if not store.folder.is_dir():
+    folder, grid = output_folder(study, output), plan(study)
+    store, committed = Store(folder), folder / "records.csv"
+    raw = store.folder.is_dir()
+    if not raw and not committed.is_file():
         raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
-    records = store.load(plan(study))
-    if all(record["state"] == "missing" for record in records):
+    again = f"holoeval run {config} --output {folder}"
+    records = store.load(grid) if raw else _committed(study, grid, committed, again)
+    missing = sum(record["state"] == "missing" for record in records)
+    if missing == len(records):
         changed = "the study, the code or the metrics that this machine can compute have changed"
-        again = f"holoeval run {config} --output {folder}"
         raise UserError(f"{folder}: no cell of this study has a record here ({changed}); {again} computes them")
-    write_report(console(), study, records, folder, provenance.read(folder))
+    known = provenance.read(folder) if missing else provenance.restate(folder, study)
+    write_report(console(), study, records, folder, known, keep_pictures=not raw)
+
+
+def _committed(study: Study, grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:
+    """The records of a committed records.csv. UserError: it has other cells than the study plans now."""
+    from ..report import Results, committed_records, difference, layout_of, read_records
+
+    frame = read_records(path.read_text(encoding="utf-8"))
+    if differs := difference(frame, grid):
+        changed = "the study, the code or the metrics that this machine can compute have changed"
+        raise UserError(f"{path.parent}: {differs} ({changed}); {again} computes them")
+    return committed_records(Results(frame, layout_of(study)), grid)

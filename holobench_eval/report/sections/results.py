@@ -167,4 +167,4 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     )
 
 
-SECTIONS = (Section("results", 30, _render, figures=_figures),)
+SECTIONS = (Section("results", 30, _render, figures=_figures, details=True),)

@@ -2,7 +2,7 @@ import pytest
 
 from holobench_eval.report import Results, csv_text, recompute_table, records_frame
 from holobench_eval.report.data.categories import meanings
-from holobench_eval.report.sections.findings import findings
+from holobench_eval.report.sections.display.findings import findings
 from holobench_eval.report.sections.leaderboard import leaderboard, reading
 from holobench_eval.report.sections.results import stopped
 from holobench_eval.study.plan import REFERENCE

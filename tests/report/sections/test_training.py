@@ -13,6 +13,7 @@ from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
 from holobench_eval.study.artifacts import Round, rounds_in, rounds_of
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import whole
 
 TARGETS = synthetic.TARGETS[1:4]
 PAIRS = (("GS", "leto-aged"), ("HIL", "leto-aged"), ("U-Net", "leto-aged"))
@@ -66,7 +67,7 @@ def found(tmp_path_factory):
 
 
 def written(found, tmp_path, **changes):
-    return write_report(layout(**changes), found, tmp_path, {}, Description())[0].read_text()
+    return whole(write_report(layout(**changes), found, tmp_path, {}, Description())[0])
 
 
 def rows_under(text, heading):
