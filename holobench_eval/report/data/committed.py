@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -32,7 +33,11 @@ def committed_records(results: Results, plan: Plan) -> list[dict[str, Any]]:
     """A record for every cell of a plan, as ``Store.load`` gives them, from a records frame that has all of them."""
     rows = {(row["method"], row["cell"]): row for row in results.frame.to_dict("records")}
     scores = score_columns(results.frame)
-    return [_record(cell.description(), label, rows[label, cell.id], scores) for label, cell in plan.labelled()]
+    # In the order of the keys of a record's file, in which a report lists parameters.
+    cells = (
+        (label, cell.id, json.loads(json.dumps(cell.description(), sort_keys=True))) for label, cell in plan.labelled()
+    )
+    return [_record(described, label, rows[label, identity], scores) for label, identity, described in cells]
 
 
 def _record(cell: dict[str, Any], label: str, row: Mapping[Any, Any], scores: list[str]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +44,12 @@ def draw(results: Results, condition: str, path: Path) -> None:
     if "floor_constant" in results.floors and results.has_floor(condition):
         floors[constant] = float(results.row("floor_constant", REFERENCE)[results.headline.key])
     quality_bars(path, rows, Chart(results.headline, results.layout, tuple(results.methods(condition)), floors))
+
+
+def _row(report: Report) -> Iterable[tuple[Path, str]]:
+    """The row of pictures; where an earlier report has none to keep, its first page of pictures."""
+    kept = report.pictures(PICTURES, lambda: _pictures(report))
+    return kept or list(report.pictures("comparison-*.jpg", lambda: ()))[:1]
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
@@ -92,6 +98,6 @@ SECTIONS = (
         6,
         lambda _, figures: figures,
         applies=_has_scores,
-        figures=lambda report: report.pictures(PICTURES, lambda: _pictures(report)),
+        figures=_row,
     ),
 )
