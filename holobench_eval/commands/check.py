@@ -67,7 +67,8 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     records = (report / "records.csv").read_text(encoding="utf-8")
     if differs := difference(read_records(records), plan(study)):
         yield f"{differs}: the study, the code or the metrics of this machine have changed; run the study again"
-    elif text_digest(study.text) != known["config_sha256"]:
+        return
+    if text_digest(study.text) != known["config_sha256"]:
         yield "the text of the config has changed, but no cell; run 'holoeval report' on it, which computes nothing"
     for name in ("report.md", "details.md"):
         if not (report / name).is_file():

@@ -158,8 +158,8 @@ class Study:
     captures of ``holograms`` against those captures; ``error_budget`` also splits the error of these captures by what
     the methods, in the order of the config, explain of it; ``focus`` scores the planes of focal stacks, each at its own
     distance. question: what the study asks; its report answers it first, for the methods whose labels the question
-    names; would_change: which result would change the answer. note: a paragraph that the report prints beside its
-    tables.
+    names; would_change: which result would change the answer. note: a paragraph that the report prints among the
+    limits of its answer.
     repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
     whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
     changes of the displays at test time; baseline: label that paired tests compare against (the first method when the

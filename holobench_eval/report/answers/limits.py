@@ -28,6 +28,8 @@ def _all(report: Report) -> Iterator[str]:
     yield from _displays(report)
     yield from _form(report)
     yield from _tuned(report)
+    if report.layout.note:
+        yield f"Note: {report.layout.note}"
     if report.layout.privileged:
         yield (
             f"Oracle: the method {words(sorted(report.layout.privileged))} may differentiate through the simulated "

@@ -62,7 +62,7 @@ class Layout:
     question: what the study asks (empty: what its kind asks); would_change: which result would change the answer;
     about: what a method or a display is whose name does not say it, by label or condition; tuned: on what the settings
     of methods were chosen, by label.
-    note: a paragraph that the study wants beside its tables. measure: that of the study, or ``files`` (pictures that
+    note: a paragraph that the study wants among its limits. measure: that of the study, or ``files`` (pictures that
     were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
     holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
     stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition

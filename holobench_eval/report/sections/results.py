@@ -36,7 +36,6 @@ def _render(report: Report, figures: Figures) -> Blocks:
         yield heading(condition, 3)
         yield table(*headline_rows(results, condition))
         yield bullets(stopped(results, condition))
-    yield layout.note
     if layout.reported_source:
         yield (
             'Columns named "reported" hold published figures from other hardware and other images; they were not '

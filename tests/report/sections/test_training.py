@@ -233,10 +233,10 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         assert phrase in text, phrase
 
 
-def test_the_note_of_a_study_stands_behind_its_table_as_text(found, tmp_path):
+def test_the_note_of_a_study_stands_among_its_limits_as_text(found, tmp_path):
     text = written(found, tmp_path, note="Weights *as drawn*.\n\n# No heading | no table")
     place = text.index("Weights \\*as drawn\\*. # No heading \\| no table")
-    assert text.index("\n## Results\n") < place < text.index("\n### The floor\n")
+    assert text.index("\n### Limits\n") < place < text.index("\n## What the answer rests on\n")
 
 
 def test_hostile_names_in_a_training_stay_text(found, tmp_path):
