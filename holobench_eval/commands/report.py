@@ -10,7 +10,6 @@ from .options import Config, Output, output_folder
 from .output import console, write_report
 
 if TYPE_CHECKING:
-    from ..study.definition import Study
     from ..study.plan import Plan
 
 
@@ -28,7 +27,7 @@ def report(config: Config, output: Output = None) -> None:
     if not raw and not committed.is_file():
         raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
     again = f"holoeval run {config} --output {folder}"
-    records = store.load(grid) if raw else _committed(study, grid, committed, again)
+    records = store.load(grid) if raw else _committed(grid, committed, again)
     missing = sum(record["state"] == "missing" for record in records)
     if missing == len(records):
         changed = "the study, the code or the metrics that this machine can compute have changed"
@@ -37,12 +36,12 @@ def report(config: Config, output: Output = None) -> None:
     write_report(console(), study, records, folder, known, keep_pictures=not raw)
 
 
-def _committed(study: Study, grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:
+def _committed(grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:
     """The records of a committed records.csv. UserError: it has other cells than the study plans now."""
-    from ..report import Results, committed_records, difference, layout_of, read_records
+    from ..report import committed_records, difference, read_records
 
     frame = read_records(path.read_text(encoding="utf-8"))
     if differs := difference(frame, grid):
         changed = "the study, the code or the metrics that this machine can compute have changed"
         raise UserError(f"{path.parent}: {differs} ({changed}); {again} computes them")
-    return committed_records(Results(frame, layout_of(study)), grid)
+    return committed_records(frame, grid)

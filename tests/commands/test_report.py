@@ -48,6 +48,14 @@ def test_a_new_question_is_answered_from_the_committed_files_and_nothing_else_ch
     assert problems_in(folder.parent)[1] == []
 
 
+def test_a_row_may_be_renamed_without_computing_it_again(committed: tuple[Path, Path]) -> None:
+    config, folder = committed
+    config.write_text(config.read_text().replace("- plugins.py:Toy", '- {name: "plugins.py:Toy", label: Anew | <b>}'))
+    report(config, folder)
+    assert "| Anew \\| &lt;b> |" in (folder / "report.md").read_text()
+    assert problems_in(folder.parent)[1] == []
+
+
 def test_cells_that_the_committed_files_lack_are_computed_and_never_made_up(committed: tuple[Path, Path]) -> None:
     config, folder = committed
     before = (folder / "report.md").read_bytes()

@@ -14,6 +14,7 @@ from ..markdown import Markdown, table
 from .kind import Kind, subjects
 
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
+OWN = ("refocus", "other_plane", *REMEDIES)  # kinds of which the answer tells the baseline's loss, one by one
 MOST = 3  # methods that the answer follows
 
 
@@ -24,7 +25,7 @@ def sentences(results: Results) -> Iterator[str]:
         same = [sweep for sweep in found if sweep.swept.kind == kind]
         if kind == "refocus":
             yield from _range(results, same)
-        if kind in REMEDIES and results.layout.baseline:
+        if kind in OWN and results.layout.baseline:
             yield from _worst(results, same, results.layout.baseline)
         for remedy in REMEDIES.get(kind, ()):
             yield from _recovered(results, same, [sweep for sweep in found if sweep.swept.kind == remedy])
@@ -39,7 +40,7 @@ def _followed(results: Results) -> list[str]:
     Where the answer tells a range or a share, only those of the question.
     """
     layout, condition = results.layout, results.conditions[0]
-    if {"refocus", *REMEDIES} & {swept.kind for swept in layout.sweeps}:
+    if set(OWN) & {swept.kind for swept in layout.sweeps}:
         return subjects(results)[:MOST]
     chosen = subjects(results) or results.ranking(condition, categories=(*OFFLINE, ONLINE))[:1]
     return list(dict.fromkeys([*chosen, *([layout.baseline] if layout.baseline else [])]))[:MOST]
@@ -109,14 +110,15 @@ def _range(results: Results, same: list[Sweep]) -> Iterator[str]:
         ranges: dict[str, list[str]] = {}
         for label in sweep.methods:
             if ends := sweep.small_range(label):
-                ranges.setdefault(f"{ends[0]:g} to {ends[1]:g} {sweep.kind.unit}", []).append(label)
+                reach = f"{ends[0]:g} to {ends[1]:g} {sweep.kind.unit}" if ends[0] < ends[1] else "nowhere"
+                ranges.setdefault(reach, []).append(label)
         if ranges:
             each = [f"{text} ({words(labels)})" for text, labels in ranges.items()]
             parts.append(f"on {sweep.swept.before} {words(each)}")
     if parts:
         yield (
-            f"A lens moves the hologram with a change of the mean score of at most {SMALL:g} "
-            f"{results.headline.unit}: {'; '.join(parts)}."
+            f"A lens phase moves the picture, while the mean {results.headline.title} changes by at most {SMALL:g} "
+            f"{results.headline.unit}, from and to: {'; '.join(parts)}."
         )
 
 
@@ -129,7 +131,7 @@ def _recovered(results: Results, same: list[Sweep], remedies: list[Sweep]) -> It
                 shares = sorted(sweep.recovered(baseline, remedy).items(), key=lambda entry: entry[1].mean)
                 if shares:
                     each = [f"{percent(share)} % at {value}" for value, share in (shares[0], shares[-1])]
-                    parts.append(f"on {sweep.swept.before} {' to '.join(dict.fromkeys(each))}")
+                    parts.append(f"on {sweep.swept.before} {' up to '.join(dict.fromkeys(each))}")
     if parts:
         yield f"Of the loss of {baseline}, this share is recovered ({remedies[0].kind.words}): {'; '.join(parts)}."
 
@@ -165,7 +167,8 @@ KIND = Kind(
     sentences=sentences,
     table=rows,
     limits=(
-        "Changes: a loss is the paired difference to the score before the change; methods are prepared before it, and "
+        "Changes: a loss is the paired difference to the score before the change, positive where the picture got "
+        "worse; methods are prepared before it, and "
         "one that captures the scored image solves under it. The models of the changes and their rates are assumed. "
         "The worst of several values is chosen by its mean, so its interval is a little optimistic.",
     ),

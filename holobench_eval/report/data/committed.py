@@ -9,7 +9,6 @@ from typing import Any
 import pandas as pd
 
 from ...study.plan import Plan
-from .results import Results
 from .tables import (
     ALONE_COLUMN,
     FELL_BACK_COLUMN,
@@ -29,15 +28,16 @@ def difference(frame: pd.DataFrame, plan: Plan) -> str:
     return ", ".join(f"{count} {text}" for count, text in parts if count)
 
 
-def committed_records(results: Results, plan: Plan) -> list[dict[str, Any]]:
-    """A record for every cell of a plan, as ``Store.load`` gives them, from a records frame that has all of them."""
-    rows = {(row["method"], row["cell"]): row for row in results.frame.to_dict("records")}
-    scores = score_columns(results.frame)
+def committed_records(frame: pd.DataFrame, plan: Plan) -> list[dict[str, Any]]:
+    """A record for every cell of a plan, as ``Store.load`` gives them under the plan's labels.
+
+    frame: a records frame that has all of them, see ``difference``.
+    """
+    rows = {row["cell"]: row for row in frame.to_dict("records")}
+    scores = score_columns(frame)
     # In the order of the keys of a record's file, in which a report lists parameters.
-    cells = (
-        (label, cell.id, json.loads(json.dumps(cell.description(), sort_keys=True))) for label, cell in plan.labelled()
-    )
-    return [_record(described, label, rows[label, identity], scores) for label, identity, described in cells]
+    cells = ((label, cell.id, json.dumps(cell.description(), sort_keys=True)) for label, cell in plan.labelled())
+    return [_record(json.loads(described), label, rows[identity], scores) for label, identity, described in cells]
 
 
 def _record(cell: dict[str, Any], label: str, row: Mapping[Any, Any], scores: list[str]) -> dict[str, Any]:

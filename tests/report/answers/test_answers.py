@@ -12,6 +12,7 @@ import pytest
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.answers import KINDS, kind_of
 from holobench_eval.report.answers.kind import MOST_COLUMNS, MOST_SENTENCES, subjects
+from holobench_eval.report.data.layout import Swept
 from holobench_eval.study.plan import REFERENCE
 from tests.report.data import test_error_budget as budget_of_errors
 from tests.report.sections import test_focus as focus
@@ -192,6 +193,17 @@ def test_a_remedy_says_which_share_of_the_loss_it_recovers() -> None:
     text = answer(sweep(baseline="HIL"))
     assert "The largest mean loss of HIL is on leto-aged +8.00 dB" in text
     assert "this share is recovered (the same eye, known to the methods): on leto-aged 88 [88, 88] % at -2." in text
+
+
+def test_refocusing_says_how_far_a_lens_moves_the_picture() -> None:
+    points = tuple((value, f"bench, refocus {value:g} mm") for value in (-2.0, 1.0, 2.0))
+    loss = {"old": 0.3, "new": 2.0}
+    means = {f"{label}@bench": 20.0 for label in loss}
+    means |= {f"{label}@{name}": 20.0 - loss[label] * abs(value) for label in loss for value, name in points}
+    found = results_of(means, sweeps=(Swept("refocus", "bench", points),))
+    first, second = kind_of(found).answer(found)
+    assert "at most 1 dB, from and to: on bench -2 to 2 mm (old) and nowhere (new)." in first
+    assert "The largest mean loss of old is on bench +0.60 dB [+0.60, +0.60] (image moved by a lens phase" in second
 
 
 def ranked() -> Results:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report import Results, build_report, committed_records, difference, layout_of, read_records
+from holobench_eval.report import build_report, committed_records, difference, read_records
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from tests.study.test_run import compute
@@ -32,7 +32,7 @@ def test_a_report_from_records_csv_has_the_same_bytes_and_keeps_its_pictures(tmp
 
     frame = read_records((output / "records.csv").read_text())
     assert difference(frame, plan(study)) == ""
-    records = committed_records(Results(frame, layout_of(study)), plan(study))
+    records = committed_records(frame, plan(study))
     for path in output.glob("figures/*.png"):
         path.unlink()
     build_report(study, records, output, outcome.provenance, keep_pictures=True)
