@@ -25,8 +25,8 @@ def _reading(budget: Budget) -> str:
     shares = [f"{part.label} {_percent(part)} %" for part in budget.parts]
     gains = [f"{_gain(part)} with {part.label}" for part in budget.explained]
     return (
-        f"On {budget.condition} the captures have {_decibel(budget.psnr)}, and their squared error splits into "
-        f"{words(shares)}; removing one part after the other would gain at most {words(gains)}."
+        f"On {budget.condition} the captures have a PSNR of {_decibel(budget.psnr)}, and their squared error splits "
+        f"into {words(shares)}; removing one part after the other would gain at most {words(gains)}."
     )
 
 
