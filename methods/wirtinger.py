@@ -47,9 +47,10 @@ class Objective:
 
 @dataclass(frozen=True)
 class Wirtinger:
-    """First-order phase retrieval in the region; light outside it is free.
+    """Wirtinger holography: gradient descent on the phase, through ideal optics and without a camera.
 
-    The phase of the least loss that was seen is returned. SI units throughout.
+    It is first-order phase retrieval in the scored region; light outside it is free. The phase of the least loss that
+    was seen is returned. SI units throughout.
 
     Parameters
     ----------
@@ -78,6 +79,10 @@ class Wirtinger:
     initial_phase: InitialPhase = "constant"
     offset: Offset = "centre"
 
+    tuned: ClassVar[str] = (
+        "the starting phase and global offset were chosen on the display ideal and, in part, on an earlier leto-aged, "
+        "with photographs that are cropped for the targets of the headline studies"
+    )
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 

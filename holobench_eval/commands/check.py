@@ -59,18 +59,26 @@ def _problems(report: Path) -> Iterator[str]:
 
 def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]:
     """What is different from when the report was made, of which its provenance is ``known``."""
-    from ..report import layout_of, recompute_table
+    from ..report import difference, layout_of, read_records, recompute_table
     from ..study.displays import displays
+    from ..study.plan import plan
     from ..study.provenance import text_digest
 
-    if text_digest(study.text) != known["config_sha256"]:
-        yield "the config has changed since the report was made; run the study again"
     for display in displays(study).values():
         now = {"version": display.version, "sha256": display.digest}
         then = dict(known["profiles"]).get(display.name)
         if then != now:
             yield f"profile '{display.name}' was {then}, is now {now}; run the study again"
-    again = recompute_table((report / "records.csv").read_text(encoding="utf-8"), layout_of(study))
+    records = (report / "records.csv").read_text(encoding="utf-8")
+    if differs := difference(read_records(records), plan(study)):
+        yield f"{differs}: the study, the code or the metrics of this machine have changed; run the study again"
+        return
+    if text_digest(study.text) != known["config_sha256"]:
+        yield "the text of the config has changed, but no cell; run 'holoeval report' on it, which computes nothing"
+    for name in ("report.md", "details.md"):
+        if not (report / name).is_file():
+            yield f"{name} is missing; run 'holoeval report' on its config"
+    again = recompute_table(records, layout_of(study))
     table = (report / "table.csv").read_text(encoding="utf-8")
     if again.partition("\n")[0] != table.partition("\n")[0]:
         yield "table.csv has the columns of another version; run 'holoeval report' on its config"

@@ -21,12 +21,20 @@ def console() -> Console:
 
 
 def write_report(
-    console: Console, study: Study, records: list[dict[str, object]], output: Path, known: dict[str, object]
+    console: Console,
+    study: Study,
+    records: list[dict[str, object]],
+    output: Path,
+    known: dict[str, object],
+    keep_pictures: bool = False,
 ) -> Results:
-    """Write a study's report, print its headline tables and return its numbers. known: its provenance."""
+    """Write a study's report, print its headline tables and return its numbers.
+
+    known: its provenance; keep_pictures: see build_report.
+    """
     from ..report import build_report
 
-    written, results = build_report(study, records, output, known)
+    written, results = build_report(study, records, output, known, keep_pictures)
     print_headline(console, results)
     console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
     return results

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,11 +11,14 @@ from ..core.errors import UserError
 from .options import Config, Output, output_folder
 from .output import console, write_report
 
+if TYPE_CHECKING:
+    from ..study.plan import Plan
+
 Print = Annotated[Path | None, typer.Option("--print", help="Draw the charts for print too, into this folder.")]
 
 
 def report(config: Config, output: Output = None, print_to: Print = None) -> None:
-    """Write the report of a study again from its records."""
+    """Write the report of a study again from its records, or from a committed records.csv."""
     from ..report.description import describe
     from ..report.printing import print_figures
     from ..report.section import Report
@@ -25,17 +28,30 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
     from ..study.store import Store
 
     study = load_study(config)
-    folder = output_folder(study, output)
-    store = Store(folder)
-    if not store.folder.is_dir():
+    folder, grid = output_folder(study, output), plan(study)
+    store, committed = Store(folder), folder / "records.csv"
+    raw = store.folder.is_dir()
+    if not raw and not committed.is_file():
         raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
-    records = store.load(plan(study))
-    if all(record["state"] == "missing" for record in records):
+    again = f"holoeval run {config} --output {folder}"
+    records = store.load(grid) if raw else _committed(grid, committed, again)
+    missing = sum(record["state"] == "missing" for record in records)
+    if missing == len(records):
         changed = "the study, the code or the metrics that this machine can compute have changed"
-        again = f"holoeval run {config} --output {folder}"
         raise UserError(f"{folder}: no cell of this study has a record here ({changed}); {again} computes them")
-    known = provenance.read(folder)
-    results = write_report(console(), study, records, folder, known)
+    known = provenance.read(folder) if missing else provenance.restate(folder, study)
+    results = write_report(console(), study, records, folder, known, keep_pictures=not raw)
     if print_to is not None:
         for path in print_figures(Report(results, records, folder, known, describe(study)), print_to):
             print(path)
+
+
+def _committed(grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:
+    """The records of a committed records.csv. UserError: it has other cells than the study plans now."""
+    from ..report import committed_records, difference, read_records
+
+    frame = read_records(path.read_text(encoding="utf-8"))
+    if differs := difference(frame, grid):
+        changed = "the study, the code or the metrics that this machine can compute have changed"
+        raise UserError(f"{path.parent}: {differs} ({changed}); {again} computes them")
+    return committed_records(frame, grid)

@@ -79,7 +79,7 @@ def run(
         write_report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
-        console.print(f"reasons: {folder}/report.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
+        console.print(f"reasons: {folder}/details.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
         raise typer.Exit(1)
 
 

@@ -1,6 +1,7 @@
-"""Reports: statistics over targets, tables, figures and report.md, all computed from the records of a study."""
+"""Reports: statistics over targets, tables, figures and texts, all computed from the records of a study."""
 
 from .build import build_report, recompute_table, write_report
+from .data.committed import committed_records, difference
 from .data.layout import Layout, layout_of
 from .data.results import Results
 from .data.tables import csv_text, read_records, records_frame, table_from_records
@@ -13,7 +14,9 @@ __all__ = [
     "Layout",
     "Results",
     "build_report",
+    "committed_records",
     "csv_text",
+    "difference",
     "headline_rows",
     "layout_of",
     "read_records",

@@ -1,9 +1,11 @@
-"""report.md, the figures and the files of data of a study, from its records."""
+"""report.md, details.md, the figures and the files of data of a study, from its records."""
 
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -19,19 +21,29 @@ from .markdown import Markdown, blocks
 from .section import Report
 from .sections import sections
 
-# Figures that a report draws itself; others in its folder, such as the stages of a bench, are drawn elsewhere.
-DRAWN = ("comparison-*.jpg", "sweep-*.jpg", "quality-*.png", "training-*.png")
+# Figures that a report draws itself, those of pictures from thumbnails; others in its folder, such as the stages of a
+# bench, are drawn elsewhere.
+OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
+OF_NUMBERS = ("quality-*.png", "training-*.png")
+REPORT, DETAILS = "report.md", "details.md"
+
+_FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
 
 
 def build_report(
-    study: Study, records: Sequence[Mapping[str, Any]], output: Path, provenance: Mapping[str, Any]
+    study: Study,
+    records: Sequence[Mapping[str, Any]],
+    output: Path,
+    provenance: Mapping[str, Any],
+    keep_pictures: bool = False,
 ) -> tuple[Path, Results]:
     """Write everything a reader of the study gets into ``output``; return the path of report.md and its numbers.
 
     records: one for every planned cell, as ``Store.load`` gives them; thumbnails are taken from ``output/records``.
-    provenance: see ``study.provenance``. UserError when no record has the headline metric.
+    provenance: see ``study.provenance``; keep_pictures: keep the figures made of pictures that are there, with their
+    captions, and draw the others alone. UserError when no record has the headline metric.
     """
-    return write_report(layout_of(study), records, output, provenance, describe(study))
+    return write_report(layout_of(study), records, output, provenance, describe(study), keep_pictures)
 
 
 def write_report(
@@ -40,25 +52,38 @@ def write_report(
     output: Path,
     provenance: Mapping[str, Any],
     description: Description,
+    keep_pictures: bool = False,
 ) -> tuple[Path, Results]:
     """``build_report`` for a study that is given by its layout and description."""
     results = Results(records_frame(records, layout), layout)
-    report = Report(results, records, output, provenance, description)
+    report = Report(results, records, output, provenance, description, _kept(output) if keep_pictures else None)
     write_files(results, output)
-    for pattern in DRAWN:
+    for pattern in OF_NUMBERS if keep_pictures else (*OF_PICTURES, *OF_NUMBERS):
         for old in report.figures.glob(pattern):
             old.unlink()
-    write_atomically(output / "report.md", f"{_text(report)}\n".encode())
-    return output / "report.md", results
+    for name, text in _texts(report).items():
+        write_atomically(output / name, f"{text}\n".encode())
+    return output / REPORT, results
 
 
-def _text(report: Report) -> Markdown:
-    numbers, parts = itertools.count(1), list[object]()
+def _kept(output: Path) -> dict[str, Markdown]:
+    """The captions of the figures made of pictures that an earlier report left, by file name."""
+    texts = [path.read_text(encoding="utf-8") for name in (REPORT, DETAILS) if (path := output / name).is_file()]
+    return {
+        name: Markdown(caption)
+        for name, caption in _FIGURE.findall("\n".join(texts))
+        if any(fnmatch(name, pattern) for pattern in OF_PICTURES) and (output / "figures" / name).is_file()
+    }
+
+
+def _texts(report: Report) -> dict[str, Markdown]:
+    """The text of each file, by its name."""
+    numbers, parts = itertools.count(1), dict[str, list[object]]({REPORT: [], DETAILS: []})
     for section in sections():
         if section.applies(report):
             drawn = [_figure(next(numbers), path, caption) for path, caption in section.figures(report)]
-            parts += section.render(report, drawn)
-    return blocks(parts)
+            parts[DETAILS if section.details else REPORT] += section.render(report, drawn)
+    return {name: blocks(text) for name, text in parts.items()}
 
 
 def _figure(number: int, path: Path, caption: str) -> Markdown:

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from types import MappingProxyType
 
+from ..core import plugins
+from ..core.errors import UserError
 from ..display.api import DisplaySpec
 from ..display.simulated.profile import Profile, load_profile
 from ..display.simulated.stages import Panel
+from ..study.calibration import load_calibration
 from ..study.definition import Study
 from ..study.displays import Condition
 from ..study.displays import displays as conditions
-from .data.text import plain
+from .data.text import plain, words
 
 
 @dataclass(frozen=True)
 class Display:
-    """A display as the report describes it: name, a heading line, and a line per property."""
+    """A display as the report describes it: name, a heading line, and a line per property.
+
+    basis: what it is and where its parameters come from, in a sentence; modelled: the effects of a simulated display
+    that the model of a method has terms for, by the method's label, and effects: how many it has.
+    """
 
     name: str
     heading: str
     lines: tuple[str, ...]
+    basis: str = ""
+    modelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    effects: int = 0
 
 
 @dataclass(frozen=True)
@@ -42,7 +54,9 @@ def describe(study: Study) -> Description:
         displays = tuple(_real(condition) for condition in conditions(study).values())
     elif study.display.learned is None:
         profiles = [load_profile(source, study.folder) for source in study.display.profiles]
-        displays = tuple(_simulated(profile, study.display.panel) for profile in profiles)
+        methods = {entry.label: plugins.find("methods", entry.name, study.folder) for entry in study.methods}
+        forms = {label: method.form for label, method in methods.items() if hasattr(method, "form")}
+        displays = tuple(_simulated(profile, study.display.panel, forms) for profile in profiles)
     else:
         profile = study.display.learned.profile
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
@@ -73,7 +87,10 @@ def _real(condition: Condition) -> Display:
     )
 
 
-def _simulated(profile: Profile, panel: tuple[int, int] | None) -> Display:
+def _simulated(
+    profile: Profile, panel: tuple[int, int] | None, forms: Mapping[str, frozenset[str]] = MappingProxyType({})
+) -> Display:
+    effects = [effect.name for effect in profile.effects()]
     return Display(
         name=profile.name,
         heading=f"Version {profile.version}, sha256 {profile.digest[:16]}. {profile.description}",
@@ -82,6 +99,26 @@ def _simulated(profile: Profile, panel: tuple[int, int] | None) -> Display:
             _optics(profile.scaled(panel).panel),
             *_stages(profile),
         ),
+        basis=_basis(profile),
+        modelled={label: tuple(name for name in effects if name in form) for label, form in forms.items()},
+        effects=len(effects),
+    )
+
+
+def _basis(profile: Profile) -> str:
+    """Where the parameters of a simulated display come from."""
+    measured = "simulated; its parameters are assumed or from data sheets, and none was measured on a real panel"
+    try:
+        calibration = load_calibration(profile)
+    except UserError:
+        return measured
+    figures = [f"{name} {psnr:g} dB" for name, psnr in calibration.figures.items()]
+    if calibration.prediction:
+        figures.append(f"predictions by a U-Net {calibration.prediction.psnr:g} dB")
+    free = words([name.replace(".", " ").replace("_", " ") for name in calibration.free])
+    return (
+        f"{measured}; {free} were fitted to published PSNR ({', '.join(figures)}), on {calibration.targets.dataset}, "
+        "so that agreement with these figures is no evidence"
     )
 
 

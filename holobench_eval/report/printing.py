@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .charts.look.medium import COLUMNS, drawn_for
-from .charts.thumbnails import Thumbnails
 from .section import Report
 from .sections import sections
 
 
 @dataclass(frozen=True)
 class _Printed(Report):
-    """A report whose figures go elsewhere, without pictures: there are thumbnails neither there nor in ``folder``."""
+    """A report whose figures go elsewhere."""
 
-    folder: Path
+    folder: Path = field(kw_only=True)
 
     @property
     def figures(self) -> Path:
         return self.folder
 
-    @cached_property
-    def thumbnails(self) -> Thumbnails:
-        return Thumbnails(self.results, self.folder)
-
 
 def print_figures(report: Report, folder: Path) -> Iterator[Path]:
     """Draw the charts of a report into ``folder/single`` (84 mm wide) and ``folder/double`` (174 mm); every file."""
     for name, medium in COLUMNS.items():
-        printed = _Printed(
-            report.results, report.records, report.output, report.provenance, report.description, folder / name
-        )
+        parts = report.results, report.records, report.output, report.provenance, report.description
+        printed = _Printed(*parts, kept={}, folder=folder / name)  # none of the figures made of pictures
         with drawn_for(medium):
             for section in sections():
                 if section.applies(printed):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,8 @@ class Report:
     """What sections are made from.
 
     records: one for every planned cell; output: the folder of the report, with thumbnails in ``records``; provenance:
-    see ``study.provenance``.
+    see ``study.provenance``; kept: captions of the figures made of pictures that an earlier report left, by file, where
+    the thumbnails are not there to draw them from (None: they are).
     """
 
     results: Results
@@ -58,6 +60,13 @@ class Report:
     output: Path
     provenance: Mapping[str, Any]
     description: Description
+    kept: Mapping[str, Markdown] | None = None
+
+    def pictures(self, pattern: str, draw: Callable[[], Iterable[tuple[Path, str]]]) -> Iterable[tuple[Path, str]]:
+        """(file, caption) of figures made of pictures: drawn, or those of ``pattern`` that an earlier report left."""
+        if self.kept is None:
+            return draw()
+        return [(self.figures / name, text) for name, text in self.kept.items() if fnmatch(name, pattern)]
 
     @property
     def layout(self) -> Layout:
@@ -102,8 +111,9 @@ class Report:
 class Section:
     """A section of the report.
 
-    order: where it stands among the others; render: its blocks, from the report and the figures of the section, each a
-    block too; applies: whether the report has it; figures: draws its figures, (file, caption) of each.
+    order: where it stands among the others; details: whether it stands in details.md and not in report.md; render: its
+    blocks, from the report and the figures of the section, each a block too; applies: whether the report has it;
+    figures: draws its figures, (file, caption) of each.
     """
 
     name: str
@@ -111,3 +121,4 @@ class Section:
     render: Callable[[Report, Figures], Blocks]
     applies: Callable[[Report], bool] = lambda report: True
     figures: Callable[[Report], Iterable[tuple[Path, str]]] = lambda report: ()
+    details: bool = False

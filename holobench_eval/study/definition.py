@@ -157,7 +157,9 @@ class Study:
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
     captures of ``holograms`` against those captures; ``error_budget`` also splits the error of these captures by what
     the methods, in the order of the config, explain of it; ``focus`` scores the planes of focal stacks, each at its own
-    distance. note: a paragraph that the report prints beside its tables.
+    distance. question: what the study asks; its report answers it first, for the methods whose labels the question
+    names; would_change: which result would change the answer. note: a paragraph that the report prints among the
+    limits of its answer.
     repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
     whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
     changes of the displays at test time; baseline: label that paired tests compare against (the first method when the
@@ -174,6 +176,8 @@ class Study:
     holograms: Probe = Probe()
     training: Training = Training()
     sweeps: tuple[Sweep, ...] = ()
+    question: str = ""
+    would_change: str = ""
     note: str = ""
     seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
     repeats: Annotated[int, Interval(ge=1, le=1000)] = 1

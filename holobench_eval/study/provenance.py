@@ -93,6 +93,13 @@ def end(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:
     return _write(output, {**provenance, "ended": now()})
 
 
+def restate(output: Path, study: Study) -> dict[str, Any]:
+    """Note the text of the config that a report is written from again, beside the provenance of what was computed."""
+    known = read(output)
+    config = {"config": os.path.relpath(study.file, output), "config_sha256": text_digest(study.text)}
+    return _write(output, {**known, **config}) if known else known
+
+
 def _write(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:
     write_atomically(output / FILE, f"{json.dumps(provenance, indent=1)}\n".encode())
     return provenance

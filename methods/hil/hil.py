@@ -65,6 +65,9 @@ class HIL:
     seed: int = 0
     fallback: bool = False
 
+    tuned: ClassVar[str] = (
+        "the network, rates and steps were chosen on a trial display that resembles leto-2020, with generated images"
+    )
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True

@@ -36,10 +36,10 @@ def residual_network(spec: DisplaySpec, network: Network, seed: int) -> nn.Modul
 
 @dataclass(frozen=True)
 class HILPlus(Diagnosed, ThroughModel):
-    """Hardware in the loop with the aberration field as a field; see this file's first lines.
+    """The loop of `hil` with a physical model of the display, learned from captures, in the place of its network.
 
-    The field is that of Eq. 13. The other parameters are those of `ThroughModel`; `training` is Algorithm 1. SI units
-    throughout.
+    The aberration field is a field; see this file's first lines. It is that of Eq. 13. The other parameters are those
+    of `ThroughModel`; `training` is Algorithm 1. SI units throughout.
 
     Parameters
     ----------

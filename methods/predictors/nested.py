@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from ...display.api import DisplaySpec, ideal_image
 from ...optics.phasor import squared_modulus
 from ..calibrated.approximator import ModelApproximator, PredictedCapture, Rates
-from ..calibrated.display_model import DisplayModel
+from ..calibrated.display_model import FORM, DisplayModel
 from ..calibrated.method import SearchRetrieval, ThroughModel
 from ..hil.networks import Network
 from ..learned.samples import Schedule, Steps
@@ -139,6 +139,8 @@ class ImageNetwork(NestedPrediction):
 @dataclass(frozen=True)
 class FieldNetwork(NestedPrediction):
     """`ImageNetwork` on a field that interferes: `DisplayModel` in the place of the ideal model."""
+
+    form: ClassVar[frozenset[str]] = FORM
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""

@@ -6,8 +6,7 @@ import pytest
 
 from holobench_eval.commands.check import problems_in
 from holobench_eval.core.errors import UserError
-from holobench_eval.report import csv_text, layout_of, recompute_table, records_frame
-from holobench_eval.report.files.tidy import tidy_records
+from holobench_eval.report import build_report
 from holobench_eval.study.config import load_study
 from tests.study.test_run import compute
 from tests.support.fake_study import write_config
@@ -21,10 +20,7 @@ def report(tmp_path: Path) -> Path:
     config = write_config(tmp_path, count=2)
     folder = tmp_path / "reports" / "study"
     outcome = compute(config, folder)
-    layout = layout_of(load_study(config))
-    text = csv_text(tidy_records(records_frame(outcome.records, layout), layout))
-    (folder / "records.csv").write_text(text)
-    (folder / "table.csv").write_text(recompute_table(text, layout))
+    build_report(load_study(config), outcome.records, folder, outcome.provenance)
     return folder
 
 
@@ -50,10 +46,25 @@ def test_a_table_of_another_version_is_told_from_a_changed_number(report: Path) 
     assert ["columns of another version" in problem for problem in problems(report)] == [True]
 
 
-def test_a_changed_config_is_found(report: Path) -> None:
+def test_a_config_that_plans_other_cells_is_found(report: Path) -> None:
     config = report.parents[1] / "study.yaml"
-    config.write_text(config.read_text() + "# later\n")
-    assert ["config has changed" in problem for problem in problems(report)] == [True]
+    config.write_text(config.read_text().replace("seed: 3", "seed: 4"))
+    (problem,) = problems(report)
+    assert "14 of 14 planned cells are not in records.csv" in problem
+    assert "run the study again" in problem
+
+
+def test_a_comment_or_a_question_in_a_config_asks_for_a_report_and_not_for_a_run(report: Path) -> None:
+    config = report.parents[1] / "study.yaml"
+    config.write_text(f"{config.read_text()}question: Why?  # later\n")
+    (problem,) = problems(report)
+    assert "no cell; run 'holoeval report' on it, which computes nothing" in problem
+
+
+@pytest.mark.parametrize("name", ["report.md", "details.md"])
+def test_a_missing_text_is_found(report: Path, name: str) -> None:
+    (report / name).unlink()
+    assert [f"{name} is missing" in problem for problem in problems(report)] == [True]
 
 
 def test_a_config_that_does_not_load_is_found(report: Path) -> None:

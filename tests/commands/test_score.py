@@ -24,6 +24,7 @@ from holobench_eval.report import read_records
 from holobench_eval.study.folders import scoring as scored_pictures
 from holobench_eval.study.folders.files import read_folders
 from tests.support.photographed import captured, photograph, pose
+from tests.support.reports import whole
 
 REAL = Path(__file__).resolve().parents[2] / "../shared/captures/stanford-2021"
 PUBLISHED = {"sgd-asm": 20.94, "citl-asm": 25.16, "sgd-ours": 27.41}
@@ -56,7 +57,7 @@ def lay_out(root: Path) -> Path:
 
 def run(root: Path, values: str = "stored", baseline: str | None = None) -> str:
     report, _ = score_folders(root / "captures", root / "targets", root / "out", values, baseline, None, quiet())
-    return report.read_text()
+    return whole(report)
 
 
 def records(root: Path) -> list[Path]:

@@ -9,6 +9,7 @@ from holobench_eval.report import write_report
 from holobench_eval.report.description import Description, Display
 from holobench_eval.study.store import Store
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import whole
 
 PROVENANCE = {
     "package": "0.1.0",
@@ -50,7 +51,7 @@ def records(tmp_path_factory):
 @pytest.fixture(scope="module")
 def report(records):
     folder, found = records
-    return write_report(LAYOUT, found, folder, PROVENANCE, DESCRIPTION)[0].read_text()
+    return whole(write_report(LAYOUT, found, folder, PROVENANCE, DESCRIPTION)[0])
 
 
 def test_a_report_is_written_with_tables_and_every_figure(records, report):
@@ -58,6 +59,7 @@ def test_a_report_is_written_with_tables_and_every_figure(records, report):
     linked = re.findall(r"!\[Figure \d+\]\((.*?)\)", report)
     assert linked == [
         "figures/quality-paired-leto-aged.png",
+        "figures/answer-pictures.jpg",
         "figures/quality-paired-ideal.png",
         "figures/quality-by-target.png",
         "figures/quality-time.png",
@@ -114,7 +116,7 @@ def test_a_reader_finds_what_was_measured_and_how_to_do_it_again(report):
 def test_a_reader_is_told_what_was_at_work_beside_what_was_timed(records, tmp_path):
     kept, layout = minimal(records[1])
     noted = [record | {"memory_mib": 9.0, "alone": record["cell"]["target"] == TARGETS[0]} for record in kept]
-    text = write_report(layout, noted, tmp_path, PROVENANCE, DESCRIPTION)[0].read_text()
+    text = whole(write_report(layout, noted, tmp_path, PROVENANCE, DESCRIPTION)[0])
     assert "Seconds and memory are the first measurement on this machine" in text
     assert "Seconds are those of one hologram per row, timed alone. Memory is" in text
 
@@ -122,7 +124,7 @@ def test_a_reader_is_told_what_was_at_work_beside_what_was_timed(records, tmp_pa
 @pytest.mark.parametrize(("wanted", "missed"), [(None, True), (("psnr", "lpips_alex"), True), (("psnr",), False)])
 def test_lpips_is_missed_only_where_it_was_wanted(records, tmp_path, wanted, missed):
     kept, layout = minimal(records[1], metrics=wanted)
-    text = write_report(layout, kept, tmp_path, PROVENANCE, DESCRIPTION)[0].read_text()
+    text = whole(write_report(layout, kept, tmp_path, PROVENANCE, DESCRIPTION)[0])
     assert ("LPIPS is not in these tables" in text) == missed
 
 
@@ -137,7 +139,7 @@ def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
     stale, sheet = tmp_path / "figures" / "comparison-old-9.jpg", tmp_path / "figures" / "stages-leto-aged.png"
     for file in (stale, sheet):
         synthetic.save_picture(file, np.full((8, 8, 3), 0.5))
-    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
+    text = whole(write_report(layout, kept, tmp_path, {}, Description())[0])
     assert not stale.exists()
     assert "(figures/stages-leto-aged.png)" in text
 
@@ -145,7 +147,7 @@ def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
 def test_missing_thumbnails_are_said_and_stop_nothing(records, tmp_path):
     _, found = records
     kept, layout = minimal(found)
-    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
+    text = whole(write_report(layout, kept, tmp_path, {}, Description())[0])
     assert "There is no comparison figure" in text
     assert "Missing thumbnails (3): target-chelsea.png" in text
     assert "No description of the displays was recorded." in text
@@ -156,9 +158,9 @@ def test_missing_thumbnails_are_said_and_stop_nothing(records, tmp_path):
         synthetic.save_picture(store.target_thumbnail(target), np.full((48, 48, 3), 0.5))
     one = kept[-1]
     synthetic.save_picture(store.folder / f"{synthetic.digest(one['cell'])}.png", np.full((48, 48, 3), 0.4))
-    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
+    text = whole(write_report(layout, kept, tmp_path, {}, Description())[0])
     assert "(figures/comparison-leto-aged-1.jpg)" in text
-    assert "Missing thumbnails (4)" in text
+    assert "Missing thumbnails (6)" in text
 
 
 def test_hostile_names_stay_text(records, tmp_path):
@@ -170,7 +172,7 @@ def test_hostile_names_stay_text(records, tmp_path):
     )
     renamed = [record | {"label": evil} if record["label"] == "Wirtinger" else record for record in kept]
     description = Description(config_text="```\n<script>\n```", config_file="x.yaml")
-    text = write_report(layout, renamed, tmp_path, {}, description)[0].read_text()
+    text = whole(write_report(layout, renamed, tmp_path, {}, description)[0])
     body = text.replace("```\n<script>\n```", "")
     assert "<img" not in body
     assert not re.search(r"(?<!\\)\]\(javascript", body)
@@ -187,7 +189,7 @@ def test_a_study_in_which_everything_failed_still_has_a_report(records, tmp_path
     _, found = records
     kept, layout = minimal(found)
     failed = [record | {"state": "failed", "reason": "no light", "scores": {}} for record in kept]
-    text = write_report(layout, failed, tmp_path, {}, Description())[0].read_text()
+    text = whole(write_report(layout, failed, tmp_path, {}, Description())[0])
     assert "9 cells, 0 with a score, 9 without" in text
     assert text.count("no light") == len(kept)
 
@@ -196,6 +198,6 @@ def test_two_targets_are_reported_without_tests(records, tmp_path):
     _, found = records
     kept, layout = minimal(found, targets=TARGETS[:1] + TARGETS[2:])
     kept = [record for record in kept if record["cell"]["target"] != TARGETS[1]]
-    text = write_report(layout, kept, tmp_path, {}, Description())[0].read_text()
+    text = whole(write_report(layout, kept, tmp_path, {}, Description())[0])
     assert "| Double phase – Wirtinger | leto-aged | 2 of 2 targets |" in text
     assert "| no test | – |" in text

@@ -9,6 +9,7 @@ import pytest
 
 from holobench_eval.report import Description, sections, write_report
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import whole
 
 FILE = '''
 """How bright the captures are, which no other section asks."""
@@ -53,15 +54,15 @@ def text_of(tmp_path: Path, condition: str) -> str:
         for target in synthetic.TARGETS
     ]
     layout = synthetic.layout(pairs=pairs, reported={}, privileged=frozenset())
-    return write_report(layout, records, tmp_path / "report", {}, Description())[0].read_text()
+    return whole(write_report(layout, records, tmp_path / "report", {}, Description())[0])
 
 
 def test_a_file_and_a_line_add_a_section_at_its_place_with_numbered_figures(added: None, tmp_path: Path) -> None:
     text = text_of(tmp_path, "ideal")
     headings = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
-    assert headings[2:5] == ["Results", r"Brightness \| of captures", "Captures to look at"]
+    assert headings[2:5] == ["What the answer rests on", r"Brightness \| of captures", "What was measured"]
     assert "\n- GS: \\*6\\* targets\n- Wirtinger: \\*6\\* targets\n" in text
-    assert "![Figure 3](figures/brightness.png)\n\n**Figure 3.** Nothing yet.\n" in text
+    assert "![Figure 2](figures/brightness.png)\n\n**Figure 2.** Nothing yet.\n" in text
     assert (tmp_path / "report" / "figures" / "brightness.png").is_file()
 
 
@@ -78,5 +79,5 @@ def test_every_file_of_sections_is_in_the_list_and_no_two_sections_share_a_place
         if path.stem != "__init__"
     }
     assert files == set(sections.NAMES)
-    orders = [section.order for section in sections.sections()]
-    assert orders == sorted(set(orders))
+    places = [(section.details, section.order) for section in sections.sections()]
+    assert places == sorted(set(places))

@@ -87,7 +87,14 @@ def test_what_changes_a_number_changes_its_cell(tmp_path: Path, old: str, new: s
     assert before.isdisjoint(cell.id for cell in plan(load_study(config)).cells)
 
 
-@pytest.mark.parametrize(("old", "new"), [('title: "Fake"', 'title: "Other"'), ("seed: 3", "seed: 3\nrepeats: 2")])
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('title: "Fake"', 'title: "Other"'),
+        ("seed: 3", "seed: 3\nrepeats: 2"),
+        ("seed: 3", "seed: 3\nquestion: Is Toy better?\nwould_change: Another seed."),
+    ],
+)
 def test_what_changes_no_number_keeps_its_cell(tmp_path: Path, old: str, new: str) -> None:
     config = write_config(tmp_path)
     before = {cell.id for cell in plan(load_study(config)).cells}

@@ -9,19 +9,24 @@ from ..data.results import Results
 from .look.medium import medium
 from .look.methods import looks
 from .quality import Row, best_first, draw_rows_of_dots, footer_of, height_of
-from .style import GREY, save, stacked, style
+from .style import GREY, save, slugs, stacked, style
 
 
-def draw(results: Results, condition: str, path: Path) -> bool:
-    """Draw the differences on a display, best method first; whether there was one to draw.
+def displays(results: Results) -> list[tuple[str, str]]:
+    """The displays that have a difference to draw, each with a name for its file."""
+    slugged = slugs(results.conditions).items()
+    return [(condition, stem) for condition, stem in slugged if any(_rows(results, condition))]
+
+
+def draw(results: Results, condition: str, path: Path) -> None:
+    """Draw the differences on one of ``displays``, best method first.
 
     Intervals are those of the paired tests, over clusters of targets (``data.statistics``). The dashed line is the
     constant image, at its mean difference to the baseline.
     """
     baseline, score = results.layout.baseline, results.headline
     rows = best_first(_rows(results, condition), score.higher_is_better)
-    if not rows or baseline is None:
-        return False
+    assert baseline is not None
     above = results.above_floor(baseline, condition)
     better = "right" if score.higher_is_better else "left"
     axis = f"difference to {baseline} in {score.axis}{results.layout.text.axis}; better: to the {better}"
@@ -41,7 +46,6 @@ def draw(results: Results, condition: str, path: Path) -> bool:
         for text in legend.get_texts():
             text.set_parse_math(False)
         save(figure, path)
-    return True
 
 
 def caption(results: Results, condition: str) -> str:
@@ -56,7 +60,7 @@ def caption(results: Results, condition: str) -> str:
 def _rows(results: Results, condition: str) -> Iterator[Row]:
     """A row for every method but the baseline; how many targets have no difference stands in its name."""
     looked, score = looks(results.names), results.headline
-    for test in results.against_baseline:
+    for test in results.against_baseline if results.layout.baseline else ():
         if test.condition != condition or not test.estimate.n:
             continue
         name = results.layout.marked(test.second)

@@ -55,6 +55,11 @@ class Thumbnails:
         quality = dict(zip(results.targets, sign * means, strict=True))
         return sorted(self.targets, key=lambda target: quality[target])
 
+    def middle(self, condition: str) -> str:
+        """The target in the middle of ``by_quality``."""
+        ordered = self.by_quality(condition)
+        return ordered[len(ordered) // 2]
+
     def _load(self, path: Path) -> Picture | None:
         picture = load_picture(path)
         if picture is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -58,7 +59,10 @@ class Layout:
     privileged: labels of methods that may differentiate through the bench; they are oracles, not competitors.
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
-    note: a paragraph that the study wants beside its tables. measure: that of the study, or ``files`` (pictures that
+    question: what the study asks (empty: what its kind asks); would_change: which result would change the answer;
+    about: what a method or a display is whose name does not say it, by label or condition; tuned: on what the settings
+    of methods were chosen, by label.
+    note: a paragraph that the study wants among its limits. measure: that of the study, or ``files`` (pictures that
     were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
     holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
     stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
@@ -83,6 +87,10 @@ class Layout:
     reported: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     reported_source: str = ""
     reported_beside: str | None = None
+    question: str = ""
+    would_change: str = ""
+    about: Mapping[str, str] = field(default_factory=dict)
+    tuned: Mapping[str, str] = field(default_factory=dict)
     note: str = ""
     measure: str = "picture"
     holograms: str = ""
@@ -187,6 +195,10 @@ def layout_of(study: Study) -> Layout:
         reported=reported.rows if reported else {},
         reported_source=reported.source if reported else "",
         reported_beside=names[reported.beside] if reported and reported.beside else None,
+        question=study.question,
+        would_change=study.would_change,
+        about=_about(study, conditions),
+        tuned={label: method.tuned for label, method in methods.items() if hasattr(method, "tuned")},
         note=study.note,
         measure=study.measure,
         metrics=study.protocol.metrics,
@@ -206,6 +218,22 @@ def layout_of(study: Study) -> Layout:
         capture_limits={entry.label: entry.captures for entry in study.methods if entry.captures is not None},
         panels={condition.name: condition.spec.shape for condition in conditions.values()},
     )
+
+
+def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
+    """What methods and displays are that go by their registered name alone: the first sentence of a docstring, the
+    description of a profile."""
+    methods = {
+        entry.label: (inspect.getdoc(plugins.find("methods", entry.name, study.folder)) or "").partition("\n\n")[0]
+        for entry in study.methods
+        if entry.label == entry.name
+    }
+    profiles = {
+        condition.name: load_profile(source, study.folder).description
+        for source, condition in conditions.items()
+        if condition.real is None and condition.learned is None
+    }
+    return {name: " ".join(text.replace("`", "").split()) for name, text in (methods | profiles).items() if text}
 
 
 def _network(params: Mapping[str, Any]) -> str:

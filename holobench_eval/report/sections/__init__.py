@@ -1,4 +1,4 @@
-"""The sections of report.md: each is a file with its tables, sentences and figures, and a line here."""
+"""The sections of report.md and details.md: each is a file with its tables, sentences and figures, and a line here."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from importlib import import_module
 from ..section import Section
 
 NAMES = (
+    "front.answer",
+    "front.overview",
     "display.error_budget",
     "setup",
-    "findings",
+    "display.findings",
     "results",
     "leaderboard",
     "sweeps",
@@ -27,6 +29,8 @@ NAMES = (
 
 
 def sections() -> list[Section]:
-    """Every section, in the order of the report; a file of small ones holds several."""
+    """Every section, those of report.md first, in the order of their file; a module of small ones holds several."""
     files = (import_module(f"{__name__}.{name}") for name in NAMES)
-    return sorted((section for file in files for section in file.SECTIONS), key=lambda section: section.order)
+    return sorted(
+        (section for file in files for section in file.SECTIONS), key=lambda section: (section.details, section.order)
+    )

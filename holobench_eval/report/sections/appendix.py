@@ -121,13 +121,22 @@ def _reproduce(report: Report, _: Figures) -> Blocks:
     description = report.description
     yield heading("Reproduce")
     yield code_block(description.command or f"holoeval run {description.config_file or 'CONFIG.yaml'}")
+    yield Markdown(
+        "[details.md](details.md) has the displays with every parameter, the methods, every metric, target and test, "
+        "captures and seconds, the config, and the environment of the run."
+    )
+    if report.layout.measure != FILES:
+        yield PAPER
+
+
+def _environment(report: Report, _: Figures) -> Blocks:
+    description = report.description
+    yield heading("Config and environment")
     if description.config_text:
         yield Markdown("The config, {}:").format(code(description.config_file))
         yield code_block(description.config_text)
     rows = environment(report.provenance)
     yield properties(rows) if rows else "The environment was not recorded."
-    if report.layout.measure != FILES:
-        yield PAPER
 
 
 def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -141,4 +150,5 @@ def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
 SECTIONS = (
     Section("reading", 200, _reading),
     Section("reproduce", 210, _reproduce),
+    Section("environment", 220, _environment, details=True),
 )

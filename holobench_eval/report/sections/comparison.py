@@ -119,6 +119,12 @@ def _stages(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 SECTIONS = (
-    Section("comparison", 80, _render, figures=_figures),
-    Section("stages", 90, lambda _, figures: figures, figures=_stages),
+    Section(
+        "comparison",
+        80,
+        _render,
+        figures=lambda report: report.pictures("comparison-*.jpg", lambda: _figures(report)),
+        details=True,
+    ),
+    Section("stages", 90, lambda _, figures: figures, figures=_stages, details=True),
 )

@@ -83,4 +83,4 @@ def timing(results: Results, workers: int) -> str:
     return f"Seconds are those of {chosen} timed alone{rest}."
 
 
-SECTIONS = (Section("cost", 170, _render),)
+SECTIONS = (Section("cost", 170, _render, details=True),)

@@ -228,4 +228,6 @@ def _caption(results: Results, panels: list[Frontier], cost: Cost) -> str:
     return " ".join(sentences)
 
 
-SECTIONS = (Section("leaderboard", 40, _render, figures=lambda report: draw(report.results, report.figures)),)
+SECTIONS = (
+    Section("leaderboard", 40, _render, figures=lambda report: draw(report.results, report.figures), details=True),
+)

@@ -81,7 +81,7 @@ def _blurred(results: Results, condition: str) -> Markdown | None:
 
 
 SECTIONS = (
-    Section("domains", 130, _domains),
-    Section("geometry", 150, _geometry),
-    Section("blur", 160, _blur),
+    Section("domains", 130, _domains, details=True),
+    Section("geometry", 150, _geometry, details=True),
+    Section("blur", 160, _blur, details=True),
 )

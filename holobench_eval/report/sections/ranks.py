@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
+from ..answers.ranks import table as methods
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
 from ..data.ranks import CIRCULAR, Cause, Feature, Pair, Ranks, share
@@ -40,18 +41,6 @@ def _render(report: Report, figures: Figures) -> Blocks:
             yield "Parameters that were drawn:"
             yield drawn
     yield from figures
-
-
-def methods(ranks: Ranks) -> Markdown:
-    """Where each method stands, nominally and over the draws."""
-    columns = ["method", "nominal rank", "first in [% of draws]", "mean rank", "best rank", "worst rank"]
-    rows = []
-    for index, label in enumerate(ranks.methods):
-        column = ranks.positions[:, index]
-        first = percent(ranks.first(label))
-        ends = (f"{column.min():.0f}", f"{column.max():.0f}")
-        rows.append([label, f"{ranks.nominal_positions[index]:.0f}", first, f"{column.mean():.1f}", *ends])
-    return table(columns, rows)
 
 
 def flips(ranks: Ranks) -> Markdown | None:

@@ -10,7 +10,6 @@ import pandas as pd
 from ...study.plan import REFERENCE
 from ..charts import paired
 from ..charts.quality import draw_quality
-from ..charts.style import slugs
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.tables import DONE, MEDIAN, STOPPED_COLUMN
@@ -37,7 +36,6 @@ def _render(report: Report, figures: Figures) -> Blocks:
         yield heading(condition, 3)
         yield table(*headline_rows(results, condition))
         yield bullets(stopped(results, condition))
-    yield layout.note
     if layout.reported_source:
         yield (
             'Columns named "reported" hold published figures from other hardware and other images; they were not '
@@ -140,10 +138,10 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     results, text = report.results, report.layout.text
     if results.done.empty:
         return
-    for condition, stem in slugs(results.conditions).items():
+    for condition, stem in paired.displays(results)[1:]:  # that of the first display stands on the first page
         path = report.figures / f"quality-paired-{stem}.png"
-        if paired.draw(results, condition, path):
-            yield path, paired.caption(results, condition)
+        paired.draw(results, condition, path)
+        yield path, paired.caption(results, condition)
     floors = {
         text.floor_name(name): float(results.row(name, REFERENCE)[results.headline.key])
         for name in ("floor_constant", "floor_speckle")
@@ -158,4 +156,4 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     )
 
 
-SECTIONS = (Section("results", 30, _render, figures=_figures),)
+SECTIONS = (Section("results", 30, _render, figures=_figures, details=True),)

@@ -12,7 +12,7 @@ from ..data.results import Results
 from ..data.tables import DONE
 from ..data.text import FILES, plain, words
 from ..data.trainings import DISPLAY, Training
-from ..markdown import Markdown, bullets, code, heading, properties, table
+from ..markdown import Markdown, blocks, bullets, code, heading, properties, table
 from ..section import Blocks, Figures, Report, Section
 
 TARGETS_NAMED = 40
@@ -27,19 +27,28 @@ def _setup(report: Report, _: Figures) -> Blocks:
     yield heading("What was measured")
     yield layout.text.procedure
     yield properties(_from_files(report) if layout.measure == FILES else _on_displays(report))
-    displays = report.description.displays
-    if displays:
-        yield layout.text.displays
-    elif layout.measure != FILES:
-        yield "No description of the displays was recorded."
+
+
+def _described(report: Report, _: Figures) -> Blocks:
+    layout, displays = report.layout, report.description.displays
+    yield heading("Displays and methods")
+    yield layout.text.displays if displays else "No description of the displays was recorded."
     for display in displays:
         yield heading(f"Display {display.name}", 3)
         yield display.heading
         yield bullets(display.lines)
-    if layout.measure != FILES:
-        yield heading("Methods", 3)
-        yield _methods(report)
+    yield heading("Methods", 3)
+    yield _methods(report)
     yield training_paragraph(layout, report.trainings)
+
+
+def _details_of(report: Report) -> Markdown:
+    return blocks(
+        [
+            heading(Markdown("Details: {}").format(report.layout.title), 1),
+            Markdown("What [report.md](report.md) rests on, number by number."),
+        ]
+    )
 
 
 def counts(results: Results) -> str:
@@ -159,5 +168,7 @@ def _captures_taken(trainings: Sequence[Training]) -> str:
 
 SECTIONS = (
     Section("title", 0, _title),
-    Section("setup", 20, _setup),
+    Section("details", 1, lambda report, _: [_details_of(report)], details=True),
+    Section("setup", 75, _setup),
+    Section("displays and methods", 20, _described, lambda report: report.layout.measure != FILES, details=True),
 )

@@ -218,13 +218,18 @@ def _claim(sweep: Sweep, label: str) -> str:
     )
 
 
-def _figures(report: Report) -> Iterator[tuple[Path, str]]:
-    """Curves of every kind of change, and rows of pictures of the target in the middle of their ranking by quality."""
-    results, drawable = report.results, [sweep for sweep in report.sweeps if sweep.methods]
-    thumbnails = report.thumbnails
-    for kind in dict.fromkeys(sweep.swept.kind for sweep in drawable):
-        same = [sweep for sweep in drawable if sweep.swept.kind == kind]
-        change = same[0].kind.words
+def _by_kind(report: Report) -> list[list[Sweep]]:
+    """The sweeps with rows of methods, those of a kind together."""
+    drawable = [sweep for sweep in report.sweeps if sweep.methods]
+    kinds = dict.fromkeys(sweep.swept.kind for sweep in drawable)
+    return [[sweep for sweep in drawable if sweep.swept.kind == kind] for kind in kinds]
+
+
+def _curves(report: Report) -> Iterator[tuple[Path, str]]:
+    """Curves of every kind of change."""
+    results = report.results
+    for same in _by_kind(report):
+        change, kind = same[0].kind.words, same[0].swept.kind
         path = report.figures / f"quality-sweep-{kind}.png"
         draw_sweep(path, [_panel(sweep) for sweep in same], f"{results.headline.axis}{report.layout.text.axis}")
         yield (
@@ -232,10 +237,16 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
             f"{results.headline.axis} along a change: {change}. Mean over targets; bars, slightly offset: 95 % "
             "interval of the paired mean difference to the unchanged display. Dashed: the baseline.",
         )
-        if not thumbnails.targets:
-            continue
-        ordered = thumbnails.by_quality(results.conditions[0])
-        target = ordered[len(ordered) // 2]
+
+
+def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
+    """Rows of pictures of the target in the middle of their ranking by quality."""
+    thumbnails = report.thumbnails
+    if not thumbnails.targets:
+        return
+    target = thumbnails.middle(report.results.conditions[0])
+    for same in _by_kind(report):
+        change, kind = same[0].kind.words, same[0].swept.kind
         for sweep in same:
             stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in sweep.swept.before)
             path = report.figures / f"sweep-{kind}-{stem}.jpg"
@@ -298,6 +309,18 @@ def _chosen(sweep: Sweep) -> list[str]:
     return list(dict.fromkeys([*first, *paper, *others]))[:MOST_ROWS]
 
 
+def _any(report: Report) -> bool:
+    return any(sweep.methods for sweep in report.sweeps)
+
+
 SECTIONS = (
-    Section("sweeps", 50, _render, applies=lambda report: any(s.methods for s in report.sweeps), figures=_figures),
+    Section("along the changes", 45, lambda _, figures: figures, applies=_any, figures=_curves),
+    Section(
+        "sweeps",
+        50,
+        _render,
+        applies=_any,
+        figures=lambda report: report.pictures("sweep-*.jpg", lambda: _pictures(report)),
+        details=True,
+    ),
 )

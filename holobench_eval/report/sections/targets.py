@@ -94,7 +94,7 @@ def _holes(report: Report, _: Figures) -> Blocks:
 
 
 SECTIONS = (
-    Section("paired tests", 120, _paired_tests),
-    Section("every target", 180, _every_target),
-    Section("holes", 190, _holes),
+    Section("paired tests", 120, _paired_tests, details=True),
+    Section("every target", 180, _every_target, details=True),
+    Section("holes", 190, _holes, details=True),
 )

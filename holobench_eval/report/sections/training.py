@@ -108,4 +108,4 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         )
 
 
-SECTIONS = (Section("training", 100, _render, applies=lambda report: bool(report.trainings), figures=_figures),)
+SECTIONS = (Section("training", 100, _render, lambda report: bool(report.trainings), figures=_figures, details=True),)

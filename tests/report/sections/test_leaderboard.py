@@ -4,7 +4,7 @@ from holobench_eval.report import Results, csv_text, read_records, recompute_tab
 from holobench_eval.report.data.categories import meanings
 from holobench_eval.report.data.columns import file_name
 from holobench_eval.report.files.tidy import tidy_records, tidy_table
-from holobench_eval.report.sections.findings import findings
+from holobench_eval.report.sections.display.findings import findings
 from holobench_eval.report.sections.leaderboard import leaderboard, reading
 from holobench_eval.report.sections.results import stopped
 from holobench_eval.study.plan import REFERENCE

@@ -19,6 +19,7 @@ from holobench_eval.report.description import Description
 from holobench_eval.report.sections import ranks as section_ranks
 from holobench_eval.study.config import load_study
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import whole
 
 Quality = Callable[[Mapping[str, float]], float]
 
@@ -225,7 +226,7 @@ def test_a_share_has_wilsons_interval():
 
 def test_the_report_has_the_section_its_tables_and_its_figure(tmp_path):
     records, layout = study(FLIPPING)
-    text = write_report(layout, records, tmp_path, {}, Description())[0].read_text()
+    text = whole(write_report(layout, records, tmp_path, {}, Description())[0])
     section = text.partition("## Rank stability")[2].partition("\n## ")[0]
     for phrase in (
         "### leto-aged, 30 draws",

@@ -15,6 +15,7 @@ from holobench_eval.report.data.sweeps import Sweep, sweeps
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.report.sections import sweeps as section_sweeps
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import whole
 
 TARGETS = ("a", "b", "c", "d")
 DAYS = (30.0, 60.0, 90.0)
@@ -153,7 +154,7 @@ def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Res
 
 def test_a_report_with_sweeps_has_curves_and_tables(tmp_path: Path, results: Results) -> None:
     path, _ = write_report(layout(), records(), tmp_path, {}, Description())
-    text = path.read_text()
+    text = whole(path)
     assert "## Changes of the displays" in text
     assert "### Drift since calibration: leto-aged" in text
     assert "loss per 30 days [dB]" in text

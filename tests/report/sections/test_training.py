@@ -14,6 +14,7 @@ from holobench_eval.report.description import Description
 from holobench_eval.report.files.tidy import tidy_records, tidy_table
 from holobench_eval.study.artifacts import Round, rounds_in, rounds_of
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import whole
 
 TARGETS = synthetic.TARGETS[1:4]
 PAIRS = (("GS", "leto-aged"), ("HIL", "leto-aged"), ("U-Net", "leto-aged"))
@@ -67,7 +68,7 @@ def found(tmp_path_factory):
 
 
 def written(found, tmp_path, **changes):
-    return write_report(layout(**changes), found, tmp_path, {}, Description())[0].read_text()
+    return whole(write_report(layout(**changes), found, tmp_path, {}, Description())[0])
 
 
 def rows_under(text, heading):
@@ -234,10 +235,10 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         assert phrase in text, phrase
 
 
-def test_the_note_of_a_study_stands_behind_its_table_as_text(found, tmp_path):
+def test_the_note_of_a_study_stands_among_its_limits_as_text(found, tmp_path):
     text = written(found, tmp_path, note="Weights *as drawn*.\n\n# No heading | no table")
     place = text.index("Weights \\*as drawn\\*. # No heading \\| no table")
-    assert text.index("\n## Results\n") < place < text.index("\n### The floor\n")
+    assert text.index("\n### Limits\n") < place < text.index("\n## What the answer rests on\n")
 
 
 def test_hostile_names_in_a_training_stay_text(found, tmp_path):

@@ -133,4 +133,4 @@ def _verdict(rows: Sequence[Row]) -> str:
     return f"{len(judged) - len(outside)} of {len(judged)} numbers are within their stated errors; outside: {named}."
 
 
-SECTIONS = (Section("diagnosis", 110, _render),)
+SECTIONS = (Section("diagnosis", 110, _render, details=True),)

@@ -13,7 +13,7 @@ from ...markdown import Markdown, blocks, bullets, heading, table
 from ...section import Blocks, Figures, Report, Section
 
 
-def _render(report: Report, figures: Figures) -> Blocks:
+def _render(report: Report, _: Figures) -> Blocks:
     found = budgets(report.results)
     yield heading("The error budget")
     yield (
@@ -22,7 +22,6 @@ def _render(report: Report, figures: Figures) -> Blocks:
         "of the hologram that was shown; models were trained on captures of other images."
     )
     yield bullets(reading(budget, report.layout.holograms.partition(" (")[0]) for budget in found)
-    yield from figures
     if not found:
         yield "No display has the scores of all methods for all targets, so none has a budget."
         return
@@ -102,12 +101,11 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         )
 
 
+def _applies(report: Report) -> bool:
+    return report.layout.measure == "error_budget" and bool(report.results.conditions)
+
+
 SECTIONS = (
-    Section(
-        "error budget",
-        5,
-        _render,
-        applies=lambda report: report.layout.measure == "error_budget" and bool(report.results.conditions),
-        figures=_figures,
-    ),
+    Section("error budget, drawn", 5, lambda _, figures: figures, applies=_applies, figures=_figures),
+    Section("error budget", 5, _render, applies=_applies, details=True),
 )

@@ -8,6 +8,7 @@ from holobench_eval.report.charts.error_budget import draw_budgets
 from holobench_eval.report.data.error_budget import budgets
 from holobench_eval.report.sections.display.error_budget import reading
 from tests.report.data.test_error_budget import LEFT, METHODS, record, results
+from tests.support.reports import whole
 
 
 def test_the_paragraph_bounds_what_each_prediction_and_the_noise_allow() -> None:
@@ -37,10 +38,11 @@ def test_noise_of_some_targets_is_said_to_be_theirs() -> None:
     assert "over the 2 of 3 targets that have any." in str(reading(some, "wirtinger"))
 
 
-def test_a_report_has_the_budget_and_its_figure_before_all_else(tmp_path: Path) -> None:
+def test_a_report_has_the_figure_of_the_budget_on_its_first_page_and_its_tables_in_the_details(tmp_path: Path) -> None:
     records = [record(label, target) for target in LEFT for label in METHODS]
-    text = write_report(results().layout, records, tmp_path, {}, Description())[0].read_text()
-    assert text.index("## The error budget") < text.index("## Findings")
+    text = whole(write_report(results().layout, records, tmp_path, {}, Description())[0])
+    assert text.index("## Answer") < text.index("(figures/error-budget.png)") < text.index("## What was measured")
+    assert text.index("# Details: ") < text.index("## The error budget")
     assert (tmp_path / "figures" / "error-budget.png").is_file()
     assert "| temporal noise |" in text
 

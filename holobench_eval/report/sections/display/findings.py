@@ -1,4 +1,4 @@
-"""What the numbers say, as sentences; each is computed from the records and none is written without its numbers."""
+"""What the numbers of each display say, as sentences; none is written without its numbers."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from typing import Literal
 
 import numpy as np
 
-from ...study.plan import REFERENCE
-from ..data.categories import CALIBRATED, ONLINE
-from ..data.results import Results
-from ..data.scores import DOMAIN_NAMES, Score
-from ..data.statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
-from ..data.text import p_value, percent, sample, words
-from ..markdown import bullets, heading
-from ..section import Blocks, Figures, Report, Section
+from ....study.plan import REFERENCE
+from ...data.categories import CALIBRATED, ONLINE
+from ...data.phrases import difference, margin
+from ...data.results import Results
+from ...data.scores import DOMAIN_NAMES
+from ...data.statistics import FEWEST, SIGNIFICANCE
+from ...data.text import percent, words
+from ...markdown import bullets, heading
+from ...section import Blocks, Figures, Report, Section
 
 
 def _render(report: Report, _: Figures) -> Blocks:
     text = report.layout.text
-    yield heading("Findings")
+    yield heading("Display by display")
     yield (
         f'Computed from the records of this study. The headline metric is "{report.results.headline.axis}"{text.axis}; '
         f"intervals are 95 %. {text.caution}"
@@ -51,22 +52,6 @@ def findings(results: Results) -> list[tuple[str, list[str]]]:
     ]
     across = _across_conditions(results)
     return [*groups, ("Across displays", across)] if across else groups
-
-
-def _margin(score: Score, test: PairedTest) -> str:
-    """The mean paired difference, second minus first, with all that belongs to it."""
-    found = test.estimate
-    difference = f"{_difference(score, found)} over {sample(found, test.differences.size)}"
-    if found.clusters < FEWEST:
-        return f"{difference}, too few for an interval or a test"
-    return f"{difference}, {p_value(test.p)}{'' if test.is_shown else ': not shown'}"
-
-
-def _difference(score: Score, estimate: Estimate) -> str:
-    """``+1.20 dB [+0.80, +1.60]``."""
-    mean = score.with_unit(estimate.mean, signed=True)
-    ends = (score.number(end, signed=True) for end in (estimate.low, estimate.high))
-    return mean if np.isnan(estimate.low) else f"{mean} [{', '.join(ends)}]"
 
 
 def _best(results: Results, condition: str) -> list[str]:
@@ -104,9 +89,9 @@ def _leading(
     for test in results.against_baseline:
         if test.condition == condition and test.second in compared and test.estimate.n:
             if best == baseline:
-                return [f"{sentence} {test.second} follows at {_margin(score, test)}."]
+                return [f"{sentence} {test.second} follows at {margin(score, test)}."]
             other = score.with_unit(results.row(test.first, condition)[score.key])
-            sentence += f" Difference from the baseline {baseline} ({other}): {_margin(score, test)}."
+            sentence += f" Difference from the baseline {baseline} ({other}): {margin(score, test)}."
     return [sentence + _lead(results, condition, ranking)]
 
 
@@ -117,8 +102,8 @@ def _lead(results: Results, condition: str, ranking: Sequence[str]) -> str:
     first, second = ranking[:2]
     lead = results.estimate(results.values(first, condition) - results.values(second, condition))
     zero = ", and its interval holds zero" if lead.low <= 0 <= lead.high else ""
-    difference = f"{_difference(results.headline, lead)}, untested, as the two were chosen by rank{zero}"
-    return f" It differs from the second, {second}, by {difference}."
+    apart = f"{difference(results.headline, lead)}, untested, as the two were chosen by rank{zero}"
+    return f" It differs from the second, {second}, by {apart}."
 
 
 def _second_baseline(results: Results, condition: str) -> list[str]:
@@ -128,7 +113,7 @@ def _second_baseline(results: Results, condition: str) -> list[str]:
         return []
     value, own = score.with_unit(results.row(second, condition)[score.key]), results.values(second, condition)
     differences = [
-        f"{label} {_difference(score, results.estimate(results.values(label, condition) - own))}"
+        f"{label} {difference(score, results.estimate(results.values(label, condition) - own))}"
         for label in results.ranking(condition)
         if label != second
     ]
@@ -163,7 +148,7 @@ def _oracle(results: Results, condition: str) -> list[str]:
             gap = results.estimate(results.values(label, condition) - results.values(ranking[0], condition))
             sentences.append(
                 f"The privileged method {label}, an oracle that may differentiate through the bench, scores "
-                f"{score.with_unit(value)}, {_difference(score, gap)} from {ranking[0]}."
+                f"{score.with_unit(value)}, {difference(score, gap)} from {ranking[0]}."
             )
     for category in (CALIBRATED, ONLINE):
         best = results.ranking(condition, categories=(category,))[:1]
@@ -248,4 +233,4 @@ def _across_conditions(results: Results) -> list[str]:
     return [f"The order of methods depends on the display: {listed}."]
 
 
-SECTIONS = (Section("findings", 10, _render, applies=lambda report: bool(report.results.conditions)),)
+SECTIONS = (Section("findings", 10, _render, applies=lambda report: bool(report.results.conditions), details=True),)

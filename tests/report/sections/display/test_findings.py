@@ -4,7 +4,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, records_frame
 from holobench_eval.report.data.tables import read_records
-from holobench_eval.report.sections.findings import findings
+from holobench_eval.report.sections.display.findings import findings
 from holobench_eval.study.plan import REFERENCE
 from tests.support import synthetic_study as synthetic
 

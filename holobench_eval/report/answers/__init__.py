@@ -1,0 +1,25 @@
+"""What a study's records answer to its question: a file for each kind of study, and a line here."""
+
+from __future__ import annotations
+
+from ..data.results import Results
+from . import ablation, budget, comparison, error_budget, focus, learned_display, prediction, ranks, sweeps
+from .kind import Kind
+
+# The first that applies answers; a comparison of methods is what any study is.
+KINDS = (
+    error_budget.KIND,
+    learned_display.KIND,
+    prediction.KIND,
+    focus.KIND,
+    ranks.KIND,
+    sweeps.KIND,
+    ablation.KIND,
+    budget.KIND,
+    comparison.KIND,
+)
+
+
+def kind_of(results: Results) -> Kind:
+    """The kind of a study."""
+    return next(kind for kind in KINDS if kind.applies(results))

@@ -1,0 +1,73 @@
+"""Ablation: which single change of the baseline method matters, and in which direction?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..data.phrases import difference, tested, value, verdict
+from ..data.results import Results
+from ..data.statistics import PairedTest
+from ..data.text import words
+from .comparison import against_baseline, floor, rows
+from .kind import Kind, subjects
+
+FEWEST = 3  # variants of the baseline method that make a study an ablation
+NAMED = 6  # changes that the answer lists with their differences
+
+
+def variants(results: Results) -> list[str]:
+    """The rows that are the baseline's own method with other settings."""
+    names = results.frame.drop_duplicates("method").set_index("method")["name"]
+    baseline = results.layout.baseline
+    return [label for label in results.layout.methods if label != baseline and names.get(label) == names.get(baseline)]
+
+
+def _applies(results: Results) -> bool:
+    return len(variants(results)) >= max(FEWEST, len(results.layout.methods) / 2 - 1)
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """Display by display what lowers, raises and does not move the score; then the other methods."""
+    for condition in results.conditions:
+        tests = [test for label in variants(results) if (test := tested(results, label, condition))]
+        if tests:
+            yield from _changes(results, condition, tests)
+    others = [label for label in results.layout.methods if label not in variants(results)]
+    yield from (against_baseline(results, label) for label in others if label in subjects(results))
+    yield from floor(results)
+
+
+def _changes(results: Results, condition: str, tests: list[PairedTest]) -> Iterator[str]:
+    score, baseline = results.headline, str(results.layout.baseline)
+    groups: dict[str, list[PairedTest]] = {}
+    for test in sorted(tests, key=lambda test: -abs(test.estimate.mean)):
+        groups.setdefault(verdict(score, test), []).append(test)
+    whole = f"{baseline} on {condition} ({value(results, baseline, condition)})"
+    for name, effect in (("worse", "lower"), ("better", "raise")):
+        found = groups.get(name, [])
+        listed = [f"{test.second} ({difference(score, test.estimate)})" for test in found[:NAMED]]
+        more = f", and {len(found) - NAMED} more" if len(found) > NAMED else ""
+        some = f"{words(listed)}{more}" if listed else "none"
+        yield f"Of {len(tests)} single changes of {whole}, those shown to {effect} the score: {some}."
+    unclear = groups.get("not shown to differ", []) + groups.get("not tested", [])
+    if unclear:
+        ends = np.array([[test.estimate.low, test.estimate.high] for test in unclear])
+        within = f", whose intervals reach from {score.number(np.nanmin(ends), signed=True)} to " + (
+            f"{score.with_unit(np.nanmax(ends), signed=True)}"
+        )
+        bounds = within if np.isfinite(ends).any() else ""
+        yield f"No difference is shown for the other {len(unclear)}{bounds}: {words([t.second for t in unclear])}."
+
+
+KIND = Kind(
+    question="Which single change of the method matters?",
+    applies=_applies,
+    sentences=sentences,
+    table=rows,
+    limits=(
+        "Training: each row was trained once, and the intervals do not hold what another training of the same row "
+        "would change; a row with another seed, where there is one, shows how much that is.",
+    ),
+)

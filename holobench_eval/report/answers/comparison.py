@@ -1,0 +1,153 @@
+"""Comparison of methods: is what the question names better than the baseline, and what is best on each display?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..data.categories import OFFLINE, ONLINE
+from ..data.marks import marked
+from ..data.phrases import difference, relation, tested, value, verdict
+from ..data.results import Results
+from ..data.scores import DOMAIN_NAMES
+from ..data.text import number, p_value, percent, words
+from ..markdown import Markdown, table
+from .kind import Kind, subjects
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """The named methods against the baseline, the best on each display, the online track, the oracle, the floor."""
+    yield from (sentence for label in subjects(results)[:2] if (sentence := against_baseline(results, label)))
+    yield best(results)
+    yield from online(results)
+    yield from floor(results)
+    yield from oracle(results)
+
+
+def against_baseline(results: Results, label: str) -> str:
+    """One sentence on a method and the baseline on every display that has both; empty where none has."""
+    score, baseline = results.headline, str(results.layout.baseline)
+    parts = [
+        f"on {condition} {relation(score, test)} ({value(results, label, condition)} against "
+        f"{value(results, baseline, condition)})"
+        for condition in results.conditions
+        if (test := tested(results, label, condition))
+    ]
+    return f"{label}: {'; '.join(parts)}." if parts else ""
+
+
+def best(results: Results) -> str:
+    """The best mean of every display, and by how much it is above the baseline."""
+    parts = [_first(results, condition) for condition in results.conditions]
+    track = " without a camera for the scored image" if ONLINE in results.categories else ""
+    if not any(parts):
+        return "No method has a score for every target, so none is ranked."
+    score, domain = results.headline, DOMAIN_NAMES.get(results.headline.domain)
+    metric = f"{score.title} ({domain})" if domain else score.title
+    return f"The best mean {metric}{track}: {'; '.join(filter(None, parts))}."
+
+
+def _first(results: Results, condition: str) -> str:
+    ranking = results.ranking(condition, categories=OFFLINE)
+    if not ranking:
+        return ""
+    first, score = ranking[0], results.headline
+    own = f"on {condition} {first}, {value(results, first, condition)}"
+    if first == results.layout.baseline:
+        test = tested(results, ranking[1], condition) if len(ranking) > 1 else None
+        return f"{own}{f', followed by {ranking[1]}, {relation(score, test)}' if test else ''}"
+    test = tested(results, first, condition)
+    return f"{own}{f', {relation(score, test)}' if test and first not in subjects(results) else ''}"
+
+
+def online(results: Results) -> Iterator[str]:
+    """The best of those that see the camera for the scored image."""
+    parts = []
+    for condition in results.conditions:
+        for label in results.ranking(condition, categories=(ONLINE,))[:1]:
+            test = tested(results, label, condition)
+            against = f", {relation(results.headline, test)}" if test and label not in subjects(results) else ""
+            parts.append(f"on {condition} {label}, {value(results, label, condition)}{against}")
+    if parts:
+        yield f"With a camera for the scored image the best is {'; '.join(parts)}."
+
+
+def floor(results: Results) -> Iterator[str]:
+    """Who is not above what a constant image scores."""
+    parts, known = [], False
+    for condition in results.conditions:
+        above = {label: results.above_floor(label, condition) for label in results.methods(condition)}
+        scored = {label: gap for label, gap in above.items() if gap and gap.n == len(results.targets)}
+        known = known or bool(scored)
+        below = [label for label, gap in scored.items() if not results.headline.better(gap.mean, 0.0)]
+        if below:
+            parts.append(f"{words(below)} on {condition}")
+    if parts:
+        yield f"No better on average than a constant image in the place of a {results.layout.text.scored}: " + (
+            f"{'; '.join(parts)}."
+        )
+    elif known:
+        yield f"Every method is better on average than a constant image in the place of a {results.layout.text.scored}."
+
+
+def oracle(results: Results) -> Iterator[str]:
+    """What an oracle reaches, and how much of the gap the best method closes."""
+    parts = []
+    for condition in results.conditions:
+        ranking, top = results.ranking(condition), results.oracle(condition)
+        if top and ranking:
+            gap = results.estimate(results.values(top, condition) - results.values(ranking[0], condition))
+            closed = results.gap_closed(ranking[0], condition) if ranking[0] != results.layout.baseline else None
+            share = f", so {ranking[0]} closes {percent(closed)} % of the gap from the baseline" if closed else ""
+            parts.append(
+                f"{value(results, top, condition)} on {condition}, {difference(results.headline, gap)} from "
+                f"{ranking[0]}{share}"
+            )
+    if parts:
+        yield f"The oracle, which knows the simulated bench, reaches {'; '.join(parts)}."
+
+
+def rows(results: Results) -> Markdown | None:
+    """A row a method and display, best mean first: score, difference to the baseline, verdict, captures."""
+    many, captures = len(results.conditions) > 1, "total_captures" in results.table and results.layout.spends_captures
+    baseline = results.layout.baseline
+    headings = ["method", *(["display"] if many else []), results.headline.heading]
+    headings += [f"difference to {baseline}", "verdict"] if results.against_baseline else []
+    headings += ["captures in total"] if captures else []
+    lines = []
+    for condition in results.conditions:
+        for label in _ordered(results, condition):
+            row, test = results.row(label, condition), tested(results, label, condition)
+            line = [marked(results, label, condition), *([condition] if many else []), results.headline.in_row(row)]
+            if results.against_baseline:
+                line += (
+                    _compared(results, label, condition) if test else ["baseline" if label == baseline else "–", "–"]
+                )
+            lines.append([*line, *([number(row["total_captures"])] if captures else [])])
+    return table(headings, lines) if lines else None
+
+
+def _ordered(results: Results, condition: str) -> list[str]:
+    """Methods with every target by their mean, then those that lack one."""
+    sign = -1 if results.headline.higher_is_better else 1
+
+    def place(label: str) -> tuple[bool, float]:
+        complete = results.is_complete(label, condition)
+        return not complete, sign * float(results.values(label, condition).mean()) if complete else 0.0
+
+    return sorted(results.methods(condition), key=place)
+
+
+def _compared(results: Results, label: str, condition: str) -> list[str]:
+    test = tested(results, label, condition)
+    assert test is not None
+    shown = verdict(results.headline, test)
+    p = "" if shown == "not tested" else f", {p_value(test.p)}"
+    return [results.headline.estimate(test.estimate, signed=True), f"{shown}{p}"]
+
+
+KIND = Kind(
+    question="Which method gives the better picture, and by how much?",
+    applies=lambda results: True,
+    sentences=sentences,
+    table=rows,
+)

@@ -1,0 +1,76 @@
+"""Error budget: which part of the error of captures an image, a network or a field model explains, and which none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..data.error_budget import Budget, Part, budgets
+from ..data.results import Results
+from ..data.statistics import Estimate
+from ..data.text import percent, words
+from ..markdown import Markdown, table
+from .kind import Kind
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """A sentence a display: what the image-domain predictions, then all of them, explain, and what remains."""
+    found = budgets(results)
+    if not found:
+        yield "No display has the scores of all methods for all targets, so none has a budget."
+    for budget in found:
+        yield _reading(budget)
+
+
+def _reading(budget: Budget) -> str:
+    shares = [f"{part.label} {_percent(part)} %" for part in budget.parts]
+    gains = [f"{_gain(part)} with {part.label}" for part in budget.explained]
+    return (
+        f"On {budget.condition} the captures have a PSNR of {_decibel(budget.psnr)}, and their squared error splits "
+        f"into {words(shares)}; removing one part after the other would gain at most {words(gains)}."
+    )
+
+
+def _percent(part: Part) -> str:
+    return percent(part.share)
+
+
+def _gain(part: Part) -> str:
+    return _decibel(part.gain) if part.gain else "–"
+
+
+def _decibel(found: Estimate) -> str:
+    return f"{_interval(found)} dB"
+
+
+def _interval(found: Estimate) -> str:
+    mean, low, high = (f"{value:z.1f}" for value in (found.mean, found.low, found.high))
+    return mean if low == "nan" else f"{mean} [{low}, {high}]"
+
+
+def rows(results: Results) -> Markdown | None:
+    """A row a display and part: its share, what removing it and all above it would gain, what it leaves by itself."""
+    lines = [
+        [
+            budget.condition,
+            part.label,
+            _percent(part),
+            _interval(part.gain) if part.gain else "–",
+            percent(part.alone),
+        ]
+        for budget in budgets(results)
+        for part in budget.parts
+    ]
+    columns = ["display", "explained by", "share of the squared error [%]", "PSNR gained at most, with all above [dB]"]
+    return table([*columns, "left by it alone [%]"], lines) if lines else None
+
+
+KIND = Kind(
+    question="Where does the error of the captures come from, and who can remove it?",
+    applies=lambda results: results.layout.measure == "error_budget",
+    sentences=sentences,
+    table=rows,
+    limits=(
+        "Bounds: a part is what one prediction explains and none before it did, for whom it is known which prediction "
+        "to believe; what it would gain in dB is an upper bound, and a larger model or more captures may explain more.",
+    ),
+)

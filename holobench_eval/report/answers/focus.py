@@ -1,0 +1,75 @@
+"""Focus: one hologram of all planes of a scene against one hologram a plane, moved by a lens phase."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..data.marks import marked
+from ..data.phrases import relation, tested
+from ..data.results import Results
+from ..data.text import number
+from ..markdown import Markdown, table
+from .comparison import best, floor
+from .kind import Kind, subjects
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """The methods that make one hologram of all planes, or that the question names, against the baseline; the best."""
+    layout, score = results.layout, results.headline
+    chosen = dict.fromkeys([*(label for label in layout.methods if label in layout.stacked), *subjects(results)])
+    for label in list(chosen)[:2]:
+        parts = [
+            f"on {condition} {relation(score, test)}, in {_times(results, label, condition)}"
+            for condition in results.conditions
+            if (test := tested(results, label, condition))
+        ]
+        what = "one hologram of all planes" if label in layout.stacked else "one hologram a plane, moved by a lens"
+        if parts:
+            yield f"{label}, {what}: {'; '.join(parts)}."
+    yield best(results)
+    yield from floor(results)
+
+
+def _planes(results: Results) -> int:
+    return len({plane for _, plane in results.layout.planes.values()})
+
+
+def _seconds(results: Results, label: str, condition: str) -> float:
+    """Computing time of a scene [s]."""
+    times = 1 if label in results.layout.stacked else _planes(results)
+    return times * float(results.row(label, condition)["seconds"])
+
+
+def _times(results: Results, label: str, condition: str) -> str:
+    own, other = (_seconds(results, name, condition) for name in (label, str(results.layout.baseline)))
+    return f"{number(own / other)} times the computing time of a scene"
+
+
+def rows(results: Results) -> Markdown | None:
+    """A row a method and display: score over all planes, difference to the baseline, seconds a scene."""
+    score, baseline = results.headline, results.layout.baseline
+    lines = [
+        [
+            marked(results, label, condition),
+            condition,
+            "all planes" if label in results.layout.stacked else "one plane",
+            score.in_row(results.row(label, condition)),
+            score.estimate(test.estimate, signed=True) if (test := tested(results, label, condition)) else "–",
+            number(_seconds(results, label, condition)),
+        ]
+        for condition in results.conditions
+        for label in results.methods(condition)
+    ]
+    headings = ["method", "display", "hologram of", score.heading, f"difference to {baseline}", "seconds a scene"]
+    return table(headings, lines) if lines else None
+
+
+KIND = Kind(
+    question="What does one hologram of all planes gain over one hologram a plane, and what does it cost?",
+    applies=lambda results: bool(results.layout.planes),
+    sentences=sentences,
+    table=rows,
+    limits=(
+        "Scenes: the planes of a scene are not independent, so intervals and tests are over scenes, which are few.",
+    ),
+)

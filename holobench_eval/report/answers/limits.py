@@ -1,0 +1,104 @@
+"""How far an answer goes: the sample, the displays, who has the form of the bench, and what was tuned on what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...study.plan import REFERENCE
+from ..data.statistics import FEWEST, SIGNIFICANCE
+from ..data.text import FILES, words
+from ..markdown import Markdown
+from ..section import Report
+from .kind import Kind
+
+
+def limits(report: Report, kind: Kind) -> Iterator[Markdown]:
+    """The items of the list, each with its name in bold."""
+    for text in (*_all(report), *kind.limits):
+        name, _, rest = text.partition(": ")
+        yield Markdown("**{}.** {}").format(name, f"{rest[:1].upper()}{rest[1:]}")
+
+
+def _all(report: Report) -> Iterator[str]:
+    yield f"Sample: {_sample(report)}"
+    if report.layout.text.caution:
+        yield f"Measured: {report.layout.text.caution}"
+    yield from _displays(report)
+    yield from _form(report)
+    yield from _tuned(report)
+    if report.layout.note:
+        yield f"Note: {report.layout.note}"
+    if report.layout.privileged:
+        yield (
+            f"Oracle: the method {words(sorted(report.layout.privileged))} may differentiate through the simulated "
+            "bench, which no real method can; it bounds what is possible and is not ranked."
+        )
+
+
+def _sample(report: Report) -> str:
+    results = report.results
+    targets, clusters = len(results.targets), len(set(results.clusters))
+    among = (
+        f" in {clusters} clusters (parts of one picture form a cluster, which counts as one)"
+        if clusters < targets
+        else ""
+    )
+    trained = ", nor with another training of a method, each of which was trained once" if report.trainings else ""
+    parts = [
+        f"{targets} target{'s' * (targets != 1)}{among}; brackets hold 95 % intervals of how a mean varies with other "
+        f"images of the kind, not with other displays{trained}."
+    ]
+    tests = sum(np.isfinite(test.p) for test in results.against_baseline)
+    if tests:
+        smallest = 2.0 ** (1 - clusters)
+        parts.append(
+            f"p is adjusted for all {tests} comparisons with the baseline; a difference is shown at p < "
+            f"{SIGNIFICANCE}; not shown does not mean that there is none."
+        )
+        if smallest >= SIGNIFICANCE:
+            parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")
+    elif clusters < FEWEST:
+        parts.append(f"Fewer than {FEWEST} clusters give no interval and no test.")
+    holes = int((results.holes["condition"] != REFERENCE).sum())
+    if holes:
+        parts.append(
+            f"{holes} planned cells have no score (details.md says why); a method that lacks one is not ranked."
+        )
+    return " ".join(parts)
+
+
+def _displays(report: Report) -> Iterator[str]:
+    same: dict[str, list[str]] = {}
+    for display in report.description.displays:
+        same.setdefault(display.basis or display.heading, []).append(display.name)
+    for basis, names in same.items():
+        yield f"Display{'s' * (len(names) > 1)} {words(names)}: {basis.rstrip('.')}."
+    if report.layout.measure == FILES:
+        yield "Display: real, and known from its photographs alone."
+
+
+def _form(report: Report) -> Iterator[str]:
+    """Which methods fit a model that has the bench's own equations for some of its effects."""
+    for display in report.description.displays:
+        same: dict[tuple[str, ...], list[str]] = {}
+        for label, effects in display.modelled.items():
+            if effects and label in report.results.methods(display.name):
+                same.setdefault(effects, []).append(label)
+        for effects, labels in same.items():
+            which = ", ".join(name.replace("_", " ") for name in effects)
+            yield (
+                f"Inverse crime on {display.name}: the model of {words(labels)} has the bench's own form for "
+                f"{len(effects)} of its {display.effects} effects ({which}), so what is gained there is an upper "
+                "bound for a real display."
+            )
+
+
+def _tuned(report: Report) -> Iterator[str]:
+    same: dict[str, list[str]] = {}
+    for label, text in report.layout.tuned.items():
+        same.setdefault(text, []).append(label)
+    parts = [f"of {words(labels)}, {text}" for text, labels in same.items()]
+    if parts:
+        yield f"Tuned: {'; '.join(parts)}. Other methods have the settings of their papers or of this package."

@@ -1,0 +1,60 @@
+"""Prediction (paper Table 1): which network predicts the captures of a display best, and is any better than none?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..data.phrases import value
+from ..data.results import Results
+from ..data.text import words
+from .comparison import against_baseline, best, floor, rows
+from .kind import Kind, subjects
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """The best, the named ones against the baseline, the published order, and who predicts worse than no network."""
+    yield from filter(None, (against_baseline(results, label) for label in subjects(results)[:2]))
+    yield best(results)
+    yield from reported(results)
+    yield from _untrained(results)
+    yield from floor(results)
+
+
+def reported(results: Results) -> Iterator[str]:
+    """The published order of the rows, and the one that was measured."""
+    published = {label: row["psnr"] for label, row in results.layout.reported.items() if "psnr" in row}
+    condition = results.layout.reported_beside or results.conditions[0]
+    ranked = [label for label in results.ranking(condition) if label in published]
+    if len(ranked) < 2 or not results.headline.key.startswith("psnr"):
+        return
+    order = sorted(ranked, key=lambda label: -published[label])
+    first = f"{order[0]} first ({published[order[0]]:g} dB)"
+    here = ranked.index(order[0]) + 1
+    verdict = "the same order" if order == ranked else f"another order here, where it is number {here} of {len(ranked)}"
+    yield (
+        f"The paper reports {first} of the rows that it has, on other hardware and images: {verdict} "
+        f"({value(results, order[0], condition)})."
+    )
+
+
+def _untrained(results: Results) -> Iterator[str]:
+    """Trained rows that predict captures worse than the ideal image, which is a prediction without training."""
+    condition, layout = results.conditions[0], results.layout
+    for identity in [label for label in layout.identities if results.is_complete(label, condition)][:1]:
+        own, better = results.values(identity, condition).mean(), results.headline.better
+        trained = [label for label in results.ranking(condition) if label in layout.trained - layout.identities]
+        below = [label for label in trained if better(own, float(results.values(label, condition).mean()))]
+        if below:
+            yield (
+                f"{words(below)} predict{'s' * (len(below) == 1)} worse than the ideal image of the hologram, which "
+                f"takes no training and has {value(results, identity, condition)}."
+            )
+
+
+KIND = Kind(
+    question="Which network predicts the captures of the display best?",
+    applies=lambda results: results.layout.measure == "prediction",
+    sentences=sentences,
+    table=rows,
+    limits=("Training: one short training of each network; the order after longer ones may be another.",),
+)

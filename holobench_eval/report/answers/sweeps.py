@@ -1,0 +1,175 @@
+"""Sweeps: what does a change of the display cost each method, and where does a lead over the baseline end?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..data.categories import OFFLINE, ONLINE
+from ..data.phrases import difference
+from ..data.results import Results
+from ..data.statistics import Estimate
+from ..data.sweeps import SMALL, Sweep, sweeps
+from ..data.text import percent, words
+from ..markdown import Markdown, table
+from .kind import Kind, subjects
+
+REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
+OWN = ("refocus", "other_plane", *REMEDIES)  # kinds of which the answer tells the baseline's loss, one by one
+MOST = 3  # methods that the answer follows
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """How far a lens moves the picture, what a remedy recovers, and worst losses and leads of those in question."""
+    found = [sweep for sweep in sweeps(results) if sweep.methods]
+    for kind in dict.fromkeys(sweep.swept.kind for sweep in found):
+        same = [sweep for sweep in found if sweep.swept.kind == kind]
+        if kind == "refocus":
+            yield from _range(results, same)
+        if kind in OWN and results.layout.baseline:
+            yield from _worst(results, same, results.layout.baseline)
+        for remedy in REMEDIES.get(kind, ()):
+            yield from _recovered(results, same, [sweep for sweep in found if sweep.swept.kind == remedy])
+    for label in _followed(results):
+        yield from _worst(results, found, label)
+    yield from _leads(results, found)
+
+
+def _followed(results: Results) -> list[str]:
+    """The methods whose losses the answer tells: those of the question, else the best before the change; the baseline.
+
+    Where the answer tells a range or a share, only those of the question.
+    """
+    layout, condition = results.layout, results.conditions[0]
+    if set(OWN) & {swept.kind for swept in layout.sweeps}:
+        return subjects(results)[:MOST]
+    chosen = subjects(results) or results.ranking(condition, categories=(*OFFLINE, ONLINE))[:1]
+    return list(dict.fromkeys([*chosen, *([layout.baseline] if layout.baseline else [])]))[:MOST]
+
+
+def value_text(sweep: Sweep, value: float | str) -> str:
+    """A value with its unit, as in a config."""
+    return f"{f'{value:g}' if isinstance(value, float) else value} {sweep.kind.unit}".strip()
+
+
+def _worst(results: Results, found: list[Sweep], label: str) -> Iterator[str]:
+    """The largest mean loss of a method on every display, and how many changes cost it more than a little."""
+    score, parts = results.headline, []
+    for before in dict.fromkeys(sweep.swept.before for sweep in found):
+        here = [sweep for sweep in found if sweep.swept.before == before and label in sweep.methods]
+        losses = [(loss, sweep, value) for sweep in here if (worst := sweep.worst(label)) for value, loss in [worst]]
+        if losses:
+            loss, sweep, value = max(losses, key=lambda entry: entry[0].mean)
+            above = sum(estimate.low > SMALL for estimate, _, _ in losses)
+            many = f", and {above} of {len(losses)} kinds of change clearly cost more than {SMALL:g} dB"
+            parts.append(
+                f"on {before} {difference(score, loss)} ({sweep.kind.words}, {value_text(sweep, value)})"
+                f"{many if score.unit == 'dB' and len(losses) > 1 else ''}"
+            )
+    if parts:
+        yield f"The largest mean loss of {label} is {'; '.join(parts)}."
+
+
+def _leads(results: Results, found: list[Sweep]) -> Iterator[str]:
+    """Where the leads over the baseline end, of the methods that have one before any change."""
+    baseline, parts = results.layout.baseline, []
+    for label in [label for label in _followed(results) if label != baseline]:
+        for before in dict.fromkeys(sweep.swept.before for sweep in found):
+            here = [sweep for sweep in found if sweep.swept.before == before and label in sweep.methods]
+            lead = results.gain(label, before) if here else None
+            if lead is None:
+                continue
+            own = f"{label} on {before}, {difference(results.headline, lead)} before any change"
+            sign = 1 if results.headline.higher_is_better else -1
+            parts.append(f"{own}, {_ends(here, label) if sign * lead.mean > 0 else 'which is none'}")
+    if parts:
+        yield f"Lead over {baseline}: {'; '.join(parts)}."
+
+
+def _ends(here: list[Sweep], label: str) -> str:
+    """Where a lead turns negative, or that it does nowhere, and where it is least."""
+    gains: list[tuple[Estimate, Sweep, float | str]] = [
+        (gain, sweep, value)
+        for sweep in here
+        for value, condition in sweep.swept.points
+        if (gain := sweep.gain(label, condition))
+    ]
+    if not gains:
+        return "not known after a change"
+    least, sweep, value = min(gains, key=lambda entry: entry[0].mean)
+    where = f"{sweep.kind.words}, {value_text(sweep, value)}"
+    lost = list(dict.fromkeys(other.kind.words for gain, other, _ in gains if gain.mean <= 0))
+    if not lost:
+        return f"kept on average under every change, least at {difference(sweep.results.headline, least)} ({where})"
+    return f"lost on average under some change of {words(lost)} (worst {where})"
+
+
+def _range(results: Results, same: list[Sweep]) -> Iterator[str]:
+    """How far a lens moves the picture for a small loss."""
+    parts = []
+    for sweep in same:
+        ranges: dict[str, list[str]] = {}
+        for label in sweep.methods:
+            if ends := sweep.small_range(label):
+                reach = f"{ends[0]:g} to {ends[1]:g} {sweep.kind.unit}" if ends[0] < ends[1] else "nowhere"
+                ranges.setdefault(reach, []).append(label)
+        if ranges:
+            each = [f"{text} ({words(labels)})" for text, labels in ranges.items()]
+            parts.append(f"on {sweep.swept.before} {words(each)}")
+    if parts:
+        yield (
+            f"A lens phase moves the picture, while the mean {results.headline.title} changes by at most {SMALL:g} "
+            f"{results.headline.unit}, from and to: {'; '.join(parts)}."
+        )
+
+
+def _recovered(results: Results, same: list[Sweep], remedies: list[Sweep]) -> Iterator[str]:
+    """What share of a loss a remedy gets back, from the worst to the best value."""
+    parts, baseline = [], str(results.layout.baseline)
+    for sweep in same:
+        for remedy in remedies:
+            if remedy.swept.before == sweep.swept.before and baseline in sweep.methods:
+                shares = sorted(sweep.recovered(baseline, remedy).items(), key=lambda entry: entry[1].mean)
+                if shares:
+                    each = [f"{percent(share)} % at {value}" for value, share in (shares[0], shares[-1])]
+                    parts.append(f"on {sweep.swept.before} {' up to '.join(dict.fromkeys(each))}")
+    if parts:
+        yield f"Of the loss of {baseline}, this share is recovered ({remedies[0].kind.words}): {'; '.join(parts)}."
+
+
+def rows(results: Results) -> Markdown | None:
+    """A row a change and method: the worst value, the loss there, and what is left above the baseline."""
+    score, baseline = results.headline, results.layout.baseline
+    unit = f" [{score.unit}]" if score.unit else ""
+    lines = []
+    for sweep in sweeps(results):
+        for label in sweep.methods:
+            if (worst := sweep.worst(label)) is None:
+                continue
+            value, loss = worst
+            gained = sweep.gain(label, dict(sweep.swept.points)[value]) if label != baseline else None
+            lines.append(
+                [
+                    sweep.kind.words,
+                    sweep.swept.before,
+                    f"{label} (online)" if results.layout.category(label) == ONLINE else results.layout.marked(label),
+                    value_text(sweep, value),
+                    score.estimate(loss, signed=True),
+                    score.estimate(gained, signed=True) if gained else "–",
+                ]
+            )
+    columns = ["change", "display", "method", "worst at", f"mean loss there{unit}", f"above {baseline} there{unit}"]
+    return table(columns, lines) if lines else None
+
+
+KIND = Kind(
+    question="What does a change of the display cost each method?",
+    applies=lambda results: any(sweep.methods for sweep in sweeps(results)),
+    sentences=sentences,
+    table=rows,
+    limits=(
+        "Changes: a loss is the paired difference to the score before the change, positive where the picture got "
+        "worse; methods are prepared before it, and "
+        "one that captures the scored image solves under it. The models of the changes and their rates are assumed. "
+        "The worst of several values is chosen by its mean, so its interval is a little optimistic.",
+    ),
+)

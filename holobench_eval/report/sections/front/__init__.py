@@ -1,0 +1,1 @@
+"""The first page of a report: question, answer, limits, one table, one plot, one row of pictures."""

@@ -1,0 +1,90 @@
+"""The table, the plot and the row of pictures that the answer rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ...answers import kind_of
+from ...answers.kind import subjects
+from ...charts import paired
+from ...charts.rows import Row, draw_rows
+from ...data.categories import OFFLINE, ONLINE
+from ...data.results import Results
+from ...markdown import heading
+from ...section import Blocks, Figures, Report, Section
+
+PICTURES = "answer-pictures.jpg"
+
+
+def _table(report: Report, _: Figures) -> Blocks:
+    if rows := kind_of(report.results).table(report.results):
+        yield heading("What the answer rests on")
+        yield rows
+
+
+def _plot(report: Report) -> Iterator[tuple[Path, str]]:
+    """Differences to the baseline on the first display that has any."""
+    for condition, stem in paired.displays(report.results)[:1]:
+        path = report.figures / f"quality-paired-{stem}.png"
+        paired.draw(report.results, condition, path)
+        yield path, paired.caption(report.results, condition)
+
+
+def _row(report: Report) -> Iterable[tuple[Path, str]]:
+    """The row of pictures; where an earlier report has none to keep, its first page of pictures."""
+    kept = report.pictures(PICTURES, lambda: _pictures(report))
+    return kept or list(report.pictures("comparison-*.jpg", lambda: ()))[:1]
+
+
+def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
+    """A target, and its captures by the best method, those of the question, the baseline and the oracle."""
+    results, thumbnails = report.results, report.thumbnails
+    condition = next((name for name in results.conditions if results.has_pictures(name)), None)
+    if condition is None or not thumbnails.targets:
+        return
+    target = thumbnails.middle(condition)
+    labels = chosen(results, condition)
+    tiles = [(report.layout.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
+    if any(tile.picture is not None for _, tile in tiles):
+        path, text = report.figures / PICTURES, report.layout.text
+        draw_rows(path, f"{condition}", (target, thumbnails.targets[target]), [Row("", tuple(tiles))])
+        yield (
+            path,
+            f"{text.scored.capitalize()}s of {target}, the target in the middle of the ranking by quality, on "
+            f"{condition}. {text.picture}. Left: the {text.truth}.",
+        )
+
+
+def chosen(results: Results, condition: str) -> list[str]:
+    """The best method of each track, those of the question, the baseline and the oracle, as far as they have rows."""
+    firsts = [results.ranking(condition, categories=track)[:1] for track in (OFFLINE, (ONLINE,))]
+    wanted = [*(label for ranking in firsts for label in ranking), *subjects(results)]
+    wanted += [label for label in (results.layout.baseline, results.oracle(condition)) if label]
+    return [label for label in dict.fromkeys(wanted) if label in results.methods(condition)]
+
+
+def _has_scores(report: Report) -> bool:
+    values = report.results.table.get(report.results.headline.key)
+    return bool(report.results.conditions) and values is not None and bool(np.isfinite(values).any())
+
+
+SECTIONS = (
+    Section("overview", 3, _table, applies=_has_scores),
+    Section(
+        "plot",
+        4,
+        lambda _, figures: figures,
+        applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget",
+        figures=_plot,
+    ),
+    Section(
+        "pictures",
+        6,
+        lambda _, figures: figures,
+        applies=_has_scores,
+        figures=_row,
+    ),
+)

@@ -1,0 +1,268 @@
+"""What each kind of study answers, from made-up records whose answer is known."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from holobench_eval.report import Results, records_frame
+from holobench_eval.report.answers import KINDS, kind_of
+from holobench_eval.report.answers.kind import MOST_COLUMNS, MOST_SENTENCES, subjects
+from holobench_eval.report.data.layout import Swept
+from holobench_eval.study.plan import REFERENCE
+from tests.report.data import test_error_budget as budget_of_errors
+from tests.report.sections import test_focus as focus
+from tests.report.sections import test_ranks as ranks
+from tests.report.sections import test_sweeps as sweeps
+from tests.support import synthetic_study as synthetic
+
+TARGETS = tuple(f"t{index}" for index in range(8))
+NOISE = np.array([0.0, 0.3, -0.2, 0.1, 0.4, -0.1, 0.2, -0.3])
+
+
+def results_of(
+    means: dict[str, float],
+    names: dict[str, str] | None = None,
+    captures: dict[str, int] | None = None,
+    noise: Callable[[str], np.ndarray] = lambda label: NOISE,
+    **changes: Any,
+) -> Results:
+    """A study of one display, or of the display after ``@`` in a label; names: registered; captures: per target."""
+    records, pairs = [], []
+    for key, mean in means.items():
+        label, _, display = key.partition("@")
+        condition = REFERENCE if label.startswith("floor_") else display or "bench"
+        if condition != REFERENCE:
+            pairs.append((label, condition))
+        for target, value in zip(TARGETS, mean + noise(label), strict=True):
+            described = synthetic.cell((names or {}).get(label, label), target, condition, params={"label": label})
+            taken = (captures or {}).get(label, 0)
+            records.append(synthetic.record(label, described, {"psnr_linear": float(value)}, captures=taken))
+    given = {
+        "pairs": tuple(pairs),
+        "targets": TARGETS,
+        "baseline": "old",
+        "reported": {},
+        "privileged": frozenset({"oracle"}),
+    }
+    layout = synthetic.layout(**(given | changes))
+    return Results(records_frame(records, layout), layout)
+
+
+def answer(results: Results) -> str:
+    return "\n".join(kind_of(results).answer(results))
+
+
+def name_of(results: Results) -> str:
+    return kind_of(results).sentences.__module__.rpartition(".")[2]
+
+
+COMPARED = {"old": 17.0, "new": 19.0, "other": 20.0, "oracle": 25.0, "floor_constant": 15.0}
+
+
+def test_the_method_that_the_question_names_is_answered_for_display_by_display() -> None:
+    found = results_of(
+        {"old@a": 17.0, "new@a": 19.0, "old@b": 17.0, "new@b": 17.0},
+        noise=lambda label: NOISE if label == "old" else -NOISE,
+        question="Is new better?",
+    )
+    first, *_ = kind_of(found).answer(found)
+    assert first.startswith(
+        "new: on a better than old by +1.90 dB [+1.49, +2.31], p = 0.008 (18.95 dB against 17.05 dB)"
+    )
+    assert "; on b not shown to differ from old, -0.10 dB [" in first
+
+
+def test_without_a_named_method_the_best_one_is_compared_with_the_baseline() -> None:
+    text = answer(results_of(COMPARED))
+    assert "The best mean PSNR (linear light): on bench other, 20.05 dB, better than old by +3.00 dB" in text
+    assert "The oracle, which knows the simulated bench, reaches 25.05 dB on bench" in text
+    assert "so other closes 38" in text
+
+
+def test_who_is_no_better_than_a_constant_image_is_named() -> None:
+    text = answer(results_of({"old": 14.0, "new": 19.0, "floor_constant": 15.0}))
+    assert "No better on average than a constant image in the place of a capture: old on bench." in text
+
+
+def test_a_name_that_begins_another_is_not_taken_for_it() -> None:
+    found = results_of(
+        {"old": 17.0, "old, tuned": 18.0, "new": 19.0, "new_plus": 20.0}, question="Is new_plus, or old, tuned, better?"
+    )
+    assert subjects(found) == ["new_plus", "old, tuned"]
+
+
+def test_two_targets_are_not_tested_and_the_answer_says_so() -> None:
+    few = results_of(COMPARED)
+    layout = synthetic.layout(
+        pairs=few.layout.pairs, targets=TARGETS[:2], baseline="old", reported={}, privileged=few.layout.privileged
+    )
+    found = Results(few.frame[few.frame["target"].isin(TARGETS[:2])].reset_index(drop=True), layout)
+    assert "other, 20.15 dB, not tested against old, +3.00 dB" in answer(found)
+    assert "p =" not in answer(found)
+
+
+def test_an_ablation_says_what_lowers_and_what_is_not_shown_to_matter() -> None:
+    means = {"old": 19.0, "no loss": 17.0, "more rounds": 19.0, "no skip": 18.5, "another": 30.0}
+    found = results_of(
+        means,
+        names=dict.fromkeys(("old", "no loss", "more rounds", "no skip"), "hil"),
+        noise=lambda label: -NOISE if label == "more rounds" else NOISE,
+    )
+    assert name_of(found) == "ablation"
+    text = answer(found)
+    assert "Of 3 single changes of old on bench (19.05 dB), those shown to lower the score: no loss (-2.00 dB" in text
+    assert "those shown to raise the score: none." in text
+    assert re.search(r"No difference is shown for the other 1, .* from -0\.5\d to \+0\.3\d dB: more rounds\.", text)
+    assert "another" not in text.split("No better")[0]
+
+
+def test_a_budget_names_the_fewest_captures_that_pass_and_who_never_does() -> None:
+    means = {"old": 17.0, "good, 5": 16.0, "good, 10": 18.0, "good, 20": 19.0, "bad, 5": 15.0, "bad, 10": 16.0}
+    found = results_of(
+        means,
+        names={label: label.split(",")[0] for label in means},
+        captures={label: int(label.split(", ")[1]) for label in means if "," in label},
+        camera=frozenset(label for label in means if "," in label),
+    )
+    assert name_of(found) == "budget"
+    text = answer(found)
+    assert "shown to be better than old, which takes no captures and has 17.05 dB on bench: good 80 (+1.00 dB" in text
+    assert "Not shown to be better than old with any of their budgets: bad (up to 80)." in text
+    assert "good +3.00 [+3.00, +3.00], from 40 to 160 captures" in text
+    assert "The best row is good, 20 with 160 captures, 19.05 dB." in text
+
+
+def prediction(**changes: Any) -> Results:
+    means = {"old": 20.0, "new": 22.0, "poor": 15.0, "nothing": 18.0}
+    given = {
+        "measure": "prediction",
+        "holograms": "wirtinger",
+        "identities": frozenset({"nothing"}),
+        "trained": frozenset(means),
+        "reported": {"old": {"psnr": 30.0}, "new": {"psnr": 25.0}},
+    }
+    return results_of(means, **(given | changes))
+
+
+def test_predictions_are_held_against_the_published_order_and_the_ideal_image() -> None:
+    assert name_of(prediction()) == "prediction"
+    text = answer(prediction())
+    assert "The paper reports old first (30 dB)" in text
+    assert "another order here, where it is number 2 of 2 (20.05 dB)" in text
+    assert "poor predicts worse than the ideal image of the hologram, which takes no training and has 18.05 dB." in text
+    same = prediction(reported={"new": {"psnr": 30.0}, "old": {"psnr": 25.0}})
+    assert "the same order (22.05 dB)" in answer(same)
+
+
+def test_a_learned_display_has_an_answer_of_its_own() -> None:
+    found = results_of({"old": 17.0, "new": 19.0}, learned_display="bench")
+    assert name_of(found) == "learned_display"
+    assert answer(found).startswith("new: on bench better than old by +2.00 dB")
+
+
+def sweep(**changes: Any) -> Results:
+    layout = synthetic.layout(**(vars(sweeps.layout()) | changes))
+    return Results(records_frame(sweeps.records(), layout), layout)
+
+
+def test_a_sweep_says_the_worst_loss_and_where_a_lead_ends() -> None:
+    without = tuple(swept for swept in sweeps.layout().sweeps if "eye" not in swept.kind)
+    pairs = [pair for pair in sweeps.layout().pairs if "eye" not in pair[1]]
+    frame = sweep().frame
+    layout = synthetic.layout(**(vars(sweeps.layout()) | {"sweeps": without, "pairs": tuple(pairs)}))
+    found = Results(frame[~frame["condition"].str.contains("eye")].reset_index(drop=True), layout)
+    assert name_of(found) == "sweeps"
+    text = answer(found)
+    assert (
+        "The largest mean loss of HIL is on leto-aged +9.00 dB [+9.00, +9.00] (drift since calibration, 90 days)"
+        in text
+    )
+    assert "1 of 2 kinds of change clearly cost more than 1 dB." in text
+    assert (
+        "HIL on leto-aged, +4.00 dB [+4.00, +4.00] before any change, lost on average under some change of drift"
+        in text
+    )
+
+
+def test_a_remedy_says_which_share_of_the_loss_it_recovers() -> None:
+    text = answer(sweep(baseline="HIL"))
+    assert "The largest mean loss of HIL is on leto-aged +8.00 dB" in text
+    assert "this share is recovered (the same eye, known to the methods): on leto-aged 88 [88, 88] % at -2." in text
+
+
+def test_refocusing_says_how_far_a_lens_moves_the_picture() -> None:
+    points = tuple((value, f"bench, refocus {value:g} mm") for value in (-2.0, 1.0, 2.0))
+    loss = {"old": 0.3, "new": 2.0}
+    means = {f"{label}@bench": 20.0 for label in loss}
+    means |= {f"{label}@{name}": 20.0 - loss[label] * abs(value) for label in loss for value, name in points}
+    found = results_of(means, sweeps=(Swept("refocus", "bench", points),))
+    first, second = kind_of(found).answer(found)
+    assert "at most 1 dB, from and to: on bench -2 to 2 mm (old) and nowhere (new)." in first
+    assert "The largest mean loss of old is on bench +0.60 dB [+0.60, +0.60] (image moved by a lens phase" in second
+
+
+def ranked() -> Results:
+    records, layout = ranks.study(ranks.FLIPPING)
+    return Results(records_frame(records, layout), layout)
+
+
+def test_rank_stability_says_its_tau_and_what_turns_the_order() -> None:
+    assert name_of(ranked()) == "ranks"
+    text = answer(ranked())
+    assert re.search(r"\(1: the same order, 0: unrelated\) is 0\.\d\d \[0\.\d\d, 0\.\d\d\] on average", text)
+    assert "robust ranks first on leto-aged and in " in text
+    assert "favours robust of robust and steady (rho 1.00)" in text
+
+
+def focused() -> Results:
+    return focus.results_of({"lens": 20.0, "joint": 18.0})
+
+
+def test_focus_compares_one_hologram_of_all_planes_with_one_a_plane() -> None:
+    assert name_of(focused()) == "focus"
+    text = answer(focused())
+    assert "joint, one hologram of all planes: on bench" in text
+    assert "-3.33 dB" in text
+    assert "in 0.833 times the computing time of a scene." in text
+
+
+def test_an_error_budget_names_every_part_and_what_removing_it_would_gain() -> None:
+    text = answer(budget_of_errors.results())
+    for part in ("the ideal image", "terms", "network", "field", "unexplained", "temporal noise"):
+        assert re.search(rf"{part} -?\d+ \[", text), part
+    assert "with field." in text
+
+
+STUDIES = {
+    "comparison": lambda: results_of(COMPARED),
+    "prediction": prediction,
+    "sweeps": sweep,
+    "ranks": ranked,
+    "focus": focused,
+    "error_budget": budget_of_errors.results,
+}
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_an_answer_is_short_its_table_narrow_and_both_without_nan(study: str) -> None:
+    found = STUDIES[study]()
+    kind = kind_of(found)
+    assert name_of(found) == study
+    sentences = kind.answer(found)
+    assert 1 <= len(sentences) <= MOST_SENTENCES
+    header = str(kind.table(found)).splitlines()[0]
+    assert header.count("|") - 1 <= MOST_COLUMNS
+    assert "nan" not in " ".join(sentences).split()
+    assert kind.question.endswith("?")
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.sentences.__module__.rpartition(".")[2])
+def test_a_study_without_a_score_has_no_answer(kind: Any) -> None:
+    empty = results_of({"old": np.nan, "new": np.nan})
+    lost = empty.frame.assign(state="failed")
+    assert kind.answer(Results(lost, empty.layout)) == ["No cell of the study has a score, so there is no answer."]
