@@ -1,4 +1,4 @@
-"""report.md, table.csv, records.csv and the figures of a study, from its records."""
+"""report.md, report.html, table.csv, records.csv and the figures of a study, from its records."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from .data.results import Results
 from .data.tables import csv_text, read_records, records_frame
 from .description import Description, describe
 from .markdown import Markdown, blocks
+from .page import write_page
 from .section import Report
 from .sections import sections
 
@@ -48,6 +49,7 @@ def write_report(
         for old in report.figures.glob(pattern):
             old.unlink()
     write_atomically(output / "report.md", f"{_text(report)}\n".encode())
+    write_page(report)
     return output / "report.md", results
 
 
