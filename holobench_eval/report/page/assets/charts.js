@@ -64,7 +64,7 @@ function drawFrontier(host, cost) {
         Plot.ruleY(lines, { y: "value", stroke: "currentColor", strokeDasharray: "5 4" }),
         Plot.line(front, { x: "cost", y: "value", curve: "step-after", stroke: "currentColor", strokeOpacity: 0.25, strokeWidth: 4 }),
         Plot.ruleX(marks.filter((mark) => "low" in mark), { x: "cost", y1: "low", y2: "high", stroke: (mark) => colourOf(mark.method) }),
-        Plot.dot(marks, { x: "cost", y: "value", r: 5, symbol: (mark) => SYMBOLS[mark.track] ?? "circle", fill: (mark) => colourOf(mark.method), stroke: "var(--page)", ariaLabel: "row" }),
+        Plot.dot(marks, { x: "cost", y: "value", r: 5, symbol: (mark) => SYMBOLS[mark.track] ?? "circle", fill: (mark) => colourOf(mark.method), stroke: "var(--page)", className: "row" }),
         Plot.text(NARROW.matches ? [] : front, { x: "cost", y: "value", text: "method", dy: 14, textAnchor: "start", dx: 6, stroke: "var(--page)", fill: "currentColor" }),
         Plot.tip(marks, Plot.pointer({ x: "cost", y: "value", title: "text" })),
       ],
@@ -123,7 +123,7 @@ function drawSweep(host, sweep) {
       marks: [
         Plot.areaY(sweep.numeric ? banded : [], { x: "at", y1: "low", y2: "high", z: "method", fill: stroke, fillOpacity: 0.1 }),
         Plot.line(marks, { x: "at", y: "value", z: "method", stroke }),
-        Plot.dot(marks, { x: "at", y: "value", fill: stroke, r: 3.5, ariaLabel: "point" }),
+        Plot.dot(marks, { x: "at", y: "value", fill: stroke, r: 3.5, className: "point" }),
         Plot.tip(marks, Plot.pointer({ x: "at", y: "value", title: "text" })),
       ],
     },
@@ -150,7 +150,7 @@ function drawRanks(host, found) {
       x: { type: "band", label: "place", labelAnchor: "center", labelArrow: "none" },
       y: { type: "band", domain: kept, label: null, tickSize: 0, tickFormat: (name) => shortName(name, room) },
       marks: [
-        Plot.cell(cells, { x: "place", y: "name", fill: "var(--accent)", fillOpacity: (cell) => 0.05 + 0.6 * cell.share, ariaLabel: "share", inset: 0.5 }),
+        Plot.cell(cells, { x: "place", y: "name", fill: "var(--accent)", fillOpacity: (cell) => 0.05 + 0.6 * cell.share, className: "share", inset: 0.5 }),
         Plot.text(cells.filter((cell) => cell.share > 0), { x: "place", y: "name", text: (cell) => `${Math.round(100 * cell.share)} %` }),
         Plot.tip(cells, Plot.pointer({ x: "place", y: "name", title: (cell) => `${cell.name}\nplace ${cell.place}: ${Math.round(100 * cell.share)} % of draws` })),
       ],

@@ -16,14 +16,15 @@ function shortName(name, room) {
 }
 
 /**
- * A plot with what it takes to be read without a pointer: marks named `mark` are reached by Tab and read out.
+ * A plot with what it takes to be read without a pointer: marks of the class `mark` are reached by Tab and read out.
  * click: called with what is under the pointer.
  */
 function show(host, options, mark, texts, click) {
   const figure = Plot.plot({ className: "chart", style: { font: FONT, overflow: "visible" }, ...options });
   for (const sheet of figure.querySelectorAll("style")) sheet.remove(); // page.css has its rules; the policy forbids others
   const readout = element("p", { class: "readout", role: "status" });
-  const marks = figure.querySelectorAll(`[aria-label="${mark}"] > *`);
+  for (const group of figure.querySelectorAll("g[aria-label]")) group.removeAttribute("aria-label"); // "dot", "tick"
+  const marks = figure.querySelectorAll(`.${mark} > *`);
   marks.forEach((node, index) => {
     node.setAttribute("tabindex", "0");
     node.setAttribute("role", "img");
@@ -90,7 +91,7 @@ function drawPaired() {
         Plot.dot(dots, { x: "value", y: "method", r: 2.5, fill: (dot) => colourOf(dot.method), fillOpacity: 0.45 }),
         Plot.ruleY(means.filter((mean) => "low" in mean), { x1: "low", x2: "high", y: "method", stroke: "currentColor", strokeWidth: 2 }),
         Plot.dot(means, {
-          x: "value", y: "method", r: 5.5, stroke: "currentColor", strokeWidth: 1.5, ariaLabel: "mean",
+          x: "value", y: "method", r: 5.5, stroke: "currentColor", strokeWidth: 1.5, className: "mean",
           fill: (mean) => (mean.oracle ? "var(--page)" : colourOf(mean.method)),
         }),
         Plot.tip(dots, Plot.pointer({ x: "value", y: "method", title: (dot) => `${dot.method}\n${dot.target}: ${withUnit(dot.value, true)}` })),
