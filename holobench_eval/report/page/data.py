@@ -9,9 +9,11 @@ from typing import Any
 from ...study.plan import REFERENCE
 from ..charts.quality import Chart
 from ..data.marks import marked
+from ..data.ranks import Ranks
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Estimate
+from ..data.sweeps import Sweep
 from ..data.tables import MEMORY_COLUMN
 from ..data.text import number, p_value
 from ..section import Report
@@ -62,32 +64,15 @@ def page_data(report: Report) -> Json:
             for name in results.conditions
         },
         "oracles": {name: results.oracle(name) for name in results.conditions},
-        "sweeps": [
-            {
-                "display": sweep.swept.before,
-                "words": sweep.kind.words,
-                "unit": sweep.kind.unit,
-                "numeric": sweep.kind.numeric,
-                "points": [{"value": value, "condition": condition} for value, condition in sweep.named_points],
-            }
-            for sweep in report.sweeps
-        ],
-        "ranks": [
-            {
-                "display": found.swept.before,
-                "draws": len(found.used),
-                "methods": found.methods,
-                "shares": [[_number(share) for share in row] for row in found.shares],
-            }
-            for found in report.ranks
-            if found.exists
-        ],
+        "sweeps": [_sweep(sweep) for sweep in report.sweeps],
+        "ranks": [_ranks(found) for found in report.ranks if found.exists],
     }
 
 
 def colour(results: Results, label: str) -> str:
     """The colour of a method, ``#rrggbb``, the same as in the figures of the report."""
-    return Chart(results.headline, results.layout, results.layout.methods or (label,), {}).colour(label)
+    labels = dict.fromkeys([*results.layout.methods, *results.table["method"]])
+    return Chart(results.headline, results.layout, tuple(labels), {}).colour(label)
 
 
 def _labels(results: Results, conditions: list[str]) -> list[str]:
@@ -167,6 +152,37 @@ def _by_target(results: Results, label: str, condition: str) -> Json:
     return {
         score.key: [_number(value) for value in results.values(label, condition, score.key)]
         for score in results.leading
+    }
+
+
+def _sweep(sweep: Sweep) -> Json:
+    """Values and conditions in their order; ends: of the bars, by condition and method."""
+    changed = [condition for _, condition in sweep.swept.points]
+    return {
+        "display": sweep.swept.before,
+        "words": sweep.kind.words,
+        "unit": sweep.kind.unit,
+        "numeric": sweep.kind.numeric,
+        "points": [{"value": value, "condition": condition} for value, condition in sweep.named_points],
+        "ends": {name: {label: _ends(sweep, label, name) for label in sweep.methods} for name in changed},
+    }
+
+
+def _ends(sweep: Sweep, label: str, condition: str) -> list[float | None]:
+    """Ends of the paired interval of the loss, moved to the mean after the change; empty where there is none."""
+    loss = sweep.loss(label, condition)
+    if loss is None or math.isnan(loss.low):
+        return []
+    mean, half = float(sweep.results.values(label, condition).mean()), (loss.high - loss.low) / 2
+    return [_number(mean - half), _number(mean + half)]
+
+
+def _ranks(found: Ranks) -> Json:
+    return {
+        "display": found.swept.before,
+        "draws": len(found.used),
+        "methods": found.methods,
+        "shares": [[_number(share) for share in row] for row in found.shares],
     }
 
 

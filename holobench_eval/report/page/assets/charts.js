@@ -102,13 +102,13 @@ function drawSweep(host, sweep) {
   const marks = !here ? [] : sweep.points.flatMap((point) =>
     complete(data.rows[point.condition] ?? []).filter((row) => wanted.has(row.method)).map((row) => {
       const cell = row.cells[data.headline.key];
-      return { method: row.method, at: point.value, text: `${row.method}\n${point.value} ${sweep.unit}: ${cell.text}`, ...cell.value !== null && { value: cell.value, low: cell.low, high: cell.high } };
+      const [low, high] = sweep.ends[point.condition]?.[row.method] ?? [];
+      return { method: row.method, at: point.value, value: cell.value, low, high, text: `${row.method}\n${point.value} ${sweep.unit}: ${cell.text}` };
     })
   );
   if (!marks.length) return host.replaceChildren();
-  const place = framed(host, `Sweep: ${sweep.words}`, `${data.headline.heading} on ${sweep.display}; bands are 95 % intervals of the means.`);
+  const place = framed(host, `Sweep: ${sweep.words}`, `${data.headline.heading} on ${sweep.display} as it is changed. Bars: 95 % interval of the paired loss against the unchanged display.`);
   const names = [...new Set(marks.map((mark) => mark.method))];
-  const banded = marks.filter((mark) => mark.low !== undefined);
   const stroke = (mark) => colourOf(mark.method);
   show(
     place,
@@ -119,9 +119,9 @@ function drawSweep(host, sweep) {
       marginTop: 20,
       marginBottom: 44,
       x: { type: sweep.numeric ? "linear" : "point", domain: sweep.numeric ? undefined : sweep.points.map((point) => point.value), label: `${sweep.words}${sweep.unit ? ` [${sweep.unit}]` : ""}`, labelAnchor: "center", labelArrow: "none" },
-      y: { label: data.headline.heading, grid: true, labelArrow: "none" },
+      y: { label: data.headline.heading, grid: true, nice: true, labelArrow: "none" },
       marks: [
-        Plot.areaY(sweep.numeric ? banded : [], { x: "at", y1: "low", y2: "high", z: "method", fill: stroke, fillOpacity: 0.1 }),
+        Plot.ruleX(marks.filter((mark) => mark.low !== undefined), { x: "at", y1: "low", y2: "high", stroke }),
         Plot.line(marks, { x: "at", y: "value", z: "method", stroke }),
         Plot.dot(marks, { x: "at", y: "value", fill: stroke, r: 3.5, className: "point" }),
         Plot.tip(marks, Plot.pointer({ x: "at", y: "value", title: "text" })),

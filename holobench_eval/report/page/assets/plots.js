@@ -67,7 +67,7 @@ function drawPaired() {
   if (!state.sort) rows.sort((a, b) => (data.headline.higher ? -1 : 1) * (a.cells.gain.value - b.cells.gain.value));
   byId("paired-note").textContent = rows.length
     ? `${data.headline.heading}, of each target above that of ${data.baseline}, on ${state.display}. Small dots are targets, ` +
-      `large ones their mean with its 95 % interval. ${data.headline.higher ? "Right" : "Left"} of zero is better. A click on a dot shows its pictures.`
+      `the large one below is their mean with its 95 % interval. ${data.headline.higher ? "Right" : "Left"} of zero is better. A click on a dot shows its pictures.`
     : `No method on ${state.display} passes the filter and has a difference to ${data.baseline ?? "a baseline"}.`;
   if (!rows.length) return host.replaceChildren();
   const dots = rows.flatMap((row) =>
@@ -80,7 +80,7 @@ function drawPaired() {
     host,
     {
       width: plotWidth(host),
-      height: 60 + 30 * rows.length,
+      height: 60 + 34 * rows.length,
       marginLeft: room,
       marginTop: 10,
       marginBottom: 44,
@@ -88,13 +88,13 @@ function drawPaired() {
       y: { domain: names, label: null, tickSize: 0, tickFormat: (name) => shortName(name, room) },
       marks: [
         Plot.ruleX([0], { stroke: "currentColor", strokeWidth: 1.5 }),
-        Plot.dot(dots, { x: "value", y: "method", r: 2.5, fill: (dot) => colourOf(dot.method), fillOpacity: 0.45 }),
+        Plot.dot(dots, { x: "value", y: "method", r: 2.5, dy: -8, fill: (dot) => colourOf(dot.method), fillOpacity: 0.6 }),
         Plot.ruleY(means.filter((mean) => "low" in mean), { x1: "low", x2: "high", y: "method", stroke: "currentColor", strokeWidth: 2 }),
         Plot.dot(means, {
           x: "value", y: "method", r: 5.5, stroke: "currentColor", strokeWidth: 1.5, className: "mean",
           fill: (mean) => (mean.oracle ? "var(--page)" : colourOf(mean.method)),
         }),
-        Plot.tip(dots, Plot.pointer({ x: "value", y: "method", title: (dot) => `${dot.method}\n${dot.target}: ${withUnit(dot.value, true)}` })),
+        Plot.tip(dots, Plot.pointer({ x: "value", y: "method", dy: -8, title: (dot) => `${dot.method}\n${dot.target}: ${withUnit(dot.value, true)}` })),
       ],
     },
     "mean",
