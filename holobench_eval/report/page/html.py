@@ -32,7 +32,18 @@ MOST_BYTES = 24_000_000  # of the whole page
 OWN = 200_000  # bytes that the template, the policy and the provenance may take beside scripts, data and pictures
 TOP = ("findings",)  # the sections of report.md that the page begins with
 VENDORED = ("d3.min.js", "plot.umd.min.js")
-SCRIPTS = ("dom.js", "state.js", "table.js", "copy.js", "plots.js", "charts.js", "pixels.js", "viewer.js", "main.js")
+SCRIPTS = (
+    "dom.js",
+    "state.js",
+    "table.js",
+    "copy.js",
+    "plots.js",
+    "charts.js",
+    "pixels.js",
+    "flip.js",
+    "viewer.js",
+    "main.js",
+)
 
 _JSON = str.maketrans({char: f"\\u{ord(char):04x}" for char in "<>&\u2028\u2029"})
 

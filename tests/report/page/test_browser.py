@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.support import synthetic_study as synthetic
+
 from .conftest import HOSTILE, Written
 
 sync_api = pytest.importorskip("playwright.sync_api")
@@ -175,6 +177,28 @@ def test_an_error_map_of_the_target_s_own_capture_differs_with_values_and_colour
         seen.add(reader.canvas().tobytes())
     assert len(seen) == 4
     assert "linear light" in reader.page.inner_text("#error-note")
+
+
+def test_the_map_of_flip_has_the_mean_of_its_authors_code(reader: Reader, written: Written) -> None:
+    import torch
+    from skimage.io import imread
+
+    from holobench_eval.core.hashing import digest
+    from holobench_eval.metrics.flip import flip
+    from holobench_eval.study.store import Store
+
+    store = Store(written.folder)
+    for label, name in (("Wirtinger", "wirtinger"), ("Double phase", "double_phase")):
+        reader.page.select_option("#right", f"flip:{label}")
+        reader.page.wait_for_function(
+            "label => document.getElementById('caption-right').textContent.startsWith(`FLIP of ${label}`)", arg=label
+        )
+        capture = store.thumbnail(digest(synthetic.cell(name, "astronaut", "leto-aged")))
+        pictures = (
+            torch.tensor(imread(path)).permute(2, 0, 1) / 255 for path in (capture, store.target_thumbnail("astronaut"))
+        )
+        shown = float(reader.page.inner_text("#caption-right").rpartition(" ")[2])
+        assert shown == pytest.approx(float(flip(*pictures)), abs=0.001)
 
 
 def test_pointing_at_a_pixel_tells_the_stored_levels(reader: Reader, written: Written) -> None:

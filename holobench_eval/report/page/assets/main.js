@@ -46,7 +46,7 @@ function readPixel({ paneX, y }) {
   const texts = sides.filter((side) => side.pixels).map((side) => {
     const at = 4 * (row * side.pixels.width + column);
     const levels = [...side.pixels.data.slice(at, at + 3)].join(", ");
-    return side.reference ? `error ${errorAt(side.pixels, side.reference, at).toFixed(3)}` : `${side.caption.split(":")[0]} ${levels}`;
+    return side.errors ? `${side.caption.split(":")[0]} ${side.errors[at / 4].toFixed(3)}` : `${side.caption.split(":")[0]} ${levels}`;
   });
   byId("pixel").textContent = `Column ${column}, row ${row}: ${texts.join("; ")} (stored levels: red, green, blue of 255)`;
 }

@@ -3,7 +3,7 @@
 const decoded = new Map(); // number of a picture: a promise of its ImageData
 const MOST_DECODED = 24;
 
-/** The number of a picture in this page, or null; option: "truth", "capture:METHOD" or "error:METHOD". */
+/** The number of a picture in this page, or null; option: "truth", or a kind and a method, "capture:METHOD". */
 function pictureOf(option, target) {
   const index = data.targets.findIndex((item) => item.name === target);
   if (option === "truth") return data.pictures.targets[index] ?? null;
@@ -65,12 +65,15 @@ function errorAt(capture, truth, at) {
 
 const MAGMA = Array.from({ length: 256 }, (_, index) => d3.rgb(d3.interpolateMagma(index / 255)));
 
-/** The error map of a capture, magma from 0 to `state.scale`; both pictures have one size. */
-function errorMap(capture, truth) {
-  const made = new ImageData(truth.width, truth.height);
-  for (let at = 0; at < made.data.length; at += 4) {
-    const colour = MAGMA[Math.min(255, Math.round((255 * errorAt(capture, truth, at)) / Number(state.scale)))];
-    made.data.set([colour.r, colour.g, colour.b, 255], at);
-  }
+/** An error map `(width * height)`, magma from 0 to `most`. */
+function coloured(errors, width, height, most) {
+  const made = new ImageData(width, height);
+  errors.forEach((error, index) => {
+    const colour = MAGMA[Math.min(255, Math.round((255 * error) / most))];
+    made.data.set([colour.r, colour.g, colour.b, 255], 4 * index);
+  });
   return made;
 }
+
+/** The absolute error of a capture at every pixel; both pictures have one size. */
+const absoluteErrors = (capture, truth) => Float64Array.from({ length: truth.width * truth.height }, (_, index) => errorAt(capture, truth, 4 * index));

@@ -3,6 +3,7 @@
 const FLICKER = 600; // ms a side; slower than three flashes a second
 const MOST_ZOOM = 64;
 const GRIP = 14; // px around the slider's line that move it
+const NAMES = { capture: "", error: "error of ", flip: "FLIP of " };
 const SCALES = ["0.05", "0.1", "0.2", "0.5", "1"];
 let sides = []; // of both sides: {canvas, pixels, caption}, or {caption} where there is no picture
 let flickered = 0;
@@ -63,8 +64,8 @@ async function choose() {
   const absent = (option) => pictureOf(option, state.target) === null;
   fill(byId("target"), data.targets.map((item) => [item.name, item.name, data.pictures.targets[data.targets.indexOf(item)] === null]), state.target);
   for (const side of ["left", "right"]) {
-    const group = (kind) => rows.map((row) => [`${kind}:${row.method}`, kind === "error" ? `error of ${row.marked}` : row.marked, absent(`${kind}:${row.method}`)]);
-    const options = [[data.words.truth, [["truth", data.words.truth, absent("truth")]]], [`${data.words.scored}s`, group("capture")], ["absolute errors", group("error")]];
+    const group = (kind) => rows.map((row) => [`${kind}:${row.method}`, NAMES[kind] + row.marked, absent(`${kind}:${row.method}`)]);
+    const options = [[data.words.truth, [["truth", data.words.truth, absent("truth")]]], [`${data.words.scored}s`, group("capture")], ["absolute errors", group("error")], ["FLIP", group("flip")]];
     fill(byId(side), options, chosen(side));
   }
   for (const key of ["mode", "values", "channel"]) byId(key).value = state[key];
@@ -73,9 +74,7 @@ async function choose() {
   const loaded = await Promise.all(["left", "right"].map((side) => load(chosen(side))));
   if (asked !== drawing) return;
   sides = loaded;
-  const errors = ["left", "right"].some((side) => chosen(side).startsWith("error:"));
-  byId("error-bar").hidden = byId("error-note").hidden = !errors;
-  if (errors) describeErrors();
+  describeErrors();
   paint();
 }
 
@@ -86,10 +85,13 @@ async function load(option) {
   const index = data.targets.findIndex((item) => item.name === state.target);
   const score = option === "truth" ? "" : `: ${data.headline.title} ${withUnit(data.values[state.display][label][data.headline.key][index])}`;
   const pixels = await pixelsOf(number);
-  if (!option.startsWith("error:")) return { ...onCanvas(seen(pixels)), pixels, caption: option === "truth" ? sentence(data.words.truth) : `${label}${score}` };
+  const kind = option.slice(0, option.indexOf(":"));
+  if (!["error", "flip"].includes(kind)) return { ...onCanvas(seen(pixels)), pixels, caption: option === "truth" ? sentence(data.words.truth) : `${label}${score}` };
   const reference = truth === null ? null : await pixelsOf(truth);
   if (!reference || reference.width !== pixels.width || reference.height !== pixels.height) return { caption: `${label} has another size than the ${data.words.truth}` };
-  return { ...onCanvas(errorMap(pixels, reference)), pixels, reference, caption: `Error of ${label}${score}` };
+  const errors = kind === "flip" ? flipMap(pixels, reference) : absoluteErrors(pixels, reference);
+  const image = coloured(errors, pixels.width, pixels.height, kind === "flip" ? 1 : Number(state.scale));
+  return { ...onCanvas(image), pixels, errors, caption: `${sentence(NAMES[kind])}${label}${kind === "flip" ? `: mean ${(sum(errors) / errors.length).toFixed(3)}` : score}` };
 }
 
 function onCanvas(image) {
@@ -104,8 +106,12 @@ function describeErrors() {
     context.fillStyle = colour.formatHex();
     context.fillRect(index, 0, 1, 10);
   });
+  const shown = ["left", "right"].map((side) => chosen(side).split(":")[0]);
   const which = state.channel === "all" ? "mean over red, green and blue" : ["red", "green", "blue"][Number(state.channel)];
-  byId("error-note").textContent = `Absolute error, ${which}, in ${state.values === "linear" ? "linear light" : "sRGB values"} with full scale 1: black is 0, the brightest colour ${state.scale} and more.`;
+  byId("error-bar").hidden = byId("error-note").hidden = !shown.includes("error") && !shown.includes("flip");
+  const absolute = `Absolute error, ${which}, in ${state.values === "linear" ? "linear light" : "sRGB values"} with full scale 1: black is 0, the brightest colour ${state.scale} and more. `;
+  const flip = "FLIP (Andersson et al. 2020) at 67 pixels a degree, from 0 to 1, of all colours in sRGB.";
+  byId("error-note").textContent = (shown.includes("error") ? absolute : "") + (shown.includes("flip") ? flip : "");
 }
 
 /** Where the picture lies: size of a pane [px], zoom [screen pixels a pixel], the pixel in the middle of the pane. */
