@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from ...study.scoring.pictures import LONGEST_THUMBNAIL
 from ..charts.gallery import spread
@@ -25,19 +26,19 @@ class Pictures:
     contents: list[bytes] = field(default_factory=list)
     numbers: dict[Cell, int] = field(default_factory=dict)
 
-    def add(self, group: dict[Cell, bytes]) -> None:
+    def add(self, group: dict[Cell, Path]) -> None:
         """Take the pictures that are new, all or, where they do not fit, none."""
-        new = {cell: content for cell, content in group.items() if cell not in self.numbers}
-        if sum(map(encoded_length, new.values())) <= self.room:
-            for cell, content in new.items():
-                self.room -= encoded_length(content)
+        new = {cell: path for cell, path in group.items() if cell not in self.numbers}
+        if (taken := encoded_length(new.values())) <= self.room:
+            self.room -= taken
+            for cell, path in new.items():
                 self.numbers[cell] = len(self.contents)
-                self.contents.append(content)
+                self.contents.append(path.read_bytes())
 
 
-def encoded_length(content: bytes) -> int:
-    """Bytes of base64."""
-    return -(-len(content) // 3) * 4
+def encoded_length(paths: Iterable[Path]) -> int:
+    """Bytes of base64 that the files take."""
+    return sum(-(-path.stat().st_size // 3) * 4 for path in paths)
 
 
 def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
@@ -48,8 +49,8 @@ def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
     display; then the same on the changed displays, for the first targets only. A target's pictures come all or not.
     """
     found = Pictures(room)
-    everything = _read(report, _planned(report))
-    if sum(map(encoded_length, everything.values())) <= room:
+    everything = _files(report, _planned(report))
+    if encoded_length(everything.values()) <= room:
         found.add(everything)
     else:
         for wanted in _groups(report):
@@ -124,10 +125,10 @@ def _changed(report: Report) -> list[str]:
     return [name for name in names if name in report.layout.changed and report.results.has_pictures(name)]
 
 
-def _read(report: Report, cells: Iterator[Cell]) -> dict[Cell, bytes]:
+def _files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
     """The files that are there: of a capture that of the first repeat with a score."""
     results, store = report.results, report.thumbnails.store
-    contents = {}
+    found = {}
     for label, condition, target in cells:
         if condition:
             rows = results.cells(label, condition)
@@ -136,5 +137,5 @@ def _read(report: Report, cells: Iterator[Cell]) -> dict[Cell, bytes]:
         else:
             path = store.target_thumbnail(target)
         if path is not None and path.is_file():
-            contents[label, condition, target] = path.read_bytes()
-    return contents
+            found[label, condition, target] = path
+    return found

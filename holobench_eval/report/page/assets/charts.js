@@ -45,7 +45,7 @@ function drawFrontier(host, cost) {
   const front = bestFor(marks);
   const lines = [data.baseline, data.oracles[state.display]].flatMap((name, index) => {
     const found = all.find((row) => row.method === name);
-    return found ? [{ value: found.cells[data.headline.key].value, text: `${index ? "oracle" : "baseline"} ${name}` }] : [];
+    return found ? [{ value: found.cells[data.headline.key].value, text: index ? (name === "oracle" ? name : `oracle ${name}`) : `baseline ${name}` }] : [];
   });
   const dashed = lines.map((item) => `${item.text}, ${withUnit(item.value)}`).join("; ");
   if (dashed) place.previousSibling.append(` Dashed: ${dashed}.`);

@@ -1,7 +1,7 @@
 // What all plots share, and the plot of paired differences. Plots are drawn by Observable Plot.
 
 const FONT = "12px system-ui, sans-serif";
-const CHARACTER = 6.6; // average width of a character of that font [px]
+const CHARACTER = 7.2; // width of a rather wide character of that font [px]
 
 /** Width of a plot [px]: that of the page. */
 const plotWidth = (host) => Math.max(280, Math.min(1000, host.clientWidth || 1000));

@@ -138,7 +138,7 @@ function paint() {
   const aspect = first ? first.height / first.width : 1;
   const tall = Math.round(Math.min((enlarged ? 0.75 : 0.7) * window.innerHeight, (room / panes) * aspect));
   canvas.style.height = `${tall}px`;
-  canvas.style.width = `${Math.round((panes * tall) / aspect)}px`;
+  canvas.style.width = byId("captions").style.maxWidth = `${Math.round((panes * tall) / aspect)}px`;
   const ratio = window.devicePixelRatio || 1;
   canvas.width = Math.round(canvas.clientWidth * ratio);
   canvas.height = Math.round(canvas.clientHeight * ratio);
