@@ -28,7 +28,11 @@ def write_report(
 
     written, results = build_report(study, records, output, known)
     print_headline(console, results)
-    console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
+    console.print(
+        f"{written}\n{written.with_suffix('.html')}\n{output / 'table.csv'}\n{output / 'records.csv'}",
+        highlight=False,
+        soft_wrap=True,
+    )
 
 
 def print_headline(console: Console, results: Results) -> None:

@@ -94,11 +94,18 @@ def policy(scripts: list[str], style: str) -> str:
 
 
 def top(report: Report) -> str:
-    """The first sections of report.md as HTML; links and pictures, which would be loaded, stay text."""
+    """The first sections of report.md as HTML; links and pictures, which would be loaded, stay text.
+
+    Columns of numbers get a class, since the policy takes no style of an element.
+    """
     chosen = [section for section in sections() if section.name in TOP and section.applies(report)]
     text = blocks(block for section in chosen for block in section.render(report, []))
     reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["link", "image", "autolink"])
-    return str(reader.render(str(text)))
+    tokens = reader.parse(str(text))
+    for token in tokens:
+        if token.attrs.pop("style", None):
+            token.attrs["class"] = "number"
+    return str(reader.renderer.render(tokens, reader.options, {}))
 
 
 def _hash(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -11,8 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from holobench_eval.report import Description, Results, read_records
+from holobench_eval.report.markdown import table
 from holobench_eval.report.page import html
 from holobench_eval.report.page.html import MOST_BYTES, TOP, json_text
+from holobench_eval.report.section import Report, Section
 from holobench_eval.report.sections import sections
 
 from .conftest import HOSTILE, TITLE, Written
@@ -66,8 +70,6 @@ def test_a_name_is_the_same_text_in_the_data(written: Written) -> None:
 
 @pytest.mark.parametrize("text", ["</script>", "<!--", "a & b", "\u2028\u2029", "]]>"])
 def test_json_holds_no_character_that_ends_a_script_and_reads_back(text: str) -> None:
-    import json
-
     written = json_text({"name": text})
     assert not re.search("[<>&\u2028\u2029]", written)
     assert json.loads(written) == {"name": text}
@@ -108,3 +110,19 @@ def test_the_page_begins_with_sections_that_exist(written: Written) -> None:
 
 def test_a_page_stays_below_its_size(written: Written) -> None:
     assert (written.folder / "report.html").stat().st_size < MOST_BYTES
+
+
+def test_tables_of_the_findings_have_no_style_of_their_own(written: Written, monkeypatch: pytest.MonkeyPatch) -> None:
+    report = Report(
+        Results(read_records((written.folder / "records.csv").read_text()), written.layout),
+        [],
+        written.folder,
+        {},
+        Description(),
+    )
+    section = Section("findings", 1, lambda report, figures: [table(["method", "dB"], [["<b>|", "1.0"]])])
+    monkeypatch.setattr(html, "sections", lambda: [section])
+    text = html.top(report)
+    assert '<td class="number">1.0</td>' in text
+    assert "&lt;b&gt;|" in text
+    assert "style" not in text
