@@ -42,6 +42,7 @@ SCRIPTS = (
     "pixels.js",
     "flip.js",
     "viewer.js",
+    "strip.js",
     "main.js",
 )
 

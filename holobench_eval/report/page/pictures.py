@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -65,7 +66,12 @@ def _numbers(report: Report, found: Pictures) -> Json:
         if condition:
             holes: list[int | None] = [None] * len(targets)
             cells.setdefault(condition, {}).setdefault(label, holes)[targets.index(target)] = number
-    return {"targets": [found.numbers.get(("", "", target)) for target in targets], "cells": cells}
+    held = Counter(target for *_, target in found.numbers)
+    return {
+        "targets": [found.numbers.get(("", "", target)) for target in targets],
+        "cells": cells,
+        "first": max(targets, key=lambda target: held[target]),  # the first of those with most pictures
+    }
 
 
 def _note(report: Report, held: int, there: int) -> str:

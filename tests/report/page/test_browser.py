@@ -92,6 +92,18 @@ def test_the_slider_uncovers_the_other_picture_pixel_for_pixel(reader: Reader) -
     np.testing.assert_array_equal(both[:, middle + 12 : -12], sides[1][:, middle + 12 : -12])
 
 
+def test_the_strip_has_the_target_and_the_methods_of_the_filter_and_a_click_compares_one(reader: Reader) -> None:
+    reader.page.locator("#strip").scroll_into_view_if_needed()
+    tiles = reader.page.locator("#strip button")
+    tiles.first.wait_for()
+    assert tiles.count() == 7
+    reader.page.click("#strip button:has-text('Double phase')")
+    assert reader.page.input_value("#right") == "capture:Double phase"
+    assert reader.page.locator("#strip button[aria-pressed=true]").count() == 1
+    reader.page.fill("#filter", "double")
+    assert tiles.count() == 2
+
+
 def test_arrow_keys_move_the_slider(reader: Reader) -> None:
     reader.page.focus("#canvas")
     reader.page.keyboard.press("ArrowRight")

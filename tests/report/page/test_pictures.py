@@ -74,6 +74,8 @@ def test_with_less_room_some_targets_are_full_and_others_have_best_baseline_and_
     roles = {(name, condition) for name in ("HIL", "Wirtinger", "Oracle") for condition in synthetic.SEVERITY}
     full = [target for target, cells in found.items() if len(cells) >= 12]
     assert len(full) == TARGETS_IN_FULL
+    first = pictures(report, int(0.85 * size(report)))[1]["first"]
+    assert len(found[first]) == max(map(len, found.values()))  # the page begins with a target that has most
     for target in set(found) - set(full):
         assert found[target] == {("", ""), *roles}
 

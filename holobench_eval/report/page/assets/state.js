@@ -6,7 +6,7 @@ const DEFAULTS = {
   order: "best", // or "worst"
   filter: "",
   open: "", // the method whose targets are listed
-  target: (data.targets.find((_, index) => data.pictures.targets[index] !== null) ?? data.targets[0])?.name ?? "",
+  target: data.pictures.first,
   left: "truth",
   right: "", // "capture:METHOD" or "error:METHOD"; empty: the best method that has a picture
   mode: "slider",

@@ -12,7 +12,7 @@ let drawing = 0; // counts the pictures asked for, so that a late one does not r
 function setUpViewer() {
   byId("picture-note").textContent = data.pictures.note;
   if (data.pictures.targets.every((number) => number === null)) {
-    for (const part of byId("viewer").querySelectorAll(".controls, #stage, #viewer-help")) part.hidden = true;
+    for (const part of byId("viewer").querySelectorAll(".controls, #stage, #strip, #viewer-help")) part.hidden = true;
     return;
   }
   for (const key of ["target", "left", "right", "mode", "values", "channel", "scale", "split"]) {
@@ -35,6 +35,7 @@ function setUpViewer() {
     if (["display", "target", "left", "right", "values", "channel", "scale"].some((key) => changed.has(key))) choose();
     else if (["mode", "split", "zoom", "x", "y"].some((key) => changed.has(key))) paint();
   });
+  setUpStrip();
   new ResizeObserver(paint).observe(byId("stage"));
   if (!window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
     setInterval(() => {
