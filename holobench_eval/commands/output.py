@@ -36,7 +36,8 @@ def write_report(
 
     written, results = build_report(study, records, output, known, keep_pictures)
     print_headline(console, results)
-    console.print(f"{written}\n{output / 'table.csv'}\n{output / 'records.csv'}", highlight=False, soft_wrap=True)
+    files = (written, written.with_suffix(".html"), output / "table.csv", output / "records.csv")
+    console.print("\n".join(map(str, files)), highlight=False, soft_wrap=True)
     return results
 
 

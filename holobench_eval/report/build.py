@@ -1,4 +1,4 @@
-"""report.md, details.md, the figures and the files of data of a study, from its records."""
+"""report.md, details.md, report.html, the figures and the files of data of a study, from its records."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from .description import Description, describe
 from .files import write_files
 from .files.tidy import tidy_table
 from .markdown import Markdown, blocks
+from .page import write_page
 from .section import Report
 from .sections import sections
 
@@ -63,6 +64,7 @@ def write_report(
             old.unlink()
     for name, text in _texts(report).items():
         write_atomically(output / name, f"{text}\n".encode())
+    write_page(report)
     return output / REPORT, results
 
 

@@ -1,0 +1,190 @@
+"""The numbers of the page: those of table.csv and records.csv, with the text that the Markdown shows for each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from ...study.plan import REFERENCE
+from ..charts.look.methods import looks
+from ..data.marks import marked
+from ..data.ranks import Ranks
+from ..data.results import Results
+from ..data.scores import Score
+from ..data.statistics import Estimate
+from ..data.sweeps import Sweep
+from ..data.tables import MEMORY_COLUMN
+from ..data.text import number, p_value
+from ..section import Report
+
+Json = dict[str, Any]
+
+COSTS = {
+    "total_captures": "captures in total",
+    "training_captures": "captures for training",
+    "captures": "captures per {each}",
+    "seconds": "seconds per {each}",
+    "training_seconds": "seconds of training",
+    MEMORY_COLUMN: "memory [MiB]",
+}
+GAIN, P = "gain", "p"
+
+
+def page_data(report: Report) -> Json:
+    """Everything that the page draws, ready for JSON: no NaN, and numbers rounded as in table.csv."""
+    results = report.results
+    changed = [name for name in dict.fromkeys(results.table["condition"]) if name in results.layout.changed]
+    conditions = [*results.conditions, *changed]
+    return {
+        "study": results.layout.title,
+        "headline": _score(results.headline),
+        "baseline": results.layout.baseline,
+        "words": {"scored": results.layout.text.scored, "truth": results.layout.text.truth},
+        "displays": results.conditions,
+        "changed": changed,
+        "columns": list(_columns(results)),
+        "scores": [_score(score) for score in results.leading],
+        "methods": {name: _method(results, name) for name in _labels(results, conditions)},
+        "targets": [
+            {"name": target, "cluster": str(cluster)}
+            for target, cluster in zip(results.targets, results.clusters, strict=True)
+        ],
+        "rows": {name: [_row(results, label, name) for label in results.methods(name)] for name in conditions},
+        "values": {
+            name: {label: _by_target(results, label, name) for label in results.methods(name)} for name in conditions
+        },
+        "floors": {
+            name: [
+                {"name": results.layout.text.floor_name(floor), "mean": _number(results.row(floor, REFERENCE)[key])}
+                for floor in results.floors
+                if results.has_floor(name)
+            ]
+            for key in [results.headline.key]
+            for name in results.conditions
+        },
+        "oracles": {name: results.oracle(name) for name in results.conditions},
+        "sweeps": [_sweep(sweep) for sweep in report.sweeps],
+        "ranks": [_ranks(found) for found in report.ranks if found.exists],
+    }
+
+
+def colour(results: Results, label: str) -> str:
+    """The colour of a method, ``#rrggbb``, the same as in the figures of the report."""
+    return looks(results.names)[label].colour
+
+
+def _labels(results: Results, conditions: list[str]) -> list[str]:
+    return list(dict.fromkeys(label for name in conditions for label in results.methods(name)))
+
+
+def _method(results: Results, label: str) -> Json:
+    registered = results.frame.loc[results.frame["method"] == label, "name"].iloc[0]
+    return {
+        "registered": str(registered),
+        "track": results.layout.category(label),
+        "oracle": label in results.layout.privileged,
+        "colour": colour(results, label),
+    }
+
+
+def _score(score: Score) -> Json:
+    return {
+        "key": score.key,
+        "title": score.title,
+        "heading": score.heading,
+        "unit": score.unit,
+        "digits": len(score.number(0.0).partition(".")[2]),
+        "higher": score.higher_is_better,
+    }
+
+
+def _columns(results: Results) -> Iterator[Json]:
+    """Key, heading and direction of every column; the interval and the text of a cell stand in its row."""
+    for score in results.leading:
+        yield {"key": score.key, "heading": score.heading, "higher": score.higher_is_better}
+        if score == results.headline and results.layout.baseline is not None:
+            unit = f" [{score.unit}]" if score.unit else ""
+            heading = f"difference to {results.layout.baseline}{unit}"
+            yield {"key": GAIN, "heading": heading, "higher": score.higher_is_better}
+            yield {"key": P, "heading": "adjusted p", "higher": False}
+    each = results.layout.text.each
+    for key, heading in COSTS.items():
+        if key in results.table and results.table[key].notna().any():
+            yield {"key": key, "heading": heading.format(each=each), "higher": False}
+
+
+def _row(results: Results, label: str, condition: str) -> Json:
+    """A row of the table: of every column the value, the interval where there is one, and the text."""
+    row = results.row(label, condition)
+    cells = {
+        score.key: _cell(score.in_row(row), row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
+        for score in results.leading
+    }
+    gain = results.gain(label, condition)
+    if gain is not None and label != results.layout.baseline:
+        cells[GAIN] = _estimate(results.headline, gain)
+        for test in results.against_baseline:
+            if (test.condition, test.second) == (condition, label) and not math.isnan(test.p):
+                cells[P] = _cell(p_value(test.p).removeprefix("p ").removeprefix("= "), test.p)
+    cells |= {key: _cell(number(row[key]), row[key]) for key in COSTS if key in results.table}
+    return {
+        "method": label,
+        "marked": marked(results, label, condition),
+        "n": int(row["n"]),
+        "failed": int(row["failed"]),
+        "cells": cells,
+    }
+
+
+def _estimate(score: Score, estimate: Estimate) -> Json:
+    return _cell(score.estimate(estimate, signed=True), estimate.mean, estimate.low, estimate.high)
+
+
+def _cell(text: str, value: float, low: float = math.nan, high: float = math.nan) -> Json:
+    ends = {} if math.isnan(low) else {"low": _number(low), "high": _number(high)}
+    return {"text": text, "value": _number(value), **ends}
+
+
+def _by_target(results: Results, label: str, condition: str) -> Json:
+    """By score, the value of every target in their order; null for a hole."""
+    return {
+        score.key: [_number(value) for value in results.values(label, condition, score.key)]
+        for score in results.leading
+    }
+
+
+def _sweep(sweep: Sweep) -> Json:
+    """Values and conditions in their order; ends: of the bars, by condition and method."""
+    changed = [condition for _, condition in sweep.swept.points]
+    return {
+        "display": sweep.swept.before,
+        "words": sweep.kind.words,
+        "unit": sweep.kind.unit,
+        "numeric": sweep.kind.numeric,
+        "points": [{"value": value, "condition": condition} for value, condition in sweep.named_points],
+        "ends": {name: {label: _ends(sweep, label, name) for label in sweep.methods} for name in changed},
+    }
+
+
+def _ends(sweep: Sweep, label: str, condition: str) -> list[float | None]:
+    """Ends of the paired interval of the loss, moved to the mean after the change; empty where there is none."""
+    loss = sweep.loss(label, condition)
+    if loss is None or math.isnan(loss.low):
+        return []
+    mean, half = float(sweep.results.values(label, condition).mean()), (loss.high - loss.low) / 2
+    return [_number(mean - half), _number(mean + half)]
+
+
+def _ranks(found: Ranks) -> Json:
+    return {
+        "display": found.swept.before,
+        "draws": len(found.used),
+        "methods": found.methods,
+        "shares": [[_number(share) for share in row] for row in found.shares],
+    }
+
+
+def _number(value: float) -> float | None:
+    """Six significant digits, as in table.csv; None for NaN, which JSON has not."""
+    return None if math.isnan(value) else float(f"{value:.6g}")

@@ -1,0 +1,147 @@
+"""Which pictures the page holds: all where they fit into its size, else those that answer most, by a stated rule."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...study.scoring.pictures import LONGEST_THUMBNAIL
+from ..charts.gallery import spread
+from ..data.tables import DONE
+from ..section import Report
+from .data import Json
+
+TARGETS_IN_FULL = 4  # targets with the captures of all methods where not all pictures fit
+
+Cell = tuple[str, str, str]  # method, condition, target; a target itself has neither method nor condition
+
+
+@dataclass
+class Pictures:
+    """The pictures of a page, as the PNG files of the records; ``room``: bytes that more of them may take."""
+
+    room: int
+    contents: list[bytes] = field(default_factory=list)
+    numbers: dict[Cell, int] = field(default_factory=dict)
+
+    def add(self, group: dict[Cell, Path]) -> None:
+        """Take the pictures that are new, all or, where they do not fit, none."""
+        new = {cell: path for cell, path in group.items() if cell not in self.numbers}
+        if (taken := encoded_length(new.values())) <= self.room:
+            self.room -= taken
+            for cell, path in new.items():
+                self.numbers[cell] = len(self.contents)
+                self.contents.append(path.read_bytes())
+
+
+def encoded_length(paths: Iterable[Path]) -> int:
+    """Bytes of base64 that the files take."""
+    return sum(-(-path.stat().st_size // 3) * 4 for path in paths)
+
+
+def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
+    """The pictures that fit into ``room`` bytes, and what the page says of them.
+
+    Where not all fit, first come ``TARGETS_IN_FULL`` targets, evenly spaced from worst to best, with the captures of
+    all methods on every display; then, target by target, the best method, the baseline and the oracle on every
+    display; then the same on the changed displays, for the first targets only. A target's pictures come all or not.
+    """
+    found = Pictures(room)
+    everything = _files(report, _planned(report))
+    if encoded_length(everything.values()) <= room:
+        found.add(everything)
+    else:
+        for wanted in _groups(report):
+            found.add({cell: everything[cell] for cell in wanted if cell in everything})
+    return found, {**_numbers(report, found), "note": _note(report, len(found.numbers), len(everything))}
+
+
+def _numbers(report: Report, found: Pictures) -> Json:
+    targets = report.results.targets
+    cells: dict[str, dict[str, list[int | None]]] = {}
+    for (label, condition, target), number in found.numbers.items():
+        if condition:
+            holes: list[int | None] = [None] * len(targets)
+            cells.setdefault(condition, {}).setdefault(label, holes)[targets.index(target)] = number
+    held = Counter(target for *_, target in found.numbers)
+    return {
+        "targets": [found.numbers.get(("", "", target)) for target in targets],
+        "cells": cells,
+        "first": max(targets, key=lambda target: held[target]),  # the first of those with most pictures
+    }
+
+
+def _note(report: Report, held: int, there: int) -> str:
+    text = report.layout.text
+    sizes = (
+        f"Pictures are the stored ones, pixel for pixel: 8-bit sRGB PNG, {text.scored}s registered and matched in "
+        f"intensity, reduced where the longer side would exceed {LONGEST_THUMBNAIL} pixels."
+    )
+    if not there:
+        return f"This page holds no pictures: there were no thumbnails of {text.scored}s when it was written."
+    if held == there:
+        return f"This page holds all {there} pictures of the study. {sizes}"
+    return (
+        f"This page holds {held} of {there} pictures, as many as its size allows: all {text.scored}s of up to "
+        f"{TARGETS_IN_FULL} targets, evenly spaced from worst to best, and of further targets the best method, the "
+        f"baseline and the oracle. {sizes}"
+    )
+
+
+def _groups(report: Report) -> Iterator[list[Cell]]:
+    results, conditions = report.results, _pictured(report)
+    if not conditions:
+        return
+    ordered = report.thumbnails.by_quality(conditions[0])
+    first = spread(ordered, TARGETS_IN_FULL) if len(ordered) > TARGETS_IN_FULL else ordered
+    for target in first:
+        yield [("", "", target), *((label, name, target) for name in conditions for label in results.methods(name))]
+    for target in results.targets:
+        yield [("", "", target), *_roles(report, conditions, target)]
+    for target in first:
+        yield list(_roles(report, _changed(report), target))
+
+
+def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]:
+    """The best method of a display, the baseline and the oracle."""
+    results = report.results
+    for condition in conditions:
+        roles = (*results.ranking(condition)[:1], results.layout.baseline, results.oracle(condition))
+        for label in dict.fromkeys(role for role in roles if role in results.methods(condition)):
+            yield str(label), condition, target
+
+
+def _planned(report: Report) -> Iterator[Cell]:
+    results = report.results
+    yield from (("", "", target) for target in results.targets)
+    for condition, target in itertools.product([*_pictured(report), *_changed(report)], results.targets):
+        yield from ((label, condition, target) for label in results.methods(condition))
+
+
+def _pictured(report: Report) -> list[str]:
+    return [name for name in report.results.conditions if report.results.has_pictures(name)]
+
+
+def _changed(report: Report) -> list[str]:
+    """Conditions that are a change of another, in the order of the table."""
+    names = dict.fromkeys(report.results.table["condition"])
+    return [name for name in names if name in report.layout.changed and report.results.has_pictures(name)]
+
+
+def _files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
+    """The files that are there: of a capture that of the first repeat with a score."""
+    results, store = report.results, report.thumbnails.store
+    found = {}
+    for label, condition, target in cells:
+        if condition:
+            rows = results.cells(label, condition)
+            done = rows[(rows["target"] == target) & (rows["state"] == DONE)]
+            path = store.thumbnail(str(done.iloc[0]["cell"])) if len(done) else None
+        else:
+            path = store.target_thumbnail(target)
+        if path is not None and path.is_file():
+            found[label, condition, target] = path
+    return found

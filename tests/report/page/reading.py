@@ -1,0 +1,49 @@
+"""A reader of a page: a browser's page with what went wrong in it and what it asked of the network."""
+
+from __future__ import annotations
+
+import base64
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+DELAY = 400  # ms after which the address holds a new view
+
+
+class Reader:
+    """A page of a browser, with what went wrong and what was asked of the network."""
+
+    def __init__(self, page: Any, file: Path) -> None:
+        self.page, self.file = page, file
+        page.set_default_timeout(10_000)
+        self.wrong: list[str] = []
+        self.asked: list[str] = []
+        page.on("console", lambda message: self.wrong.append(message.text))
+        page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        page.on("request", lambda request: self.asked.append(request.url))
+        page.on("dialog", lambda dialog: self.wrong.append(dialog.message))
+
+    def open(self, view: str = "") -> Reader:
+        self.page.goto("about:blank")
+        self.asked.clear()
+        self.page.goto(f"{self.file.as_uri()}{view}")
+        self.page.wait_for_function("() => document.getElementById('canvas').getAttribute('aria-label')")
+        return self
+
+    def methods(self) -> list[str]:
+        found = self.page.eval_on_selector_all(
+            "#rows > tbody > tr:not(.opened) > th > button", "all => all.map(one => one.lastChild.textContent)"
+        )
+        return list(map(str, found))
+
+    def canvas(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        """The pixels of the viewer, ``(h, w, 4)``."""
+        address = self.page.evaluate("() => document.getElementById('canvas').toDataURL()")
+        return np.asarray(Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))))
+
+    def view(self) -> str:
+        self.page.wait_for_timeout(DELAY)
+        return str(self.page.evaluate("() => location.hash"))

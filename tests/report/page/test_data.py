@@ -1,0 +1,67 @@
+"""The numbers of the page are those of table.csv and records.csv, and its texts those of report.md."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+from .conftest import Written
+
+
+def number(text: str) -> float | None:
+    return float(text) if text else None
+
+
+def table(written: Written, name: str) -> list[dict[str, str]]:
+    with (written.folder / name).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_number_of_the_table_is_that_of_table_csv(written: Written) -> None:
+    rows = {(row["method"], row["condition"]): row for row in table(written, "table.csv")}
+    compared = 0
+    for condition, found in written.data["rows"].items():
+        for row in found:
+            expected = rows.pop((row["method"], condition))
+            assert row["n"] == int(expected["n"])
+            for key, cell in row["cells"].items():
+                if key in expected:
+                    assert cell["value"] == number(expected[key])
+                    assert cell.get("low") == number(expected.get(f"{key}_lo", ""))
+                    assert cell.get("high") == number(expected.get(f"{key}_hi", ""))
+                    compared += cell["value"] is not None
+    assert compared > 60
+    assert {condition for _, condition in rows} == {"reference"}  # the floor is beside the table
+
+
+def test_the_value_of_every_target_is_that_of_records_csv(written: Written) -> None:
+    names = [target["name"] for target in written.data["targets"]]
+    compared = 0
+    for row in table(written, "records.csv"):
+        if row["condition"] in written.data["values"]:
+            values = written.data["values"][row["condition"]][row["method"]]
+            for key, found in values.items():
+                assert found[names.index(row["target"])] == number(row[key])
+                compared += 1
+    assert compared > 100
+
+
+def test_texts_and_differences_stand_in_the_markdown_too(written: Written) -> None:
+    report = (written.folder / "report.md").read_text()
+    for rows in written.data["rows"].values():
+        for row in rows:
+            assert row["cells"]["psnr_linear"]["text"] in report
+            if "gain" in row["cells"] and math.isfinite(row["cells"]["gain"]["value"]):
+                assert row["cells"]["gain"]["text"].partition(" [")[0] in report
+
+
+def test_a_method_that_lacks_a_target_has_no_difference(written: Written) -> None:
+    rows = {row["method"]: row for row in written.data["rows"]["leto-aged"] if row["failed"]}
+    assert len(rows) == 1
+    assert all("gain" not in row["cells"] for row in rows.values())
+
+
+def test_a_colour_is_the_same_in_the_page_and_the_figures(written: Written) -> None:
+    colours = {name: method["colour"] for name, method in written.data["methods"].items()}
+    assert all(len(colour) == 7 and colour.startswith("#") for colour in colours.values())
+    assert len(set(colours.values())) == len(colours)
