@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import math
 
+from holobench_eval.report.data.columns import file_name
+
 from .conftest import Written
 
 
@@ -14,21 +16,22 @@ def number(text: str) -> float | None:
 
 def table(written: Written, name: str) -> list[dict[str, str]]:
     with (written.folder / name).open(newline="") as file:
-        return list(csv.DictReader(file))
+        # an apostrophe keeps a spreadsheet from running a name
+        return [{key: text.removeprefix("'") for key, text in row.items()} for row in csv.DictReader(file)]
 
 
 def test_every_number_of_the_table_is_that_of_table_csv(written: Written) -> None:
-    rows = {(row["method"], row["condition"]): row for row in table(written, "table.csv")}
+    rows = {(row["label"], row["condition"]): row for row in table(written, "table.csv")}
     compared = 0
     for condition, found in written.data["rows"].items():
         for row in found:
             expected = rows.pop((row["method"], condition))
             assert row["n"] == int(expected["n"])
             for key, cell in row["cells"].items():
-                if key in expected:
-                    assert cell["value"] == number(expected[key])
-                    assert cell.get("low") == number(expected.get(f"{key}_lo", ""))
-                    assert cell.get("high") == number(expected.get(f"{key}_hi", ""))
+                if file_name(key) in expected:
+                    assert cell["value"] == number(expected[file_name(key)])
+                    assert cell.get("low") == number(expected.get(file_name(f"{key}_lo"), ""))
+                    assert cell.get("high") == number(expected.get(file_name(f"{key}_hi"), ""))
                     compared += cell["value"] is not None
     assert compared > 60
     assert {condition for _, condition in rows} == {"reference"}  # the floor is beside the table
@@ -39,9 +42,9 @@ def test_the_value_of_every_target_is_that_of_records_csv(written: Written) -> N
     compared = 0
     for row in table(written, "records.csv"):
         if row["condition"] in written.data["values"]:
-            values = written.data["values"][row["condition"]][row["method"]]
+            values = written.data["values"][row["condition"]][row["label"]]
             for key, found in values.items():
-                assert found[names.index(row["target"])] == number(row[key])
+                assert found[names.index(row["target"])] == number(row[file_name(key)])
                 compared += 1
     assert compared > 100
 
