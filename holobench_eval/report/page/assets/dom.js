@@ -22,8 +22,8 @@ function swatch(label) {
   return mark;
 }
 
-/** The colour of a method. */
-const colourOf = (label) => data.methods[label].colour;
+/** The colour of a method; on a dark page mixed with white, where the registry's dark hues would not be seen. */
+const colourOf = (label) => `color-mix(in oklab, ${data.methods[label].colour} var(--pure), white)`;
 
 /** Fill a select; options: [value, text, disabled], or [heading, options] for a group of them. */
 function fill(select, options, value) {
