@@ -20,7 +20,7 @@ from .initial_phase import InitialPhase, initial_phase
 
 @dataclass(frozen=True)
 class HybridInputOutput:
-    """Drive the panel with an input image that over-corrects, instead of with the target itself.
+    """Hybrid input-output (Fienup 1982): the panel is driven with an input image that over-corrects the target.
 
     Fienup's two planes map as follows. The Fourier modulus, which is known exactly, is the unit amplitude of
     the panel. The object constraint is the target amplitude in the region. Where the output violates it

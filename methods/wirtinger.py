@@ -81,7 +81,7 @@ class Wirtinger:
 
     tuned: ClassVar[str] = (
         "the starting phase and global offset were chosen on the display ideal and, in part, on an earlier leto-aged, "
-        "with photographs that are cropped for the targets of the headline studies"
+        "with photographs that are cropped for the targets of most studies"
     )
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False

@@ -26,7 +26,8 @@ def _reading(budget: Budget) -> str:
     gains = [f"{_gain(part)} with {part.label}" for part in budget.explained]
     return (
         f"On {budget.condition} the captures have a PSNR of {_decibel(budget.psnr)}, and their squared error splits "
-        f"into {words(shares)}; removing one part after the other would gain at most {words(gains)}."
+        f"into {words(shares)}; removing the parts in this order, each with all before it, would raise the PSNR by at "
+        f"most {words(gains)} (means over images, which do not follow from the mean shares)."
     )
 
 
@@ -71,6 +72,7 @@ KIND = Kind(
     table=rows,
     limits=(
         "Bounds: a part is what one prediction explains and none before it did, for whom it is known which prediction "
-        "to believe; what it would gain in dB is an upper bound, and a larger model or more captures may explain more.",
+        "to believe; a hologram gains less from it than its dB, and a larger model or more captures may explain more.",
+        "Parts: image-domain terms are a tone curve, shading, blur and haze, fitted on training captures.",
     ),
 )

@@ -45,7 +45,7 @@ def _sample(report: Report) -> str:
         if clusters < targets
         else ""
     )
-    trained = ", nor with another training of a method, each of which was trained once" if report.trainings else ""
+    trained = ", nor with another training of a method" if report.trainings else ""
     parts = [
         f"{targets} target{'s' * (targets != 1)}{among}; brackets hold 95 % intervals of how a mean varies with other "
         f"images of the kind, not with other displays{trained}."
@@ -54,8 +54,8 @@ def _sample(report: Report) -> str:
     if tests:
         smallest = 2.0 ** (1 - clusters)
         parts.append(
-            f"p is adjusted for all {tests} comparisons with the baseline; a difference is shown at p < "
-            f"{SIGNIFICANCE}; not shown does not mean that there is none."
+            f"p is adjusted for {tests} comparison{'s' * int(tests > 1)} with {results.layout.baseline}, intervals are "
+            f"not; a difference is shown at p < {SIGNIFICANCE}; not shown does not mean that there is none."
         )
         if smallest >= SIGNIFICANCE:
             parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")
@@ -90,8 +90,8 @@ def _form(report: Report) -> Iterator[str]:
             which = ", ".join(name.replace("_", " ") for name in effects)
             yield (
                 f"Inverse crime on {display.name}: the model of {words(labels)} has the bench's own form for "
-                f"{len(effects)} of its {display.effects} effects ({which}), so what is gained there is an upper "
-                "bound for a real display."
+                f"{len(effects)} of its {display.effects} effects ({which}), so a real display may suit it less than "
+                "this one."
             )
 
 

@@ -4,20 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.phrases import value
+from ..data.phrases import short, tested, value, verdict
 from ..data.results import Results
 from ..data.text import words
-from .comparison import against_baseline, best, floor, rows
+from .comparison import best, floor, rows
 from .kind import Kind, subjects
 
 
 def sentences(results: Results) -> Iterator[str]:
     """The best, the named ones against the baseline, the published order, and who predicts worse than no network."""
-    yield from filter(None, (against_baseline(results, label) for label in subjects(results)[:2]))
+    yield from _against(results)
     yield best(results)
     yield from reported(results)
     yield from _untrained(results)
     yield from floor(results)
+
+
+def _against(results: Results) -> Iterator[str]:
+    """The networks that the question names against the baseline, by verdict."""
+    condition, parts = results.conditions[0], dict[str, list[str]]()
+    for label in subjects(results):
+        if test := tested(results, label, condition):
+            parts.setdefault(verdict(results.headline, test), []).append(f"{label} ({short(results.headline, test)})")
+    if parts:
+        baseline = str(results.layout.baseline)
+        found = "; ".join(f"{name}: {words(labels)}" for name, labels in parts.items())
+        yield f"Compared with {baseline}, which has {value(results, baseline, condition)} on {condition}: {found}."
 
 
 def reported(results: Results) -> Iterator[str]:
@@ -46,8 +58,9 @@ def _untrained(results: Results) -> Iterator[str]:
         below = [label for label in trained if better(own, float(results.values(label, condition).mean()))]
         if below:
             yield (
-                f"{words(below)} predict{'s' * (len(below) == 1)} worse than the ideal image of the hologram, which "
-                f"takes no training and has {value(results, identity, condition)}."
+                f"{words(below)} predict{'s' * (len(below) == 1)} worse than the ideal image, what "
+                f"ideal optics would make of the hologram; it takes no training and scores "
+                f"{value(results, identity, condition)}."
             )
 
 

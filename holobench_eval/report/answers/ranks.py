@@ -57,7 +57,8 @@ def _turning(each: Ranks) -> str:
     still = len(each.pairs) - len(turning)
     named = [
         f"{pair.first} over {pair.second} ({percent(pair.flipped)} % of draws, nominally "
-        f"{each.results.headline.with_unit(pair.nominal, signed=True)})"
+        f"{each.results.headline.with_unit(pair.nominal, signed=True)}"
+        f"{', in which that display is not typical of its draws' * (2 * pair.flips > len(each.used))})"
         for pair in turning[:CLOSEST]
     ]
     most = f"; most often reversed: {'; '.join(named)}" if named else ""

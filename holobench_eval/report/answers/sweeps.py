@@ -60,7 +60,7 @@ def _worst(results: Results, found: list[Sweep], label: str) -> Iterator[str]:
         if losses:
             loss, sweep, value = max(losses, key=lambda entry: entry[0].mean)
             above = sum(estimate.low > SMALL for estimate, _, _ in losses)
-            many = f", and {above} of {len(losses)} kinds of change clearly cost more than {SMALL:g} dB"
+            many = f", and {above} of {len(losses)} kinds of change are shown to cost more than {SMALL:g} dB"
             parts.append(
                 f"on {before} {difference(score, loss)} ({sweep.kind.words}, {value_text(sweep, value)})"
                 f"{many if score.unit == 'dB' and len(losses) > 1 else ''}"
@@ -168,8 +168,8 @@ KIND = Kind(
     table=rows,
     limits=(
         "Changes: a loss is the paired difference to the score before the change, positive where the picture got "
-        "worse; methods are prepared before it, and "
-        "one that captures the scored image solves under it. The models of the changes and their rates are assumed. "
+        "worse; methods are prepared before it, and only those that use the camera for the scored image solve after "
+        "it. The models of the changes and their rates are assumed. "
         "The worst of several values is chosen by its mean, so its interval is a little optimistic.",
     ),
 )

@@ -62,7 +62,9 @@ def counts(results: Results) -> str:
         (cells["repeat"].nunique(), "repeat"),
     )
     size = ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in parts)
-    return f"{size}: {len(cells)} cells, {done} with a score, {len(cells) - done} without."
+    partly = len(cells[["method", "condition"]].drop_duplicates()) < cells["method"].nunique() * len(results.conditions)
+    some = " (not every method on every display)" if partly else ""
+    return f"{size}{some}: {len(cells)} cells, {done} with a score, {len(cells) - done} without."
 
 
 def _on_displays(report: Report) -> list[tuple[str, str]]:
