@@ -155,8 +155,8 @@ def test_predictions_are_held_against_the_published_order_and_the_ideal_image() 
     assert "The paper reports old first (30 dB)" in text
     assert "another order here, where it is number 2 of 2 (20.05 dB)" in text
     assert (
-        "poor predicts worse than the ideal image, what ideal optics would make of the hologram; it takes no training and scores 18.05 dB."
-        in text
+        "poor predicts worse than the ideal image, what ideal optics would make of the hologram; it takes no "
+        "training and scores 18.05 dB." in text
     )
     same = prediction(reported={"new": {"psnr": 30.0}, "old": {"psnr": 25.0}})
     assert "the same order (22.05 dB)" in answer(same)
