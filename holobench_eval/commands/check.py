@@ -59,7 +59,7 @@ def _problems(report: Path) -> Iterator[str]:
 
 def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]:
     """What is different from when the report was made, of which its provenance is ``known``."""
-    from ..report import difference, layout_of, read_records, recompute_table
+    from ..report import difference, layout_of, read_records, recompute_files
     from ..study.displays import displays
     from ..study.plan import plan
     from ..study.provenance import text_digest
@@ -78,9 +78,11 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     for name in ("report.md", "details.md"):
         if not (report / name).is_file():
             yield f"{name} is missing; run 'holoeval report' on its config"
-    again = recompute_table(records, layout_of(study))
-    table = (report / "table.csv").read_text(encoding="utf-8")
-    if again.partition("\n")[0] != table.partition("\n")[0]:
-        yield "table.csv has the columns of another version; run 'holoeval report' on its config"
-    elif again != table:
-        yield "table.csv does not follow from records.csv; run 'holoeval report' on its config"
+    for name, again in recompute_files(records, layout_of(study)).items():
+        text = (report / name).read_text(encoding="utf-8") if (report / name).is_file() else None
+        if text is None:
+            yield f"{name} is missing; run 'holoeval report' on its config"
+        elif again.partition("\n")[0] != text.partition("\n")[0]:
+            yield f"{name} has the columns of another version; run 'holoeval report' on its config"
+        elif again != text:
+            yield f"{name} does not follow from records.csv; run 'holoeval report' on its config"

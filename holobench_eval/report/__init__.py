@@ -1,6 +1,6 @@
 """Reports: statistics over targets, tables, figures and texts, all computed from the records of a study."""
 
-from .build import build_report, recompute_table, write_report
+from .build import build_report, recompute_files, write_report
 from .data.committed import committed_records, difference
 from .data.layout import Layout, layout_of
 from .data.results import Results
@@ -20,7 +20,7 @@ __all__ = [
     "headline_rows",
     "layout_of",
     "read_records",
-    "recompute_table",
+    "recompute_files",
     "records_frame",
     "table_from_records",
     "tidy_records",

@@ -13,10 +13,9 @@ from ..core.io import write_atomically
 from ..study.definition import Study
 from .data.layout import Layout, layout_of
 from .data.results import Results
-from .data.tables import csv_text, read_records, records_frame
+from .data.tables import read_records, records_frame
 from .description import Description, describe
-from .files import write_files
-from .files.tidy import tidy_table
+from .files import texts, write_files
 from .markdown import Markdown, blocks
 from .page import write_page
 from .section import Report
@@ -93,6 +92,6 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
     return blocks([image, Markdown("**Figure {}.** {}").format(number, caption)])
 
 
-def recompute_table(records_csv: str, layout: Layout) -> str:
-    """The text of table.csv computed anew from the text of records.csv; equal bytes mean that they belong together."""
-    return csv_text(tidy_table(Results(read_records(records_csv), layout)))
+def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:
+    """The text of every file of data, by name, computed anew from that of records.csv; equal bytes belong together."""
+    return texts(Results(read_records(records_csv), layout))

@@ -16,6 +16,8 @@ from markupsafe import Markup
 _SPECIAL = re.compile(r"[\\`*|~$]|\](?=[(\[:])|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")
 _TAG = re.compile(r"<(?=[A-Za-z/!?])")
 _ENTITY = re.compile(r"&(?=[#A-Za-z])")
+# what is a heading, a quotation, a list or a rule where a line begins with it
+_BLOCK = re.compile(r"^(\d*)(?=(?<!\d)(?:>|#{1,6}(?:\s|$)|[-+](?:\s|$)|[-=_]{3,}\s*$)|(?<=\d)[.)](?:\s|$))")
 _NUMERIC = re.compile(r"[-+–]?(\d.*)?|no test")
 
 
@@ -68,7 +70,12 @@ def heading(text: object, level: int = 2) -> Markdown:
 
 def bullets(items: Iterable[object]) -> Markdown:
     """A list, empty without items."""
-    return Markdown("\n").join(Markdown("- {}").format(item) for item in items)
+    return Markdown("\n").join(Markdown("- {}").format(beginning(item)) for item in items)
+
+
+def beginning(value: object) -> Markdown:
+    """``value`` as :func:`escape` gives it, for the beginning of a line: no heading, quotation, list or rule."""
+    return Markdown(_BLOCK.sub(r"\g<1>\\", escape(value), count=1))
 
 
 def table(headers: Sequence[object], rows: Sequence[Sequence[object]]) -> Markdown:

@@ -40,6 +40,17 @@ def test_a_changed_number_in_a_table_is_found(report: Path) -> None:
     assert ["does not follow from records.csv" in problem for problem in problems(report)] == [True]
 
 
+@pytest.mark.parametrize("name", ["tests.csv", "table.tex", "columns.md"])
+def test_an_edited_or_missing_file_of_data_is_found(report: Path, name: str) -> None:
+    file = report / name
+    file.write_text(f"{file.read_text()}1.0\n")
+    assert problems(report) == [
+        f"{report}: {name} does not follow from records.csv; run 'holoeval report' on its config"
+    ]
+    file.unlink()
+    assert [f"{name} is missing" in problem for problem in problems(report)] == [True]
+
+
 def test_a_table_of_another_version_is_told_from_a_changed_number(report: Path) -> None:
     table = report / "table.csv"
     table.write_text(table.read_text().replace("psnr_linear_median", "psnr_linear_mode"))

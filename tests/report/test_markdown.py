@@ -1,9 +1,11 @@
 import re
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from markdown_it import MarkdownIt
 
-from holobench_eval.report.markdown import Markdown, blocks, bullets, code, code_block, escape, table
+from holobench_eval.report.markdown import Markdown, beginning, blocks, bullets, code, code_block, escape, table
 
 ANY_TEXT = st.text(max_size=40)
 
@@ -55,3 +57,15 @@ def test_code_cannot_be_closed_from_inside(text):
     fence = re.match("`+", str(code_block(text)))[0]
     assert max((len(run) for run in re.findall("`+", text)), default=0) < len(fence)
     assert "\n" not in str(code(text))
+
+
+@pytest.mark.parametrize("text", ["# a", "> a", "- a", "+ a", "1. a", "2) a", "---", "===", "###"])
+def test_what_begins_a_line_begins_no_block(text):
+    html = MarkdownIt("commonmark").render(f"above\n\n{beginning(text)}\n")
+    assert html.count("<") == 4  # two paragraphs
+    assert MarkdownIt("commonmark").render(str(bullets([text]))).count("<") == 4  # a list and its item
+
+
+@pytest.mark.parametrize("text", ["-0.75 dB", "+1.2", "1.5 dB", "#hil", "a - b", "20 dB."])
+def test_an_ordinary_beginning_stays_legible(text):
+    assert beginning(text) == text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from holobench_eval.report import layout_of, recompute_table
+from holobench_eval.report import layout_of, recompute_files
 from holobench_eval.report.data.tables import csv_text, read_records, records_frame
 from holobench_eval.study.config import load_study
 from holobench_eval.study.run import Outcome
@@ -15,8 +15,7 @@ def commit(config: Path, report: Path, outcome: Outcome) -> None:
     """Write the tables of a finished run into its folder, empty texts beside them, and remove its records."""
     layout = layout_of(load_study(config))
     text = csv_text(records_frame(outcome.records, layout))
-    (report / "records.csv").write_text(text)
-    (report / "table.csv").write_text(recompute_table(text, layout))
+    _write(report, recompute_files(text, layout))
     for name in ("report.md", "details.md"):
         (report / name).touch()
     shutil.rmtree(report / "records")
@@ -28,6 +27,10 @@ def change(config: Path, report: Path, method: str, by: float) -> str:
     frame = read_records(path.read_text())
     first = frame.index[frame["method"] == method][0]
     frame.loc[first, "psnr_linear"] = round(frame.loc[first, "psnr_linear"] + by, 4)
-    path.write_text(csv_text(frame))
-    (report / "table.csv").write_text(recompute_table(path.read_text(), layout))
+    _write(report, recompute_files(csv_text(frame), layout))
     return str(frame.loc[first, "target"])
+
+
+def _write(report: Path, texts: dict[str, str]) -> None:
+    for name, text in texts.items():
+        (report / name).write_text(text)

@@ -34,7 +34,7 @@ def compare(
             min=0,
             metavar="AMOUNT",
             help="Exit code 1 if a method's mean is worse by more (in dB, or the metric's unit), its interval clear of "
-            "zero, which takes three clusters of targets.",
+            "zero, which takes three clusters of targets, or if B lacks scores that A has.",
         ),
     ] = None,
 ) -> None:
@@ -52,11 +52,15 @@ def compare(
         for name, text in (("compare.md", page.markdown(comparison)), ("compare.csv", page.csv(comparison))):
             write_atomically(output / name, text.encode())
             console.print(str(output / name), markup=False, highlight=False, soft_wrap=True)
-    if fail_on_regression is not None and (worse := comparison.regressions(fail_on_regression)):
+    if fail_on_regression is not None:
         limit = f"{fail_on_regression:g} {comparison.score.unit}".rstrip()
-        named = "; ".join(f"{row.method} on {row.display}" for row in worse)
-        console.print(f"worse by more than {limit}: {named}", markup=False, highlight=False, soft_wrap=True)
-        raise typer.Exit(1)
+        worse = [f"{row.method} on {row.display}" for row in comparison.regressions(fail_on_regression)]
+        lost = [f"{part.method} on {part.display}" for part in comparison.unpaired if part.run == "A"]
+        for what, named in ((f"worse by more than {limit}", worse), ("without scores that A has", lost)):
+            if named:
+                console.print(f"{what}: {'; '.join(named)}", markup=False, highlight=False, soft_wrap=True)
+        if worse or lost:
+            raise typer.Exit(1)
 
 
 def _pairs(displays: Sequence[str] | None) -> dict[str, str] | None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..data.phrases import short, tested, value, verdict
 from ..data.results import Results
 from ..data.text import number, percent, words
@@ -32,6 +34,8 @@ def _captures(results: Results, label: str) -> float:
 def _applies(results: Results) -> bool:
     if not results.conditions or not results.layout.spends_captures or "total_captures" not in results.table:
         return False
+    if not results.layout.baseline or not results.is_complete(results.layout.baseline, results.conditions[0]):
+        return False
     return 2 * sum(map(len, families(results).values())) > len(results.methods(results.conditions[0]))
 
 
@@ -40,6 +44,8 @@ def sentences(results: Results) -> Iterator[str]:
     condition, score, baseline = results.conditions[0], results.headline, str(results.layout.baseline)
     passed, failed = [], []
     for name, labels in families(results).items():
+        if not any(_is_tested(results, label) for label in labels):
+            continue
         first = next((label for label in labels if _is_better(results, label)), None)
         if first is None:
             failed.append(f"{name} (up to {number(_captures(results, labels[-1]))})")
@@ -67,6 +73,11 @@ def sentences(results: Results) -> Iterator[str]:
             f"The best row is {ranking[0]} with {number(_captures(results, ranking[0]))} captures, "
             f"{value(results, ranking[0], condition)}{share}."
         )
+
+
+def _is_tested(results: Results, label: str) -> bool:
+    test = tested(results, label, results.conditions[0])
+    return test is not None and bool(np.isfinite(test.p))
 
 
 def _is_better(results: Results, label: str) -> bool:

@@ -40,7 +40,8 @@ def best(results: Results) -> str:
     parts = [_first(results, condition) for condition in results.conditions]
     track = " without a camera for the scored image" if ONLINE in results.categories else ""
     if not any(parts):
-        return "No method has a score for every target, so none is ranked."
+        ranked = any(results.ranking(name, categories=(ONLINE,)) for name in results.conditions)
+        return "" if ranked else "No method that competes has a score for every target, so none is ranked."
     score, domain = results.headline, DOMAIN_NAMES.get(results.headline.domain)
     metric = f"{score.title} ({domain})" if domain else score.title
     return f"The best mean {metric}{track}: {'; '.join(filter(None, parts))}."
@@ -73,11 +74,11 @@ def online(results: Results) -> Iterator[str]:
 
 def floor(results: Results) -> Iterator[str]:
     """Who is not above what a constant image scores."""
-    parts, known = [], False
+    parts, known, whole = [], False, True
     for condition in results.conditions:
         above = {label: results.above_floor(label, condition) for label in results.methods(condition)}
         scored = {label: gap for label, gap in above.items() if gap and gap.n == len(results.targets)}
-        known = known or bool(scored)
+        known, whole = known or bool(scored), whole and len(scored) == len(above)
         below = [label for label, gap in scored.items() if not results.headline.better(gap.mean, 0.0)]
         if below:
             parts.append(f"{words(below)} on {condition}")
@@ -86,7 +87,8 @@ def floor(results: Results) -> Iterator[str]:
             f"{'; '.join(parts)}."
         )
     elif known:
-        yield f"Every method is better on average than a constant image in the place of a {results.layout.text.scored}."
+        every = "Every method" if whole else "Every method with a score for every target"
+        yield f"{every} is better on average than a constant image in the place of a {results.layout.text.scored}."
 
 
 def oracle(results: Results) -> Iterator[str]:

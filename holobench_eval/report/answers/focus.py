@@ -45,6 +45,11 @@ def _times(results: Results, label: str, condition: str) -> str:
     return f"{number(own / other)} times the computing time of a scene"
 
 
+def _against(results: Results, label: str, condition: str) -> str:
+    test = tested(results, label, condition)
+    return results.headline.estimate(test.estimate, signed=True) if test else "–"
+
+
 def rows(results: Results) -> Markdown | None:
     """A row a method and display: score over all planes, difference to the baseline, seconds a scene."""
     score, baseline = results.headline, results.layout.baseline
@@ -54,13 +59,14 @@ def rows(results: Results) -> Markdown | None:
             condition,
             "all planes" if label in results.layout.stacked else "one plane",
             score.in_row(results.row(label, condition)),
-            score.estimate(test.estimate, signed=True) if (test := tested(results, label, condition)) else "–",
+            *([_against(results, label, condition)] if baseline else []),
             number(_seconds(results, label, condition)),
         ]
         for condition in results.conditions
         for label in results.methods(condition)
     ]
-    headings = ["method", "display", "hologram of", score.heading, f"difference to {baseline}", "seconds a scene"]
+    against = [f"difference to {baseline}"] if baseline else []
+    headings = ["method", "display", "hologram of", score.heading, *against, "seconds a scene"]
     return table(headings, lines) if lines else None
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from ..data.results import Results
+from ..data.text import words
 from ..markdown import Markdown
 
 MOST_SENTENCES = 5
@@ -32,7 +33,11 @@ class Kind:
         """At most ``MOST_SENTENCES`` sentences."""
         if not results.conditions or results.done.empty:
             return ["No cell of the study has a score, so there is no answer."]
-        return list(self.sentences(results))[:MOST_SENTENCES]
+        found = [sentence for sentence in self.sentences(results) if sentence][:MOST_SENTENCES]
+        untold = [label for label in subjects(results) if not any(label in sentence for sentence in found)]
+        if untold and len(found) < MOST_SENTENCES:
+            found.append(f"Nothing is said of {words(untold)}: a score is missing, of a target or of the baseline.")
+        return found or ["Too many scores are missing for an answer."]
 
 
 def subjects(results: Results) -> list[str]:

@@ -59,11 +59,13 @@ def _worst(results: Results, found: list[Sweep], label: str) -> Iterator[str]:
         losses = [(loss, sweep, value) for sweep in here if (worst := sweep.worst(label)) for value, loss in [worst]]
         if losses:
             loss, sweep, value = max(losses, key=lambda entry: entry[0].mean)
-            above = sum(estimate.low > SMALL for estimate, _, _ in losses)
-            many = f", and {above} of {len(losses)} kinds of change are shown to cost more than {SMALL:g} dB"
+            above = sum(any(one.low > SMALL for one in sweep.losses(label).values()) for sweep in here)
+            many = f", and {above} of {len(losses)} kinds of change have a loss whose interval is above {SMALL:g} dB"
+            known, points = sum(len(sweep.losses(label)) for sweep in here), sum(len(s.swept.points) for s in here)
             parts.append(
                 f"on {before} {difference(score, loss)} ({sweep.kind.words}, {value_text(sweep, value)})"
                 f"{many if score.unit == 'dB' and len(losses) > 1 else ''}"
+                f"{f', of the {known} of {points} changes that have every score' if known < points else ''}"
             )
     if parts:
         yield f"The largest mean loss of {label} is {'; '.join(parts)}."
@@ -75,12 +77,11 @@ def _leads(results: Results, found: list[Sweep]) -> Iterator[str]:
     for label in [label for label in _followed(results) if label != baseline]:
         for before in dict.fromkeys(sweep.swept.before for sweep in found):
             here = [sweep for sweep in found if sweep.swept.before == before and label in sweep.methods]
-            lead = results.gain(label, before) if here else None
+            lead = here[0].gain(label, before) if here else None
             if lead is None:
                 continue
             own = f"{label} on {before}, {difference(results.headline, lead)} before any change"
-            sign = 1 if results.headline.higher_is_better else -1
-            parts.append(f"{own}, {_ends(here, label) if sign * lead.mean > 0 else 'which is none'}")
+            parts.append(f"{own}, {_ends(here, label) if lead.mean > 0 else 'which is none'}")
     if parts:
         yield f"Lead over {baseline}: {'; '.join(parts)}."
 
@@ -98,8 +99,10 @@ def _ends(here: list[Sweep], label: str) -> str:
     least, sweep, value = min(gains, key=lambda entry: entry[0].mean)
     where = f"{sweep.kind.words}, {value_text(sweep, value)}"
     lost = list(dict.fromkeys(other.kind.words for gain, other, _ in gains if gain.mean <= 0))
+    points = sum(len(sweep.swept.points) for sweep in here)
+    every = "every change" if len(gains) == points else f"the {len(gains)} of {points} changes that have every score"
     if not lost:
-        return f"kept on average under every change, least at {difference(sweep.results.headline, least)} ({where})"
+        return f"kept on average under {every}, least at {difference(sweep.results.headline, least)} ({where})"
     return f"lost on average under some change of {words(lost)} (worst {where})"
 
 
@@ -146,7 +149,7 @@ def rows(results: Results) -> Markdown | None:
             if (worst := sweep.worst(label)) is None:
                 continue
             value, loss = worst
-            gained = sweep.gain(label, dict(sweep.swept.points)[value]) if label != baseline else None
+            gained = sweep.gain(label, dict(sweep.swept.points)[value]) if baseline and label != baseline else None
             lines.append(
                 [
                     sweep.kind.words,
@@ -154,10 +157,11 @@ def rows(results: Results) -> Markdown | None:
                     f"{label} (online)" if results.layout.category(label) == ONLINE else results.layout.marked(label),
                     value_text(sweep, value),
                     score.estimate(loss, signed=True),
-                    score.estimate(gained, signed=True) if gained else "–",
+                    *([score.estimate(gained, signed=True) if gained else "–"] if baseline else []),
                 ]
             )
-    columns = ["change", "display", "method", "worst at", f"mean loss there{unit}", f"above {baseline} there{unit}"]
+    columns = ["change", "display", "method", "worst at", f"mean loss there{unit}"]
+    columns += [f"above {baseline} there{unit}"] if baseline else []
     return table(columns, lines) if lines else None
 
 

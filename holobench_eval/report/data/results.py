@@ -229,7 +229,9 @@ class Results:
     @cached_property
     def against_baseline(self) -> list[PairedTest]:
         """Every method against the baseline on every display: one family of tests, in which the oracle is not."""
-        baseline = str(self.layout.baseline)
+        baseline = self.layout.baseline
+        if baseline is None:
+            return []
         pairs = [
             (condition, other)
             for condition in self.conditions

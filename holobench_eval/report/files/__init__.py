@@ -16,20 +16,23 @@ from .parquet import is_available, write_parquet
 from .tidy import tidy_records, tidy_table, tidy_tests
 
 
-def write_files(results: Results, output: Path) -> None:
-    """Write records.csv, table.csv, tests.csv, columns.md, table.tex and, with pyarrow, records.parquet."""
-    records = tidy_records(results.frame, results.layout)
-    files: dict[File, pd.DataFrame] = {
-        "records.csv": records,
+def texts(results: Results) -> dict[str, str]:
+    """The text of every file but the Parquet twin, by its name."""
+    frames: dict[File, pd.DataFrame] = {
+        "records.csv": tidy_records(results.frame, results.layout),
         "table.csv": tidy_table(results),
         "tests.csv": tidy_tests(results),
     }
-    for name, frame in files.items():
-        write_atomically(output / name, csv_text(frame).encode())
-    write_atomically(output / "columns.md", f"{dictionary(files)}\n".encode())
-    write_atomically(output / "table.tex", latex_tables(results).encode())
+    written = {str(name): csv_text(frame) for name, frame in frames.items()}
+    return written | {"columns.md": f"{dictionary(frames)}\n", "table.tex": latex_tables(results)}
+
+
+def write_files(results: Results, output: Path) -> None:
+    """Write records.csv, table.csv, tests.csv, columns.md, table.tex and, with pyarrow, records.parquet."""
+    for name, text in texts(results).items():
+        write_atomically(output / name, text.encode())
     parquet = output / "records.parquet"
     if is_available():
-        write_parquet(parquet, records)
+        write_parquet(parquet, tidy_records(results.frame, results.layout))
     else:
         parquet.unlink(missing_ok=True)  # of other records

@@ -45,6 +45,16 @@ def test_a_regression_beyond_the_limit_is_exit_code_1(
 
 
 @pytest.mark.usefixtures("worse")
+def test_a_method_that_is_gone_is_a_regression(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_report(Path("c"), {("kept", "bench"): BASE})
+    assert holoeval(monkeypatch, "compare", "a", "c", "--fail-on-regression", 9) == 1
+    assert "without scores that A has: toy on bench" in capsys.readouterr().out
+    assert holoeval(monkeypatch, "compare", "a", "c") == 0
+
+
+@pytest.mark.usefixtures("worse")
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -89,6 +89,28 @@ def test_who_is_no_better_than_a_constant_image_is_named() -> None:
     assert "No better on average than a constant image in the place of a capture: old on bench." in text
 
 
+def test_a_method_that_lacks_a_target_is_not_counted_among_every_method() -> None:
+    found = results_of({"old": 17.0, "new": 19.0, "floor_constant": 15.0})
+    assert "Every method is better" in answer(found)
+    whole = found.frame
+    hole = whole[(whole["method"] != "new") | (whole["target"] != TARGETS[0])].reset_index(drop=True)
+    text = answer(Results(hole, found.layout))
+    assert "Every method with a score for every target is better" in text
+
+
+def test_a_method_of_the_question_without_a_comparison_is_named() -> None:
+    found = results_of({"old": 17.0, "new": 19.0, "other": 18.0}, question="Is new better?")
+    hole = found.frame[(found.frame["method"] != "new") | (found.frame["target"] != TARGETS[0])].reset_index(drop=True)
+    assert "Nothing is said of new: a score is missing" in answer(Results(hole, found.layout))
+
+
+def test_a_baseline_of_another_display_leaves_no_budget_to_answer() -> None:
+    captures = {"few": 10, "many": 90}
+    found = results_of({"few@a": 17.0, "many@a": 19.0, "old@b": 17.0}, {"few": "online", "many": "online"}, captures)
+    assert name_of(found) == "comparison"
+    assert answer(found)
+
+
 def test_a_name_that_begins_another_is_not_taken_for_it() -> None:
     found = results_of(
         {"old": 17.0, "old, tuned": 18.0, "new": 19.0, "new_plus": 20.0}, question="Is new_plus, or old, tuned, better?"
@@ -185,7 +207,7 @@ def test_a_sweep_says_the_worst_loss_and_where_a_lead_ends() -> None:
         "The largest mean loss of HIL is on leto-aged +9.00 dB [+9.00, +9.00] (drift since calibration, 90 days)"
         in text
     )
-    assert "1 of 2 kinds of change are shown to cost more than 1 dB." in text
+    assert "1 of 2 kinds of change have a loss whose interval is above 1 dB." in text
     assert (
         "HIL on leto-aged, +4.00 dB [+4.00, +4.00] before any change, lost on average under some change of drift"
         in text

@@ -1,6 +1,6 @@
 import pytest
 
-from holobench_eval.report import Results, csv_text, read_records, recompute_table, records_frame, table_from_records
+from holobench_eval.report import Results, csv_text, read_records, recompute_files, records_frame, table_from_records
 from holobench_eval.report.data.categories import meanings
 from holobench_eval.report.data.columns import file_name
 from holobench_eval.report.files.tidy import tidy_records, tidy_table
@@ -139,7 +139,7 @@ def test_the_table_follows_from_the_written_records(records):
     floor = synthetic.record("floor_black", synthetic.cell("floor_black", "coffee", REFERENCE), {"psnr_linear": 1.0})
     found = results([*ended, floor])
     written = csv_text(tidy_records(found.frame, found.layout))
-    assert recompute_table(written, found.layout) == csv_text(tidy_table(found))
+    assert recompute_files(written, found.layout)["table.csv"] == csv_text(tidy_table(found))
 
 
 def test_records_of_an_earlier_version_give_the_table_of_that_version(found):
@@ -147,7 +147,7 @@ def test_records_of_an_earlier_version_give_the_table_of_that_version(found):
     table = table_from_records(read_records(csv_text(old)), found.layout)
     assert not set(NEW) & set(table)
     assert csv_text(found.table.drop(columns=[column for column in NEW if column in found.table])) == csv_text(table)
-    header = recompute_table(csv_text(old), found.layout).splitlines()[0]
+    header = recompute_files(csv_text(old), found.layout)["table.csv"].splitlines()[0]
     assert not set(map(file_name, NEW)) & set(header.split(","))
 
 

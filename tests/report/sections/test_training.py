@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from holobench_eval.core.hashing import digest
-from holobench_eval.report import Results, csv_text, recompute_table, records_frame, table_from_records, write_report
+from holobench_eval.report import Results, csv_text, recompute_files, records_frame, table_from_records, write_report
 from holobench_eval.report.charts.training import CURVES, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
@@ -89,7 +89,7 @@ def test_captures_for_training_are_told_apart_from_those_while_solving(found, tm
     table = table_from_records(frame, layout())
     assert table.set_index("method").loc["HIL", "learned_sha256"] == "hil" * 16
     written_records = csv_text(tidy_records(frame, layout()))
-    assert recompute_table(written_records, layout()) == csv_text(tidy_table(Results(frame, layout())))
+    assert recompute_files(written_records, layout())["table.csv"] == csv_text(tidy_table(Results(frame, layout())))
 
     text = written(found, tmp_path)
     header, _, *rows = rows_under(text, "Captures, time and light")

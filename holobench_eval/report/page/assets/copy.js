@@ -44,7 +44,7 @@ function markdown() {
 
 /** Numbers with their ends in columns of their own; text that a spreadsheet would read as a formula gets a quote. */
 function csv() {
-  const safe = (text) => (/^[=+\-@\t\r]/.test(text) ? `'${text}` : text);
+  const safe = (text) => (/^'*\s*[=+\-@＝＋－＠]/.test(text) ? `'${text}` : text);
   const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
   const line = (cells) => cells.map(quoted).join(",");
   const parts = (column) => (shownRows().some((row) => "low" in (row.cells[column.key] ?? {})) ? ["value", "low", "high"] : ["value"]);

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...answers import kind_of
 from ...answers.kind import named
 from ...answers.limits import limits
-from ...markdown import Markdown, bullets, heading
+from ...markdown import Markdown, beginning, bullets, heading
 from ...section import Blocks, Figures, Report, Section
 
 
@@ -13,7 +13,7 @@ def _render(report: Report, _: Figures) -> Blocks:
     layout, kind = report.layout, kind_of(report.results)
     sentences = kind.answer(report.results)
     yield heading("Question")
-    yield layout.question or kind.question
+    yield beginning(layout.question or kind.question)
     if layout.would_change:
         yield Markdown("**What would change the answer.** {}").format(layout.would_change)
     yield heading("Answer")
