@@ -91,7 +91,7 @@ def _grid_and_padding(samples: int, grid: Grid, limited: bool) -> list[str]:
 
 def displacement(dy: float, dx: float, setting: Setting) -> str:
     """A displacement [px], and where it may come from."""
-    return f"({dy:.2f}, {dx:.2f}) px aside: {_frequency_offset(max(dy, dx, key=abs), setting)}"
+    return f"({dy:z.2f}, {dx:z.2f}) px aside: {_frequency_offset(max(dy, dx, key=abs), setting)}"
 
 
 def _frequency_offset(pixels: float, setting: Setting) -> str:
