@@ -32,8 +32,12 @@ State = Literal["ok", "missing", "warning"]
 IMPORTING, ASKING = 180.0, 120.0  # seconds that imports and drivers may take
 LEAST_DISK = 2e9  # bytes; a full-panel study with its captures
 STYLES = {"ok": "green", "missing": "yellow", "warning": "bold yellow", "broken": "bold red"}
-MODULES = {"scikit-image": "skimage", "pillow": "PIL", "pyyaml": "yaml", "opencv-python-headless": "cv2"} | {
-    "markdown-it-py": "markdown_it"
+MODULES = {
+    "scikit-image": "skimage",
+    "pillow": "PIL",
+    "pyyaml": "yaml",
+    "opencv-python-headless": "cv2",
+    "markdown-it-py": "markdown_it",
 }
 
 LIBRARIES = """
