@@ -93,6 +93,7 @@ def _other_step(patch: pytest.MonkeyPatch) -> None:
         ("method wirtinger", _other_step),
         ("method online_camera", _other_step),
         ("method hil", _brighter_training),
+        ("method oracle", _other_step),
         ("method hil_nh3d", _other_step),
         ("method hybrid_model", _other_step),
         ("method parametric_model", _brighter_training),

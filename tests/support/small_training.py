@@ -38,7 +38,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "odak_sgd": {"iterations": 1},
     "wirtinger_gamma": {"images": 1, "of": _EARLY},
     "torchoptics_adam": {"iterations": 6},
-    "oracle": {"iterations": 4, "start_iterations": 40},
+    "oracle": {"iterations": 4, "rounds": 2},  # longer descents amplify rounding
     "online_camera": {"captures": 24, "start": _START},
     "online_camera_network": {"captures": 24, "start": _START, "steps": 3, "network": _SMALL},
     "hil": {**_HIL, "start": _EARLY},

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..markdown import Markdown
 from ..markdown import table as markdown_table
 from .kind import Kind
 
-CLOSEST = 3  # pairs that turn round most often, which the answer names
+CLOSEST = 3  # groups of pairs that turn round most often, which the answer names
 
 
 def sentences(results: Results) -> Iterator[str]:
@@ -53,32 +54,46 @@ def _first(each: Ranks) -> str:
 
 
 def _turning(each: Ranks) -> str:
-    turning = sorted((pair for pair in each.pairs if pair.flips), key=lambda pair: -pair.flips)
+    turning = sorted((pair for pair in each.pairs if pair.flips), key=lambda pair: (-pair.flips, pair.first))
     still = len(each.pairs) - len(turning)
+    groups = [list(group) for _, group in itertools.groupby(turning, lambda pair: (pair.flips, pair.first))]
     named = [
-        f"{pair.first} over {pair.second} ({percent(pair.flipped)} % of draws, nominally "
-        f"{each.results.headline.with_unit(pair.nominal, signed=True)}"
-        f"{', in which that display is not typical of its draws' * (2 * pair.flips > len(each.used))})"
-        for pair in turning[:CLOSEST]
+        f"{group[0].first} over {words([pair.second for pair in group])} ({percent(group[0].flipped)} % of draws"
+        f"{' each' * (len(group) > 1)}, nominally {_nominal(each, group)}"
+        f"{', in which that display is not typical of its draws' * (2 * group[0].flips > len(each.used))})"
+        for group in groups[:CLOSEST]
     ]
     most = f"; most often reversed: {'; '.join(named)}" if named else ""
     return f"{still} of {len(each.pairs)} pairs of methods keep their order in every draw{most}."
 
 
+def _nominal(each: Ranks, group: Sequence[Pair]) -> str:
+    """The lead of the first of each pair before any draw, or its range."""
+    ends = [extreme(pair.nominal for pair in group) for extreme in (min, max)]
+    return " to ".join(dict.fromkeys(each.results.headline.with_unit(end, signed=True) for end in ends))
+
+
 def _cause(each: Ranks) -> Iterator[str]:
-    caused = sorted((pair for pair in each.pairs if pair.cause), key=lambda pair: -pair.flips)
-    if caused:
-        parts = [_goes_with(pair, pair.cause) for pair in caused[:CLOSEST] if pair.cause]
+    groups: dict[str, list[tuple[str, Cause]]] = {}
+    for pair in sorted((pair for pair in each.pairs if pair.cause), key=lambda pair: -pair.flips):
+        if cause := pair.cause:
+            gains, loses = (pair.first, pair.second) if cause.correlation > 0 else (pair.second, pair.first)
+            form = "" if cause.feature.form == "value" else f" ({cause.feature.form})"
+            favours = f"more {PARAMETERS[cause.feature.parameter].words}{form} favours {gains}"
+            groups.setdefault(favours, []).append((loses, cause))
+    if groups:
+        parts = [
+            f"{favours} over {words([loses for loses, _ in group])} ({_strengths([cause for _, cause in group])})"
+            for favours, group in list(groups.items())[:CLOSEST]
+        ]
         yield f"What turns the order, by rank correlation over draws, adjusted for all tried: {'; '.join(parts)}."
     elif any(pair.flips for pair in each.pairs):
         yield "No single parameter of the draws is shown to turn the order of any pair."
 
 
-def _goes_with(pair: Pair, cause: Cause) -> str:
-    gains = pair.first if cause.correlation > 0 else pair.second
-    form = "" if cause.feature.form == "value" else f" ({cause.feature.form})"
-    words = PARAMETERS[cause.feature.parameter].words
-    return f"more {words}{form} favours {gains} of {pair.first} and {pair.second} (rho {abs(cause.correlation):.2f})"
+def _strengths(causes: Sequence[Cause]) -> str:
+    sizes = [abs(cause.correlation) for cause in causes]
+    return f"rho {' to '.join(dict.fromkeys(f'{extreme(sizes):.2f}' for extreme in (min, max)))}"
 
 
 def _other_displays(each: Ranks) -> Iterator[str]:

@@ -112,8 +112,7 @@ def _range(results: Results, same: list[Sweep]) -> Iterator[str]:
     for sweep in same:
         ranges: dict[str, list[str]] = {}
         for label in sweep.methods:
-            if ends := sweep.small_range(label):
-                reach = f"{ends[0]:g} to {ends[1]:g} {sweep.kind.unit}" if ends[0] < ends[1] else "nowhere"
+            if reach := sweep.small_range_text(label):
                 ranges.setdefault(reach, []).append(label)
         if ranges:
             each = [f"{text} ({words(labels)})" for text, labels in ranges.items()]

@@ -137,6 +137,18 @@ class Sweep:
             ends.append(self.kind.nominal + side * reach)
         return ends[0], ends[1]
 
+    def small_range_text(self, label: str) -> str | None:
+        """``small_range`` with its unit, ``at least`` where a larger change was not tested; ``nowhere`` for no change."""
+        if (ends := self.small_range(label)) is None:
+            return None
+        if ends[0] == ends[1]:
+            return "nowhere"
+        tested = [float(value) for value, _ in self.swept.points]
+        low, high = (
+            f"{'at least ' * (end == extreme(tested))}{end:g}" for end, extreme in zip(ends, (min, max), strict=True)
+        )
+        return f"{low} to {high} {self.kind.unit}".strip()
+
     def recovered(self, label: str, remedy: Sweep) -> dict[str, Estimate]:
         """Share of each loss that is got back under the same value of another kind, by value; of a loss that is small,
         or not clear, no share is told."""

@@ -18,6 +18,7 @@ _HEAD = """% The headline table of every display, with the numbers of table.csv 
 % In the preamble: \\usepackage{booktabs,siunitx}. A table is 84 mm wide at most, its type 7 pt (\\scriptsize at 10 pt).
 """
 _LABEL_MM = 27  # room for a method's label, which is broken into lines
+_LONGEST, _PIECE = 24, 8  # letters of a word that fit into a line, and between breaks of one that does not
 _NONE = "{--}"
 _SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -87,7 +88,7 @@ def _columns(results: Results, condition: str) -> Iterator[_Column]:
     yield _Column(
         rf">{{\raggedright\arraybackslash}}p{{{_LABEL_MM}mm}}",
         "method",
-        [escape(marked(results, label, condition)) for label in labels],
+        [_label(marked(results, label, condition)) for label in labels],
     )
     means = [(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"]) for row in rows]
     yield _pair(score, f"{escape(score.title)}{unit}", means)
@@ -108,6 +109,16 @@ def _columns(results: Results, condition: str) -> Iterator[_Column]:
         yield _single(escape(ssim.title), [_digits(ssim, row[ssim.key]) for row in rows])
     if _counts_captures(results, condition):
         yield _single("captures", [f"{row['total_captures']:.0f}" for row in rows])
+
+
+def _label(text: str) -> str:
+    """A label that can be broken between its words, and within a word that is longer than a line."""
+    return " ".join(map(_breakable, text.split()))
+
+
+def _breakable(word: str) -> str:
+    length = _PIECE if len(word) > _LONGEST else len(word)
+    return r"\allowbreak{}".join(escape(word[start : start + length]) for start in range(0, len(word), length))
 
 
 def _single(heading: str, cells: list[str]) -> _Column:

@@ -144,16 +144,14 @@ def sentences(sweep: Sweep, sweeps: Sequence[Sweep]) -> list[str]:
 
 
 def _stated_range(sweep: Sweep) -> list[str]:
-    ranges: dict[tuple[float, float], list[str]] = {}
+    ranges: dict[str, list[str]] = {}
     for label in sweep.methods:
-        ends = sweep.small_range(label)
-        if ends is not None:
-            ranges.setdefault(ends, []).append(label)
-    unit = f" {sweep.kind.unit}" if sweep.kind.unit else ""
+        if reach := sweep.small_range_text(label):
+            ranges.setdefault(reach, []).append(label)
+    limit = f"{SMALL:g} {sweep.results.headline.unit}"
     return [
-        f"From {low:g} to {high:g}{unit} the score changes by at most {SMALL:g} {sweep.results.headline.unit}: "
-        f"{words(labels)}."
-        for (low, high), labels in ranges.items()
+        f"The score changes by at most {limit} {reach if reach == 'nowhere' else f'from {reach}'}: {words(labels)}."
+        for reach, labels in ranges.items()
     ]
 
 

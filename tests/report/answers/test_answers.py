@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -227,7 +228,7 @@ def test_refocusing_says_how_far_a_lens_moves_the_picture() -> None:
     means |= {f"{label}@{name}": 20.0 - loss[label] * abs(value) for label in loss for value, name in points}
     found = results_of(means, sweeps=(Swept("refocus", "bench", points),))
     first, second = kind_of(found).answer(found)
-    assert "at most 1 dB, from and to: on bench -2 to 2 mm (old) and nowhere (new)." in first
+    assert "at most 1 dB, from and to: on bench at least -2 to at least 2 mm (old) and nowhere (new)." in first
     assert "The largest mean loss of old is on bench +0.60 dB [+0.60, +0.60] (image moved by a lens phase" in second
 
 
@@ -241,7 +242,7 @@ def test_rank_stability_says_its_tau_and_what_turns_the_order() -> None:
     text = answer(ranked())
     assert re.search(r"\(1: the same order, 0: unrelated\) is 0\.\d\d \[0\.\d\d, 0\.\d\d\] on average", text)
     assert "robust ranks first on leto-aged and in " in text
-    assert "favours robust of robust and steady (rho 1.00)" in text
+    assert "favours robust over steady (rho 1.00)" in text
 
 
 def focused() -> Results:
@@ -284,6 +285,16 @@ def test_an_answer_is_short_its_table_narrow_and_both_without_nan(study: str) ->
     assert header.count("|") - 1 <= MOST_COLUMNS
     assert "nan" not in " ".join(sentences).split()
     assert kind.question.endswith("?")
+
+
+def test_a_long_answer_says_where_the_rest_of_it_stands() -> None:
+    kind = replace(KINDS[-1], sentences=lambda results: (f"Finding {number} of old." for number in range(7)))
+    found = results_of({"old": 20.0})
+    assert kind.answer(found) == [
+        *(f"Finding {number} of old." for number in range(4)),
+        "Of 3 more findings, the first section of details.md has the sentences.",
+    ]
+    assert len(kind.whole_answer(found)) == 7
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.sentences.__module__.rpartition(".")[2])

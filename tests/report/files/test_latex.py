@@ -128,7 +128,8 @@ def test_a_hostile_name_leaves_the_structure_as_it_is(name: str) -> None:
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex with booktabs and siunitx")
 def test_the_tables_compile_and_fit_one_column(tmp_path: Path) -> None:
-    tables = [results(), named(HOSTILE), named("*[2cm] =1"), named('\\end{table}% a--b~^#{}"<|>')]
+    names = [HOSTILE, "*[2cm] =1", '\\end{table}% a--b~^#{}"<|>', "Wirtinger" * 8]
+    tables = [results(), *map(named, names)]
     body = "".join(map(latex_tables, tables))
     preamble = "\\documentclass{article}\\usepackage{booktabs,siunitx}\\setlength{\\textwidth}{84mm}\\raggedbottom"
     (tmp_path / "paper.tex").write_text(f"{preamble}\\begin{{document}}\n{body}\\end{{document}}\n")

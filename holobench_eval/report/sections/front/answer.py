@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...answers import kind_of
-from ...answers.kind import named
+from ...answers.kind import MOST_SENTENCES, named
 from ...answers.limits import limits
 from ...markdown import Markdown, beginning, bullets, heading
 from ...section import Blocks, Figures, Report, Section
@@ -26,4 +26,16 @@ def _render(report: Report, _: Figures) -> Blocks:
     yield bullets(limits(report, kind))
 
 
-SECTIONS = (Section("answer", 2, _render, applies=lambda report: bool(report.results.conditions)),)
+def _rest(report: Report, _: Figures) -> Blocks:
+    yield heading("More of the answer")
+    yield bullets(kind_of(report.results).whole_answer(report.results)[MOST_SENTENCES - 1 :])
+
+
+def _is_long(report: Report) -> bool:
+    return len(kind_of(report.results).whole_answer(report.results)) > MOST_SENTENCES
+
+
+SECTIONS = (
+    Section("answer", 2, _render, applies=lambda report: bool(report.results.conditions)),
+    Section("more of the answer", 2, _rest, applies=_is_long, details=True),
+)
