@@ -10,7 +10,7 @@ from ..data.phrases import difference, relation, tested, value, verdict
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES
 from ..data.text import number, p_value, percent, words
-from ..markdown import Markdown, table
+from ..markdown import Markdown, blocks, table
 from .kind import Kind, subjects
 
 
@@ -125,7 +125,8 @@ def rows(results: Results) -> Markdown | None:
                     _compared(results, label, condition) if test else ["baseline" if label == baseline else "–", "–"]
                 )
             lines.append([*line, *([number(row["total_captures"])] if captures else [])])
-    return table(headings, lines) if lines else None
+    note = "Captures in total: those for the training of a method and those for all scored targets." if captures else ""
+    return blocks([table(headings, lines), note]) if lines else None
 
 
 def _ordered(results: Results, condition: str) -> list[str]:

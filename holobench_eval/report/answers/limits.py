@@ -33,8 +33,8 @@ def _all(report: Report) -> Iterator[str]:
     if report.layout.privileged:
         yield (
             f"Oracle: the method {words(sorted(report.layout.privileged))} may differentiate through the simulated "
-            "bench, which no real method can; it starts from the best phase of all others, so that no method is above it, but "
-            "a better phase than its descent finds may exist. It is not ranked."
+            "bench, which no real method can; it starts from the best phase of all others, so that no method is above "
+            "it, but a better phase than its descent finds may exist. It is not ranked."
         )
 
 

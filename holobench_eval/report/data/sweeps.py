@@ -138,7 +138,7 @@ class Sweep:
         return ends[0], ends[1]
 
     def small_range_text(self, label: str) -> str | None:
-        """``small_range`` with its unit, ``at least`` where a larger change was not tested; ``nowhere`` for no change."""
+        """``small_range`` with its unit; ``at least`` where nothing larger was tested, ``nowhere`` for no change."""
         if (ends := self.small_range(label)) is None:
             return None
         if ends[0] == ends[1]:
