@@ -107,7 +107,7 @@ def _simulated(
 
 def _basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
-    measured = "simulated; its parameters are assumed or from data sheets, and none was measured on a real panel"
+    measured = "simulated; the parameters are assumed or from data sheets, and none was measured on a real panel"
     try:
         calibration = load_calibration(profile)
     except UserError:

@@ -51,7 +51,7 @@ class Residual(nn.Module):
 
 @dataclass(frozen=True)
 class HybridModel(Diagnosed, Calibrated):
-    """``DisplayModel``, a map of the panel pixel by pixel and a residual network that learn from the same captures.
+    """The parametric model, a map of the panel pixel by pixel and a residual network, learned from the same captures.
 
     Map and network begin with nothing. The other parameters are those of `Calibrated`. SI units throughout.
 

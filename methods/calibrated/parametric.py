@@ -14,7 +14,7 @@ from .method import Calibrated
 
 @dataclass(frozen=True)
 class ParametricModel(Diagnosed, Calibrated):
-    """``DisplayModel`` learned from speckle-like patterns, natural holograms and holograms it made itself."""
+    """A physical model of the display with named parameters, learned from captures; Wirtinger holography through it."""
 
     RATES: ClassVar[Rates] = Rates(model=3e-2)
 
