@@ -21,10 +21,10 @@ from .page import write_page
 from .section import Report
 from .sections import sections
 
-# Figures that a report draws itself, those of pictures from thumbnails; others in its folder, such as the stages of a
-# bench, are drawn elsewhere.
+# Figures that a report draws itself, those of pictures from thumbnails; the stages of a bench are drawn during the run.
 OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
 OF_NUMBERS = ("quality-*.png", "training-*.png")
+STAGES = "stages-*.png"
 REPORT, DETAILS = "report.md", "details.md"
 
 _FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
@@ -61,8 +61,12 @@ def write_report(
     for pattern in OF_NUMBERS if keep_pictures else (*OF_PICTURES, *OF_NUMBERS):
         for old in report.figures.glob(pattern):
             old.unlink()
-    for name, text in _texts(report).items():
+    written = _texts(report)
+    for name, text in written.items():
         write_atomically(output / name, f"{text}\n".encode())
+    for old in report.figures.glob(STAGES):  # of displays that the study had earlier
+        if not any(old.name in text for text in written.values()):
+            old.unlink()
     write_page(report)
     return output / REPORT, results
 

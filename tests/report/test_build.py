@@ -136,11 +136,13 @@ def test_a_hole_is_listed_with_its_reason(report):
 def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
     _, found = records
     kept, layout = minimal(found)
-    stale, sheet = tmp_path / "figures" / "comparison-old-9.jpg", tmp_path / "figures" / "stages-leto-aged.png"
-    for file in (stale, sheet):
+    names = ("comparison-old-9.jpg", "stages-old.png", "stages-leto-aged.png")
+    *stale, sheet = (tmp_path / "figures" / name for name in names)
+    for file in (*stale, sheet):
         synthetic.save_picture(file, np.full((8, 8, 3), 0.5))
     text = whole(write_report(layout, kept, tmp_path, {}, Description())[0])
-    assert not stale.exists()
+    assert not any(file.exists() for file in stale)
+    assert sheet.exists()
     assert "(figures/stages-leto-aged.png)" in text
 
 
