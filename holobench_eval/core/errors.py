@@ -18,8 +18,16 @@ class BudgetError(CellError):
     """A method asked the display for more captures than it may use."""
 
 
-class LostDeviceError(UserError):
+class StopError(UserError):
+    """The run cannot go on, whatever cell comes next; it is no fault of a method, and the same command resumes."""
+
+
+class LostDeviceError(StopError):
     """A device does not answer any more: no further cell of the run would get its photograph."""
+
+
+class StorageError(StopError):
+    """A file cannot be written: the disk is full, or the folder cannot be written to."""
 
 
 class Pending(BaseException):

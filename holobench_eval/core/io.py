@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from .errors import StorageError
 from .hashing import digest
 
 TEMPORARY = ".writing-"  # how the name of a file begins that is not whole yet
@@ -36,7 +37,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
     Raises
     ------
-    OSError
+    StorageError
         The file cannot be written; nothing is left behind, and an older file of this name stays as it was.
 
     Examples
@@ -47,19 +48,23 @@ def write_atomically(path: Path, content: bytes) -> None:
     >>> path.read_bytes()
     b'all or nothing'
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=TEMPORARY, dir=path.parent)
-    temporary = Path(name)
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=TEMPORARY, dir=path.parent)
+        temporary = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        reason = f"{path} cannot be written: {error.strerror}; mend that, and run the same command again"
+        raise StorageError(reason) from error
 
 
 def file_name(text: str) -> str:

@@ -29,6 +29,7 @@ import torch
 
 from .. import __version__
 from ..core.device import CPU
+from ..core.errors import StorageError
 from ..core.hashing import digest
 from ..core.io import write_atomically
 from .definition import Study
@@ -213,6 +214,6 @@ def keep(name: str, effort: Cost, retime: bool = False) -> Cost:
     kept = effort if first is None else Cost(first.seconds, effort.memory_mib)
     try:
         write_atomically(folder() / f"{name}.json", json.dumps(asdict(kept)).encode())
-    except OSError:
+    except StorageError:  # a cache, which a run can do without
         return kept
     return kept

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from ..core import plugins
 from ..core.device import find, gpu_name
-from ..core.errors import UserError
+from ..core.errors import StopError, UserError
 from ..core.hashing import canonical
 from ..metrics import catalogue
 from . import cost, provenance
@@ -200,6 +200,8 @@ def _compute(
     results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, watched)
     for job, result in results:
         taken = time.monotonic() - at_work.pop(id(job))
+        if isinstance(result, StopError):
+            raise result
         if isinstance(job, TrainingJob):
             reason = result if isinstance(result, str) else artifacts.fail(job.preparation, _error(result))
             unready.discard(job.preparation.id)

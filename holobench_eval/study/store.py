@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import fcntl
 import json
-import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Interval
+from pydantic import FiniteFloat, StringConstraints, TypeAdapter, ValidationError
 
 from ..core.errors import UserError
 from ..core.hashing import digest
@@ -21,7 +24,13 @@ from .plan import Cell, Plan
 State = Literal["done", "failed", "skipped", "unavailable", "missing"]
 
 LATE = 10.0  # s after which all machines should see a file on a shared disk
-ADDED = frozenset({"alone", "memory_mib", "stopped"})  # entries that records of earlier versions lack
+# Of a record's file. 1: without `schema` and `sha256`, the digest of all other entries.
+SCHEMA = 2
+MOST_BYTES = 1_000_000  # of a record's file, which takes a few thousand
+AGAIN = "delete the file and run the study again"
+
+Column = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_.]{0,99}$")]
+Amount = Annotated[FiniteFloat, Ge(0)]
 
 
 @dataclass(frozen=True)
@@ -42,13 +51,13 @@ class Record:
     state: State
     label: str
     reason: str = ""
-    scores: dict[str, float] = field(default_factory=dict)
-    captures: int = 0
-    seconds: float | None = None
+    scores: dict[Column, FiniteFloat] = field(default_factory=dict)
+    captures: Annotated[int, Interval(ge=0, le=10**9)] = 0
+    seconds: Amount | None = None
     alone: bool | None = None
-    memory_mib: float | None = None
-    registration_residual_px: float | None = None
-    saturated: float | None = None
+    memory_mib: Amount | None = None
+    registration_residual_px: Amount | None = None
+    saturated: Annotated[float, Interval(ge=0, le=1)] | None = None
     learned: dict[str, Any] | None = None
     stopped: str = ""
 
@@ -56,6 +65,9 @@ class Record:
     def id(self) -> str:
         """The name of the record: the hash of its cell."""
         return digest(self.cell)
+
+
+_FIELDS = frozenset(entry.name for entry in fields(Record))
 
 
 @dataclass(frozen=True)
@@ -89,18 +101,21 @@ class Store:
         """Write a record atomically. A failure never replaces a score: that cell was only to be timed again."""
         if record.state == "failed" and (earlier := self.read(record.id)) is not None and earlier.state == "done":
             return
-        text = json.dumps(vars(record), indent=1, sort_keys=True, allow_nan=False)
+        content = {**vars(record), "schema": SCHEMA}
+        text = json.dumps({**content, "sha256": digest(content)}, indent=1, sort_keys=True, allow_nan=False)
         write_atomically(self.path(record.id), f"{text}\n".encode())
 
     def read(self, identity: str) -> Record | None:
         """The record of a cell, None if there is none. UserError for a file that is not that record."""
         path = self.path(identity)
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
+            with path.open("rb") as file:
+                text = file.read(MOST_BYTES + 1)
+            content = json.loads(text) if len(text) <= MOST_BYTES else None
         except FileNotFoundError:
             return None
-        except (OSError, ValueError) as error:
-            raise UserError(f"{path}: unreadable record ({error}); delete the file and run the study again") from error
+        except (OSError, ValueError, RecursionError) as error:
+            raise UserError(f"{path}: unreadable record ({error}); {AGAIN}") from error
         return _checked(path, identity, content)
 
     def remove(self, identities: Iterable[str]) -> None:
@@ -173,33 +188,28 @@ def appears(path: Path, until: float) -> bool:
 
 
 def _checked(path: Path, identity: str, content: Any) -> Record:
-    """The record in a file. UserError for invalid content, or a cell that does not match the file's name."""
-    names = {item.name for item in fields(Record)}
-    if not isinstance(content, dict) or set(content) | ADDED != names:
-        raise UserError(f"{path}: not a record of this version; delete the file and run the study again")
-    record = Record(**content)
-    if not isinstance(record.cell, dict) or digest(record.cell) != identity:
-        raise UserError(f"{path}: holds another cell than its name says; delete the file and run the study again")
-    if record.state not in get_args(State) or not isinstance(record.scores, dict):
-        raise UserError(f"{path}: unknown state '{record.state}'; delete the file and run the study again")
-    numbers = [record.seconds, record.memory_mib, record.registration_residual_px, record.saturated]
-    if not all(
-        _is_number(value) for value in (*record.scores.values(), *filter(_is_present, numbers), record.captures)
-    ):
-        raise UserError(f"{path}: a score or a measurement is not a number; delete the file and run the study again")
-    if not all(isinstance(text, str) for text in (record.label, record.reason, record.stopped)):
-        raise UserError(f"{path}: label, reason and stopped are texts; delete the file and run the study again")
-    if not isinstance(record.alone, bool | None):
-        raise UserError(f"{path}: 'alone' is neither true nor false; delete the file and run the study again")
-    if not (record.learned is None or isinstance(record.learned, dict)):
-        raise UserError(f"{path}: 'learned' is no mapping; delete the file and run the study again")
+    """The record in a file. UserError for one that was edited or damaged, or is of another cell or a later version."""
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: not a record; {AGAIN}")
+    schema, stated = content.get("schema", 1), content.pop("sha256", None)
+    if schema not in (1, SCHEMA):
+        raise UserError(f"{path}: a record of schema {schema!r}, and this version reads up to {SCHEMA}; {AGAIN}")
+    if schema == SCHEMA and stated != digest(content):
+        raise UserError(f"{path}: the record is not as it was written, its digest is another; {AGAIN}")
+    content.pop("schema", None)
+    if unknown := content.keys() - _FIELDS:
+        raise UserError(f"{path}: a record has no entry {min(unknown)[:100]!r}; {AGAIN}")
+    try:
+        record = _adapter().validate_json(json.dumps(content), strict=True)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        where = ".".join(map(str, fault["loc"]))[:100]
+        raise UserError(f"{path}: {where}: {fault['msg']}; {AGAIN}") from error
+    if digest(record.cell) != identity:
+        raise UserError(f"{path}: holds another cell than its name says; {AGAIN}")
     return record
 
 
-def _is_present(value: object) -> bool:
-    return value is not None
-
-
-def _is_number(value: object) -> bool:
-    """A finite number that a table can hold; JSON has larger ones."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < sys.float_info.max
+@cache
+def _adapter() -> TypeAdapter[Record]:
+    return TypeAdapter(Record)

@@ -14,7 +14,7 @@ import torch
 from .. import __version__
 from ..core import plugins
 from ..core.device import CPU, find, gpu_name, moved, repeatable
-from ..core.errors import CellError, LostDeviceError, Pending
+from ..core.errors import CellError, Pending, StopError
 from ..core.io import now, write_atomically
 from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
@@ -48,7 +48,7 @@ def train(job: TrainingJob) -> str:
             return ""
         try:
             _train(job.preparation, artifacts, job.threads, device)
-        except LostDeviceError:
+        except StopError:
             raise
         except Pending:
             artifacts.forget_failure(job.preparation)

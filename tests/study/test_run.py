@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 from holobench_eval.commands.plan import preview
-from holobench_eval.core.errors import UserError
+from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.core.io import file_name
 from holobench_eval.study import provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.executors.clusters import Address
+from holobench_eval.study.executors.local import Local
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import Outcome, run
@@ -90,6 +91,23 @@ def test_an_exception_in_a_method_is_a_failed_cell_and_the_run_goes_on(tmp_path:
     store = Store(tmp_path / "out")
     assert "Traceback" in store.log(plan(load_study(config)).cells[-2].id).read_text()
     assert any("gray 1" in line and "no light" in line for line in lines)
+
+
+@pytest.mark.parametrize("executor", [Serial(), Local(2)], ids=["here", "workers"])
+def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path: Path, executor: Executor) -> None:
+    config, output = write_config(tmp_path), tmp_path / "out"
+    compute(config, output)
+    cells = plan(load_study(config)).cells
+    store = Store(output)
+    store.remove(cell.id for cell in cells)
+    refused = store.thumbnail(cells[-1].id)
+    refused.unlink()
+    refused.mkdir()  # no file can have this name, as none can be written to a full disk
+    with pytest.raises(StorageError, match=rf"{refused.name} cannot be written: .*; mend that, and run the same"):
+        compute(config, output, executor=executor)
+    assert store.read(cells[-1].id) is None
+    refused.rmdir()
+    assert {record["state"] for record in compute(config, output, executor=executor).records} == {"done"}
 
 
 def test_failed_cells_run_again_only_when_asked(tmp_path: Path) -> None:

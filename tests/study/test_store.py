@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holobench_eval.core.errors import UserError
+from holobench_eval.core.errors import StorageError, UserError
+from holobench_eval.core.hashing import digest
 from holobench_eval.core.io import file_name, write_atomically
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Plan, plan
@@ -39,25 +40,52 @@ def test_a_record_that_is_absent_is_none(tmp_path: Path) -> None:
 
 
 def corrupt(text: str) -> dict[str, str]:
+    """Damaged files; those of edited entries have a digest that fits, or are of the schema that had none."""
     content = json.loads(text)
+
+    def edited(**entries: Any) -> str:
+        changed = {key: value for key, value in (content | entries).items() if key != "sha256"}
+        return json.dumps({**changed, "sha256": digest(changed)})
+
+    earlier = {key: value for key, value in content.items() if key not in ("schema", "sha256")}
     return {
         "truncated": text[: len(text) // 2],
         "empty": "",
         "list": "[]",
         "foreign": '{"a": 1}',
-        "moved": json.dumps({**content, "cell": {**content["cell"], "repeat": 9}}),
-        "state": json.dumps({**content, "state": "fine"}),
-        "huge": json.dumps({**content, "captures": 10**400}),
-        "infinite": text.replace('"seconds": null', '"seconds": 1e999'),
-        "truth": json.dumps({**content, "saturated": True}),
-        "label": json.dumps({**content, "label": None}),
-        "learned": json.dumps({**content, "learned": [1]}),
-        "alone": json.dumps({**content, "alone": 1}),
+        "nested": "[" * 200_000,
+        "long": json.dumps({**earlier, "reason": "x" * 2_000_000}),
+        "edited": json.dumps({**content, "scores": {"psnr_linear": 99.0}}),
+        "without a digest": json.dumps({key: value for key, value in content.items() if key != "sha256"}),
+        "later": edited(schema=3),
+        "schema": edited(schema="2"),
+        "moved": edited(cell={**content["cell"], "repeat": 9}),
+        "state": edited(state="fine"),
+        "huge": json.dumps({**earlier, "captures": 10**400}),
+        "negative": edited(captures=-5),
+        "part of a capture": edited(captures=1.5),
+        "back in time": edited(seconds=-1.0),
+        "more than all": edited(saturated=1.5),
+        "infinite": json.dumps(earlier).replace('"seconds": null', '"seconds": 1e999'),
+        "score": edited(scores={"<script>": 1.0}),
+        "truth": edited(saturated=True),
+        "label": edited(label=None),
+        "learned": edited(learned=[1]),
+        "alone": edited(alone=1),
     }
 
 
-FAULTS = ["truncated", "empty", "list", "foreign", "moved", "state", "huge", "infinite", "truth", "label", "learned"]
-FAULTS.append("alone")
+FAULTS = [
+    *("truncated", "empty", "list", "foreign", "nested", "long", "edited", "without a digest", "later", "schema"),
+    *("moved", "state", "huge", "negative", "part of a capture", "back in time", "more than all", "infinite", "score"),
+    *("truth", "label", "learned", "alone"),
+]
+
+
+def test_every_fault_is_tried(tmp_path: Path, grid: Plan) -> None:
+    store, record = Store(tmp_path / "out"), record_of(grid)
+    store.write(record)
+    assert [*corrupt(store.path(record.id).read_text())] == FAULTS
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -66,15 +94,17 @@ def test_a_damaged_record_is_named(tmp_path: Path, grid: Plan, fault: str) -> No
     store.write(record)
     path = store.path(record.id)
     path.write_text(corrupt(path.read_text())[fault])
-    with pytest.raises(UserError, match=rf"{path.name}: .*delete the file"):
+    with pytest.raises(UserError, match=rf"^{re.escape(str(path))}: .*delete the file") as error:
         store.read(record.id)
+    assert len(str(error.value)) < 400
 
 
 def test_a_record_of_an_earlier_version_says_not_what_was_at_work_beside_it(tmp_path: Path, grid: Plan) -> None:
     store, record = Store(tmp_path / "out"), record_of(grid, seconds=0.1, alone=True)
     store.write(record)
     content = json.loads(store.path(record.id).read_text())
-    del content["alone"]
+    for added in ("alone", "schema", "sha256"):
+        del content[added]
     store.path(record.id).write_text(json.dumps(content))
     read = store.read(record.id)
     assert read is not None
@@ -97,14 +127,14 @@ def test_records_of_other_studies_are_left_alone(tmp_path: Path, grid: Plan) -> 
 
 
 def test_a_score_that_json_cannot_hold_is_not_written(tmp_path: Path, grid: Plan) -> None:
-    with pytest.raises(ValueError, match="not JSON compliant"):
+    with pytest.raises(UserError, match="finite numbers"):
         Store(tmp_path).write(record_of(grid, scores={"psnr_linear": float("inf")}))
     assert not list(Store(tmp_path).folder.glob("*.json"))
 
 
 def test_a_file_that_cannot_be_replaced_leaves_no_rest(tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
-    with pytest.raises(OSError, match="directory"):
+    with pytest.raises(StorageError, match=r"taken cannot be written: .*directory; mend that"):
         write_atomically(tmp_path / "taken", b"x")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 

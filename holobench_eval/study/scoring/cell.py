@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Mapping
 
 from ...core.device import repeatable
-from ...core.errors import CellError, LostDeviceError, Pending
+from ...core.errors import CellError, Pending, StopError
 from ...core.io import write_atomically
 from ..displays import Condition
 from ..plan import Cell
@@ -37,7 +37,7 @@ def work(job: Job) -> list[Record]:
     with repeatable(job.setting.threads, job.device):
         try:
             measured = (FLOORS if job.task.is_floor else MEASURES)[job.task.cells[0].measure](job)
-        except LostDeviceError:
+        except StopError:
             raise
         except Pending:
             return []
@@ -55,7 +55,7 @@ def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> R
             if not math.isfinite(value):
                 raise CellError(f"the score {name} is {value}")
         job.store.write(record)
-    except LostDeviceError:
+    except StopError:
         raise
     except Pending:
         return None
