@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import warnings
+import zlib
 from pathlib import Path
 from typing import Literal
 
@@ -29,7 +30,8 @@ FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
 # file names (lower case) that are taken for images
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".gif"})
 
-LARGEST_PIXELS = 64_000_000  # more than any panel shows; a small file can claim far more and fill the memory
+# 7680 x 4320, more than any panel shows; as linear light an image takes twelve bytes a pixel, and as much for a while.
+LARGEST_PIXELS = 33_177_600
 
 LARGEST_BYTES = 512_000_000  # enough for the largest image in 16 bits without compression
 
@@ -74,12 +76,12 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
 
     content: the file; name: used in errors. gray: take one-channel images too, replicated to three channels.
     sixteen_bit: take 16-bit PNG and TIFF too, as sRGB levels or as linear light; they must be stored upright.
-    UserError, one line, for an image that is damaged, of another kind, larger than 64 million pixels, or of another
+    UserError, one line, for an image that is damaged, of another kind, larger than 33 million pixels, or of another
     colour space by its ICC profile.
     """
     image = opened(content, name)
-    if image.format == "PNG" and PNG_END not in content:  # Pillow is content with all pixels
-        raise UserError(f"{name}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
+    if image.format == "PNG":
+        _refuse_short_png(image, content, name)
     fault = _fault(image, gray)
     bits = _bits(image, content)
     if fault is None and bits == 16 and sixteen_bit == "refuse":
@@ -120,6 +122,33 @@ def opened(content: bytes, name: str) -> Image.Image:
     if frames != 1:
         raise UserError(f"{name}: {frames} frames or pages; expected a file with one image")
     return image
+
+
+def _refuse_short_png(image: Image.Image, content: bytes, name: str) -> None:
+    """UserError for a PNG without its end or with too few rows; Pillow takes the first and fills up the second."""
+    if PNG_END not in content:
+        raise UserError(f"{name}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
+    samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(content[25], 0)  # by colour type: specification, section 11.2.1
+    row = 1 + (image.width * content[24] * samples + 7) // 8
+    interlaced = content[28] != 0  # rows of other lengths, which no camera and no renderer writes
+    if not interlaced and _inflated(content) < image.height * row:
+        raise UserError(f"{name}: truncated or damaged: rows of the PNG are missing; {RIGHT}")
+
+
+def _inflated(content: bytes) -> int:
+    """Bytes of a PNG's pixels once decompressed; those up to a fault."""
+    stream, size, at = zlib.decompressobj(), 0, 8
+    while at + 8 <= len(content):
+        length, kind = int.from_bytes(content[at : at + 4], "big"), content[at + 4 : at + 8]
+        rest = content[at + 8 : at + 8 + length] if kind == b"IDAT" else b""
+        try:
+            while rest:
+                size += len(stream.decompress(rest, 1 << 20))
+                rest = stream.unconsumed_tail
+        except zlib.error:
+            break
+        at += 12 + length
+    return size
 
 
 def _fault(image: Image.Image, gray: bool) -> str | None:

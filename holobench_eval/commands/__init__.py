@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from io import TextIOWrapper
 
 import typer
 
@@ -49,6 +50,9 @@ for _file in COMMANDS:
 
 def main() -> None:
     """Run the command line; bad input and files that cannot be used are one line on stderr and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # names and signs that a terminal of another encoding lacks
     try:
         app()
     except (UserError, OSError) as error:

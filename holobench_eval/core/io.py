@@ -92,6 +92,8 @@ def decode_levels(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16] | No
     None for what OpenCV cannot read, for samples of neither 8 nor 16 bits, and for other than 1, 3 or 4 channels.
     Pillow would give RGB of 16 bits as 8.
     """
+    if not content:
+        return None  # OpenCV raises
     levels: NDArray[Any] | None = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if levels is None or levels.dtype not in (np.uint8, np.uint16):
         return None

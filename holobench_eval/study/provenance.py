@@ -111,8 +111,11 @@ def read(output: Path) -> dict[str, Any]:
         content = json.loads((output / FILE).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"{output / FILE}: not JSON ({error}); delete the file and run the study again") from error
     if not isinstance(content, dict):
         raise UserError(f"{output / FILE}: not a mapping; delete the file and run the study again")
+    earlier = content.get("earlier", [])
+    if not isinstance(earlier, list) or not all(isinstance(run, dict) for run in earlier):
+        raise UserError(f"{output / FILE}: 'earlier' is no list of runs; delete the file and run the study again")
     return content

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import pytest
@@ -203,3 +204,11 @@ def test_a_display_is_shown_with_its_effects_and_what_the_parametric_model_lacks
     shown = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if line.startswith("│")}
     assert "has it" in shown["look_up_table"]
     assert "lacks it" in shown["plane_dust"]
+
+
+def test_signs_that_a_terminal_lacks_stop_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    narrow = TextIOWrapper(BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stderr", narrow)
+    assert holoeval(monkeypatch, "run", str(tmp_path / "Ω·.yaml")) == 2
+    narrow.seek(0)
+    assert "holoeval: " in narrow.read()

@@ -101,12 +101,25 @@ def chunk(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
-@pytest.mark.parametrize("size", [(9000, 9000), (12000, 12000), (60000, 60000)])
+@pytest.mark.parametrize("size", [(1, 64_000_000), (7999, 8000), (9000, 9000), (12000, 12000), (60000, 60000)])
 def test_a_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(size, monkeypatch):
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None if size == (60000, 60000) else Image.MAX_IMAGE_PIXELS)
     header = chunk(b"IHDR", struct.pack(">IIBBBBB", *size, 8, 2, 0, 0, 0))
     content = b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
     assert "million" in refusal(content)
+
+
+@pytest.mark.parametrize(("rows", "bits", "kind"), [(31, 8, 2), (31, 16, 2), (31, 8, 0), (31, 16, 0)])
+def test_a_png_that_ends_before_its_last_row_is_refused_though_its_checksums_fit(rows, bits, kind):
+    options = {"gray": True, "sixteen_bit": "linear"}
+
+    def png(held: int) -> bytes:
+        header = chunk(b"IHDR", struct.pack(">IIBBBBB", 24, 32, bits, kind, 0, 0, 0))
+        pixels = zlib.compress(bytes(held * (1 + 24 * (bits // 8) * (3 if kind else 1))))
+        return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", pixels) + chunk(b"IEND", b"")
+
+    assert decode(png(32), "whole.png", **options).shape == (3, 32, 24)
+    assert "rows of the PNG are missing" in refusal(png(rows), **options)
 
 
 def test_gray_is_replicated_when_it_is_asked_for():

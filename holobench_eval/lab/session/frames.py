@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from ...core.errors import UserError
 from ...core.io import decode_levels
@@ -102,7 +102,9 @@ def read_frame(path: Path, colour: int) -> Frame:
                 raise UserError(f"{path}: {header.width} x {header.height} pixels are too many for a photograph")
             if getattr(header, "n_frames", 1) > 1:
                 raise UserError(f"{path}: holds several pictures; save one frame a file")
-    except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError) as error:
+    except UserError:
+        raise
+    except Exception as error:  # whatever a decoder trips over in a damaged file
         raise UserError(f"{path}: not a picture that can be read ({' '.join(str(error).split())[:80]})") from None
     levels = decode_levels(content)
     if levels is None:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.io import imread
+
+from ...core.io import decode_levels
 
 Picture = NDArray[np.float64]
 
@@ -47,10 +48,11 @@ class Column:
 
 
 def load_picture(path: Path) -> Picture | None:
-    """A thumbnail as ``(h, w, 3)`` sRGB values in [0, 1]; None when the file is not there."""
-    if not path.is_file():
+    """A thumbnail as ``(h, w, 3)`` sRGB values in [0, 1]; None when the file is not there or damaged."""
+    levels = decode_levels(path.read_bytes()) if path.is_file() else None
+    if levels is None:
         return None
-    picture = np.asarray(imread(path), dtype=np.float64) / 255
+    picture = levels.astype(np.float64) / 255
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
     return picture[..., :3]

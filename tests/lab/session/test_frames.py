@@ -76,3 +76,16 @@ def test_two_files_for_one_photograph_are_refused_and_none_is_none(tmp_path):
     with pytest.raises(UserError, match="keep one of these"):
         find(tmp_path, "0001")
     assert find(tmp_path, "0002") is None
+
+
+def test_a_tiff_without_its_size_is_one_line(tmp_path, counts):
+    path = tmp_path / "0001.tif"
+    Image.fromarray(counts).save(path)
+    content = bytearray(path.read_bytes())
+    start = int.from_bytes(content[4:8], "little") + 2
+    for entry in range(start, len(content) - 12, 12):
+        if content[entry : entry + 2] in (b"\x00\x01", b"\x01\x01"):  # the tags of width and height
+            content[entry : entry + 2] = b"\xff\xff"
+    path.write_bytes(content)
+    with pytest.raises(UserError, match="not a picture that can be read"):
+        read_frame(path, 0)

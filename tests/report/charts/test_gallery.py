@@ -97,6 +97,12 @@ def test_gray_thumbnails_are_read_as_colour(tmp_path):
     assert load_picture(tmp_path / "absent.png") is None
 
 
+def test_a_damaged_thumbnail_is_as_one_that_is_absent(tmp_path):
+    for content in (b"", b"\x89", b"\x89PNG\r\n\x1a\n" + bytes(40)):
+        (tmp_path / "damaged.png").write_bytes(content)
+        assert load_picture(tmp_path / "damaged.png") is None
+
+
 def test_displays_keep_figures_of_their_own_whatever_they_are_called():
     stems = slugs(["a/b", "a-b", "../../x", "***"])
     assert len(set(stems.values())) == 4
