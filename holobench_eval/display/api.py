@@ -9,6 +9,7 @@ from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
+from torch.nn import Parameter
 
 from ..core.errors import CellError
 from ..imaging.register import Registration
@@ -362,6 +363,11 @@ def efficiency(image: Tensor, target: Tensor) -> float:
     return float((image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)).mean())
 
 
+def is_plain(value: object) -> bool:
+    """Whether a value is a tensor of torch's own: another class would run its own code inside the bench."""
+    return type(value) in (Tensor, Parameter)
+
+
 def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
     """Refuse what no display can show.
 
@@ -377,9 +383,11 @@ def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
     Raises
     ------
     CellError
-        Another shape or type, or values that are not finite.
+        Another shape or type, a subclass of ``Tensor`` among them, or values that are not finite.
     """
     who = f"{label}: " if label else ""
+    if not is_plain(phase):
+        raise CellError(f"{who}phase is {type(phase).__name__}, the display shows a plain torch.Tensor")
     if phase.ndim != 3 or tuple(phase.shape[-2:]) != spec.shape:
         raise CellError(
             f"{who}phase is {tuple(phase.shape)}, the display shows (channels, {spec.shape[0]}, {spec.shape[1]})"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, ClassVar
+from threading import Lock
+from typing import Any, ClassVar, NoReturn
 
 import torch
 from torch import Tensor
@@ -12,6 +13,36 @@ from torch import Tensor
 from ..core.errors import BudgetError, CellError
 from ..core.seeds import generator
 from .api import Camera, Capture, Display, DisplaySpec, Simulation, check_phase, white_irradiance
+
+
+class Account:
+    """The captures of a handle: taken so far, and allowed in all (None: no limit). It has no copies, and so no handle
+    that holds it can be copied into a second budget; threads take their captures one after the other."""
+
+    def __init__(self, label: str, budget: int | None, purpose: str = "") -> None:
+        self.budget, self.captures = budget, 0
+        self._refusal = f"{label} has used its {budget} captures{purpose}"
+        self._lock = Lock()
+
+    def __copy__(self) -> Account:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Account:
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a display's account of captures cannot be sent to another process")
+
+    def take(self) -> None:
+        """Count a capture. BudgetError when none is left."""
+        with self._lock:
+            if self.budget is not None and self.captures >= self.budget:
+                raise BudgetError(self._refusal)
+            self.captures += 1
+
+    def left(self, wanted: int) -> int:
+        """How many of the wanted captures may be taken."""
+        return wanted if self.budget is None else min(wanted, max(0, self.budget - self.captures))
 
 
 class MeteredDisplay:
@@ -56,10 +87,9 @@ class MeteredDisplay:
         self._names = names
         self._camera = bool(getattr(method, "camera", False))
         self._privileged = bool(getattr(method, "privileged", False))
-        self._budget = budget
+        self._account = Account(label, budget)
         self._learned = learned
         self._starts = tuple(starts)
-        self._captures = 0
         self._kept: Tensor | None = None
         self._over = ""
 
@@ -76,12 +106,12 @@ class MeteredDisplay:
     @property
     def captures(self) -> int:
         """Captures taken so far."""
-        return self._captures
+        return self._account.captures
 
     @property
     def budget(self) -> int | None:
         """Captures that the display allows in all, None for no limit; a method can plan its schedule for it."""
-        return self._budget
+        return self._account.budget
 
     @property
     def kept(self) -> Tensor | None:
@@ -149,11 +179,12 @@ class MeteredDisplay:
         """
         if not self._camera:
             raise CellError(f"{self._label} took a capture, but declares no camera (camera = True)")
-        if self._budget is not None and self._captures >= self._budget:
-            self._over = f"{self._label} has used its {self._budget} captures"
-            raise BudgetError(self._over)
         check_phase(phase, self.spec, self._label)
-        self._captures += 1
+        try:
+            self._account.take()
+        except BudgetError as error:
+            self._over = str(error)
+            raise
         return self._opened_camera.capture(phase)
 
     def announce(self, phases: Sequence[Tensor]) -> None:
@@ -161,9 +192,8 @@ class MeteredDisplay:
 
         A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
         """
-        left = len(phases) if self._budget is None else max(0, self._budget - self._captures)
         if self._camera:
-            self._opened_camera.announce(phases[:left])
+            self._opened_camera.announce(phases[: self._account.left(len(phases))])
 
     def keep(self, phase: Tensor) -> None:
         """Hand in the best hologram so far, in the place of an earlier one.

@@ -12,9 +12,9 @@ import torch
 from torch import Tensor
 
 from ..core.device import CPU, moved
-from ..core.errors import BudgetError
 from ..core.seeds import generator
 from .api import Camera, Display, DisplaySpec, check_phase, white_irradiance
+from .metered import Account
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
@@ -66,9 +66,8 @@ class TrainingBench:
         self._display = display
         self._label = label
         self._memory = memory
-        self._budget = budget
+        self._account = Account(label, budget, " for training")
         self._seed = seed
-        self._captures = 0
         self._spent = 0.0
         self._started = time.perf_counter()
 
@@ -85,7 +84,7 @@ class TrainingBench:
     @property
     def captures(self) -> int:
         """Captures taken so far, those before an interruption included."""
-        return self._captures
+        return self._account.captures
 
     @property
     def seconds(self) -> float:
@@ -106,10 +105,8 @@ class TrainingBench:
         Returns the capture in the image's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency.
         The noise depends on the study's seed, the image and ``names``. BudgetError when no capture is left.
         """
-        if self._budget is not None and self._captures >= self._budget:
-            raise BudgetError(f"{self._label} has used its {self._budget} captures for training")
         check_phase(phase, self.spec, self._label)
-        self._captures += 1
+        self._account.take()
         return self._display.rectified(self._camera(image, *names).capture(phase.detach()), image.target)
 
     def announce(self, photographs: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
@@ -117,7 +114,7 @@ class TrainingBench:
 
         A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
         """
-        left = None if self._budget is None else max(0, self._budget - self._captures)
+        left = None if self._account.budget is None else self._account.left(self._account.budget)
         for phase, image, names in itertools.islice(photographs, left):
             self._camera(image, *names).announce([phase.detach()])
 
@@ -137,7 +134,7 @@ class TrainingBench:
         known = self._memory.load(name)
         if known is None:
             return None
-        self._captures = max(self._captures, int(known["captures"]))
+        self._account.captures = max(self.captures, int(known["captures"]))
         if known["seconds"] > self.seconds:
             self._spent += known["seconds"] - self.seconds
         value: Value = moved(dict(known["value"]), self.device)
@@ -145,8 +142,8 @@ class TrainingBench:
 
     def save(self, name: str, value: Value) -> None:
         """Keep a value under ``name``, in the place of an older one; what is kept does not depend on the device."""
-        self._memory.save(name, {"value": moved(value, CPU), "captures": self._captures, "seconds": self.seconds})
+        self._memory.save(name, {"value": moved(value, CPU), "captures": self.captures, "seconds": self.seconds})
 
     def log(self, **row: float | int | str) -> None:
         """A row for those who watch: numbers by name, such as round, step, losses and fidelity."""
-        self._memory.log({**row, "captures": self._captures, "seconds": round(self.seconds, 1)})
+        self._memory.log({**row, "captures": self.captures, "seconds": round(self.seconds, 1)})

@@ -93,6 +93,13 @@ def test_an_exception_in_a_method_is_a_failed_cell_and_the_run_goes_on(tmp_path:
     assert any("gray 1" in line and "no light" in line for line in lines)
 
 
+def test_a_tensor_with_a_class_of_its_own_is_no_phase(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Disguised"}',), count=1)
+    outcome = compute(config, tmp_path / "out")
+    assert outcome.records[-1]["state"] == "failed"
+    assert "solve returned Target, not a phase" in outcome.records[-1]["reason"]
+
+
 @pytest.mark.parametrize("executor", [Serial(), Local(2)], ids=["here", "workers"])
 def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path: Path, executor: Executor) -> None:
     config, output = write_config(tmp_path), tmp_path / "out"

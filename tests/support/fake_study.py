@@ -74,6 +74,16 @@ class Toy:
         return torch.full(shape, self.value) + 0.01 * torch.rand(shape, generator=bench.generator("toy"))
 
 
+class Target(torch.Tensor):
+    """Would answer the display's own questions with the target."""
+
+
+@dataclass(frozen=True)
+class Disguised(Toy):
+    def solve(self, target, bench):
+        return super().solve(target, bench).as_subclass(Target)
+
+
 @dataclass(frozen=True)
 class Seeing(Toy):
     camera: ClassVar[bool] = True

@@ -15,7 +15,7 @@ from ...core import plugins
 from ...core.device import moved
 from ...core.hashing import canonical
 from ...display import RectifiedCapture
-from ...display.api import Exposure
+from ...display.api import Exposure, is_plain
 from ...metrics import match
 from .. import cost, opening
 from ..artifacts import Artifact
@@ -69,7 +69,7 @@ def _foresee(job: Job) -> Foreseen:
     watch = cost.start(job.device)
     predicted = method.predict(own, handle)
     taken = watch.stop()
-    if not isinstance(predicted, Tensor) or tuple(predicted.shape) != (1, *target.shape):
+    if not is_plain(predicted) or tuple(predicted.shape) != (1, *target.shape):
         raise wrong_output(job, "predict", predicted, f"an image {(1, *target.shape)}")
     return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned)
 

@@ -14,6 +14,7 @@ from ...core.device import moved
 from ...core.errors import BudgetError, CellError
 from ...core.io import write_atomically
 from ...display import MeteredDisplay
+from ...display.api import is_plain
 from .. import cost
 from ..artifacts import Artifact, read_tensors
 from ..cost import Cost
@@ -60,7 +61,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
     watch = cost.start(job.device)
     phase, stopped = _within_budget(method, solve, handle)
     taken = watch.stop()
-    if not isinstance(phase, Tensor) or tuple(phase.shape[:2]) != (1, len(target)):
+    if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
         raise wrong_output(job, "solve", phase, f"a phase (1, {len(target)}, H, W)")
     taken = cost.keep(job.timing, taken, job.setting.retime)
     return Solution(phase.detach().cpu()[0], handle.captures, taken, stopped, learned)
@@ -68,7 +69,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
 
 def wrong_output(job: Job, function: str, output: Any, wanted: str) -> CellError:
     """The error for an ``output`` that is not what was wanted."""
-    actual = tuple(output.shape) if isinstance(output, Tensor) else type(output).__name__
+    actual = tuple(output.shape) if is_plain(output) else type(output).__name__
     return CellError(f"{job.task.label}: {function} returned {actual}, not {wanted}")
 
 
