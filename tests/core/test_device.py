@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+import random
+
 import cv2
+import numpy as np
 import pytest
 import torch
 
@@ -104,3 +107,15 @@ def test_a_worker_of_one_thread_filters_with_one_and_others_get_theirs_back() ->
     with repeatable(1):
         assert (torch.get_num_threads(), cv2.getNumThreads()) == (1, 1)
     assert cv2.getNumThreads() == 2
+
+
+def test_what_one_cell_left_behind_does_not_reach_the_random_numbers_of_the_next() -> None:
+    drawn = []
+    for left in (0, 1):
+        random.seed(left)
+        np.random.seed(left)  # noqa: NPY002
+        torch.manual_seed(left)
+        torch.set_default_device("meta" if left else None)
+        with repeatable(1):
+            drawn.append((random.random(), float(np.random.rand()), float(torch.rand(()))))  # noqa: NPY002
+    assert drawn[0] == drawn[1]
