@@ -192,13 +192,14 @@ def _entry(study: Study, document: Document, index: int) -> MethodEntry:
 
 
 def _check_labels(study: Study, document: Document) -> None:
+    # Reports show neither a second space nor, in the names of files on some systems, the case of letters.
+    alike = [" ".join(label.split()).casefold() for label in study.labels]
     for index, label in enumerate(study.labels):
         where: Keys = ("methods", index, "label")
-        if label in study.labels[:index]:
-            other = study.labels.index(label)
-            raise document.error(
-                where, f"methods[{index}] and methods[{other}] share the label '{label}'; give one a 'label'"
-            )
+        if (other := alike.index(alike[index])) < index:
+            but = "" if label == study.labels[other] else ", but for spaces and capitals"
+            message = f"methods[{index}] and methods[{other}] share the label '{label}'{but}; give one a 'label'"
+            raise document.error(where, message)
         if not label.isprintable() or len(label) > 60 or label in FLOORS:
             raise document.error(where, f"label {label!r} should be printable, at most 60 characters and not a floor's")
     for label in study.reported.rows if study.reported else ():
