@@ -18,8 +18,8 @@ FACTS = (
     "within it are scores compared and ranked, each category by itself, and only rows with a score for every target.",
     "Targets of one name are taken for the same image where a constant image has the same score on each of them. A "
     "study without such a score, or without a recorded version of the harness, is a group of its own.",
-    "Scores of different groups do not compare: targets, displays or exposures differ. The view across groups shows the "
-    "paired difference to the baseline of each group instead. It says less than a rank, since baselines differ, too.",
+    "Scores of different groups do not compare: targets, displays or exposures differ. The view across groups shows "
+    "the paired difference to the baseline of each group instead. It says less than a rank: baselines differ, too.",
     "Above the constant image: the score minus that of an even picture in the place of a capture. Below zero, the "
     "capture is no better than an even picture.",
     "Seconds were taken on the processor beside them. They do not compare between processors.",

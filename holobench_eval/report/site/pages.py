@@ -99,7 +99,7 @@ def _what(display: Display) -> Markup:
         text = f"{profile.description} {sentence(basis(profile))}"
         return Markup("<p>{}</p><p>Version {}, sha256 {}.</p>").format(text, profile.version, display.digest)
     told = {
-        "real": "A real bench, as its folder says: nothing is simulated, and its deviations from its nominal optics are "
+        "real": "A real bench, as its folder says: nothing is simulated, and deviations from its nominal optics are "
         "not known.",
         "learned": "A trained, frozen network in the place of a display: scores say how well a method exploits it.",
         FILES: "Photographs that were given as files; how they were taken is not known.",
