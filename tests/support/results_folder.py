@@ -17,6 +17,21 @@ from holobench_eval.study.versions import HARNESS
 from tests.support import synthetic_study as synthetic
 
 TARGETS = synthetic.TARGETS[:4]
+REPORT = """\
+# A title
+
+## Question
+
+Is it <b>better</b>?
+
+## Answer
+
+- [Yes](https://example.org)
+
+## More
+
+No.
+"""
 FILES = ("records.csv", "tests.csv", "table.csv")
 
 
@@ -47,9 +62,7 @@ def write_results(
     told = provenance(**(known or {})) | ({"by": by} if by is not None else {})
     (folder / "provenance.json").write_text(json.dumps(told))
     if by is None:
-        (folder / "report.md").write_text(
-            "# A title\n\n## Question\n\nIs it <b>better</b>?\n\n## Answer\n\n- [Yes](https://example.org)\n\n## More\n\nNo.\n"
-        )
+        (folder / "report.md").write_text(REPORT)
     done = [r for r in records if r["state"] == "done" and r["label"] == "HIL"]
     for record in done[:thumbnails]:
         path = folder / "thumbnails" / f"{digest(record['cell'])}.png"

@@ -197,7 +197,7 @@ def _check_provenance(folder: Path, known: Mapping[str, Any], strict: bool) -> N
         if not isinstance(digest, str) or not _SHA256.fullmatch(digest):
             raise UserError(f"{path}: profile '{name}' has no digest; expected its version and 64 digits of sha256")
     kinds = known.get("displays", {})
-    if not isinstance(kinds, dict) or not set(kinds.values()) <= set(KINDS):
+    if not isinstance(kinds, dict) or not all(kind in KINDS for kind in kinds.values()):
         raise UserError(f'{path}: "displays" says what each display is; expected one of {", ".join(KINDS)} for each')
 
 
@@ -258,7 +258,7 @@ def _check_numbers(path: Path, frame: pd.DataFrame, key: str) -> None:
     if wrong.any():
         row = frame[wrong]
         limits = f"from {low:g} to {high:g}" if np.isfinite(high) else f"of at least {low:g}" if low == 0 else "finite"
-        raise UserError(f"{path}: {_named(row)} has {key} {row[key].iloc[0]:g}; expected a number {limits}")
+        raise UserError(f"{path}: {_named(row)} has {file_name(key)} {row[key].iloc[0]:g}; expected a number {limits}")
 
 
 def _named(rows: pd.DataFrame) -> str:

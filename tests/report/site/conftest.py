@@ -17,6 +17,7 @@ from tests.support.results_folder import TARGETS, write_results
 HOSTILE = '=cmd|"</script><script>alert(1)</script><img src=x onerror=alert(2)>'
 PATH = "../../<b>evil</b>.py:Method"
 LAB = "<i>Their</i> lab"
+THEIRS = "<u>theirs"  # the name of their folder
 OTHER = "2" * 64  # a digest that no profile of the package has
 
 
@@ -55,15 +56,20 @@ def of_others(study: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def site(tmp_path_factory: pytest.TempPathFactory, study: list[dict[str, Any]]) -> Site:
     folder = tmp_path_factory.mktemp("site")
     own = write_results(folder / "reports" / "ours", study)
-    other = write_results(folder / "others" / "<u>theirs</u>", of_others(study), by=LAB)
+    other = write_results(folder / "others" / THEIRS, of_others(study), by=LAB)
     write_site([own.parent, other], folder / "site")
     return Site(own, other, folder / "site")
 
 
+@pytest.fixture(scope="session")
+def passing(tmp_path_factory: pytest.TempPathFactory, study: list[dict[str, Any]]) -> Path:
+    return write_results(tmp_path_factory.mktemp("passing") / "theirs", study, by="Their lab", thumbnails=2)
+
+
 @pytest.fixture
-def handed_in(tmp_path: Path, study: list[dict[str, Any]]) -> Path:
+def handed_in(tmp_path: Path, passing: Path) -> Path:
     """A folder of others that passes."""
-    return write_results(tmp_path / "theirs", study, by="Their lab", thumbnails=2)
+    return Path(shutil.copytree(passing, tmp_path / "theirs"))
 
 
 @pytest.fixture(scope="session")

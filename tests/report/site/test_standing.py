@@ -34,8 +34,12 @@ def test_means_and_intervals_are_those_of_table_csv(site: Site) -> None:
     for group in groups([read(site.own)]):
         for row in group.rows:
             line = expected[row.label, group.display.name]
-            for value, name in ((row.score.mean, "psnr_linear_db"), (row.score.low, "psnr_linear_lo_db"),
-                                (row.score.high, "psnr_linear_hi_db"), (row.table["seconds"], "solving_s")):  # fmt: skip
+            for value, name in (
+                (row.score.mean, "psnr_linear_db"),
+                (row.score.low, "psnr_linear_lo_db"),
+                (row.score.high, "psnr_linear_hi_db"),
+                (row.table["seconds"], "solving_s"),
+            ):
                 assert f"{value:.6g}" == line[name]
                 compared += 1
             assert (len(row.values), row.failed) == (int(line["n"]), int(line["failed"]))
