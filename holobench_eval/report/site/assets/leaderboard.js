@@ -31,10 +31,10 @@ let state = { ...DEFAULTS };
 function isPossible(key, value) {
   const select = byId(key);
   if (select?.tagName === "SELECT") return [...select.options].some((option) => option.value === value);
-  if (key === "sort") return value === "" || value in better;
+  if (key === "sort") return value === "" || Object.hasOwn(better, value);
   if (key === "order") return ["best", "worst"].includes(value);
   if (["captures", "seconds"].includes(key)) return value === "" || (Number.isFinite(Number(value)) && Number(value) >= 0);
-  return key in DEFAULTS;
+  return Object.hasOwn(DEFAULTS, key);
 }
 
 /** The view in the address, or null where it names a part of the page. */
