@@ -63,12 +63,11 @@ def _contents(sources: Sequence[Source], without: Sequence[Path], output: Path) 
         for picture in (*shown[source.folder].figures, *shown[source.folder].thumbnails):
             yield f"pictures/{folder}/{picture.name}", picture.content
     for method in dict.fromkeys(row.method for group in standing for row in group.rows):
-        labels = {row.label for group in standing for row in group.rows if row.method == method}
         pictures = [
             (f"../pictures/{names.studies[str(source.folder)]}/{picture.name}", picture)
             for source in sources
             for picture in shown[source.folder].thumbnails
-            if picture.of in labels
+            if picture.of == method
         ]
         yield f"methods/{slug(method)}.html", method_page(method, standing, names, pictures)
     for display in {group.display.title: group.display for group in standing}.values():
@@ -81,7 +80,7 @@ def _display(
     """The page of a display, its stage sheet, and the pictures of its newest study."""
     own = [group for group in standing if group.display.title == display.title]
     sources = list({row.source.folder: row.source for group in own for row in group.rows}.values())
-    drawn = next((found for source in sources if (found := sheet(source, display.name))), None)
+    drawn = next((each for source in sources if (each := sheet(source, display.name))), None)
     if drawn is not None:
         yield f"pictures/displays/{slug(display.title)}.png", drawn.content
     pictures = next((found for source in sources if (found := _of(display, source, shown, names))), [])

@@ -50,7 +50,7 @@ def display_of(source: Source, name: str, others: Mapping[str, set[str]]) -> Dis
     """The display that a source calls by a name. others: every digest that a name has, over all sources."""
     if source.measure == FILES:
         return Display(f"{name} ({source.name})", name, source.name, FILES)
-    digest = str(dict(source.known["profiles"]).get(name, {}).get("sha256", ""))
+    digest = str(dict(source.known.get("profiles", {})).get(name, {}).get("sha256", ""))
     kind = dict(source.known.get("displays", {})).get(name) or _kind(name, digest)
     shipped = _shipped().get(name)
     if shipped is not None and shipped.digest == digest:

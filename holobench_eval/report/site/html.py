@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from importlib.resources import files
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from ...core.hashing import digest
 from ...core.io import file_name
@@ -52,7 +52,7 @@ def page(title: str, body: Markup, depth: int = 0, scripts: bool = False) -> byt
 
 def joined(parts: Iterable[object]) -> Markup:
     """Parts one after another."""
-    return Markup("").join(parts)
+    return Markup("").join(map(escape, parts))
 
 
 def listed(items: Iterable[object]) -> Markup:

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -31,8 +31,9 @@ from ..data.scores import METRICS, parse
 from ..data.tables import CATEGORY_COLUMN, DONE, clusters_in, score_columns
 from ..data.text import FILES
 
-RECORDS, TESTS = "records.csv", "tests.csv"
-MOST_BYTES = 64_000_000  # of a file of numbers
+RECORDS: Final = "records.csv"
+TESTS: Final = "tests.csv"
+MOST_BYTES, MOST_FACTS = 64_000_000, 2_000_000  # of a file of numbers, and of a provenance
 LONGEST = 300  # characters of a name
 BY = "by"  # the key of a provenance that says whose results they are
 KINDS = ("simulated", "real", "learned")
@@ -112,8 +113,8 @@ def _is_report(folder: Path) -> bool:
 
 def read(folder: Path) -> Source:
     """Take in a folder. UserError: what is wrong with it, and what would be right."""
-    for name in (RECORDS, provenance.FILE):
-        _check_file(folder / name)
+    _check_file(folder / RECORDS)
+    _check_file(folder / provenance.FILE, MOST_FACTS)
     known, raw = _known(folder), _raw(folder, _text(folder / RECORDS))
     frame = read_run(folder).records
     by = _whose(folder, known)
@@ -135,19 +136,22 @@ def read(folder: Path) -> Source:
     return Source(folder, folder.resolve().name, by, results, measure, _panels(raw), known, _parameters(raw), changed)
 
 
-def _check_file(path: Path) -> None:
+def _check_file(path: Path, most: int = MOST_BYTES) -> None:
     if path.is_symlink() or not path.is_file():
         what = "a link" if path.is_symlink() else "missing"
         raise UserError(f"{path}: {what}; a folder of results holds {RECORDS} and {provenance.FILE} as files")
-    if path.stat().st_size > MOST_BYTES:
-        raise UserError(f"{path}: more than {MOST_BYTES // 10**6} MB; expected the numbers of one study")
+    if path.stat().st_size > most:
+        raise UserError(f"{path}: more than {most // 10**6} MB; expected that of one study")
 
 
 def _known(folder: Path) -> dict[str, Any]:
     try:
-        return provenance.read(folder)
-    except RecursionError:
-        raise UserError(f"{folder / provenance.FILE}: nested too deeply; expected that of 'holoeval run'") from None
+        known = provenance.read(folder)
+        json.dumps(known, ensure_ascii=False).encode()
+    except (RecursionError, UnicodeEncodeError):
+        wrong = "nested too deeply, or not Unicode"
+        raise UserError(f"{folder / provenance.FILE}: {wrong}; expected that of 'holoeval run'") from None
+    return known
 
 
 def _text(path: Path) -> str:
@@ -187,12 +191,12 @@ def _check_provenance(folder: Path, known: Mapping[str, Any], strict: bool) -> N
     path, measured_files = folder / provenance.FILE, "files" in known
     needed = ["package", *(["harness"] if strict and not measured_files else [])]
     lacking = [key for key in needed if not isinstance(known.get(key), str) or not known[key]]
-    profiles = known.get("profiles")
-    if not measured_files and (not isinstance(profiles, dict) or not profiles):
+    profiles = known.get("profiles", {})
+    if not isinstance(profiles, dict) or not (profiles or measured_files):
         lacking.append("profiles")
     if lacking:
         raise UserError(f"{path}: lacks {', '.join(lacking)}; copy the provenance.json that 'holoeval run' wrote")
-    for name, profile in (profiles or {}).items():
+    for name, profile in profiles.items():
         digest = profile.get("sha256") if isinstance(profile, dict) else None
         if not isinstance(digest, str) or not _SHA256.fullmatch(digest):
             raise UserError(f"{path}: profile '{name}' has no digest; expected its version and 64 digits of sha256")
@@ -206,7 +210,7 @@ def _check_columns(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame, strict:
     lacking = [name for name in OF_OTHERS if name not in raw]
     if strict and lacking:
         raise UserError(f"{path}: lacks the columns {', '.join(lacking)}; write it with 'holoeval report'")
-    unknown = [name for name in raw if column(RECORDS, name) is None] if "label" in raw else []
+    unknown = [name for name in raw if column(RECORDS, str(name)) is None] if "label" in raw else []
     if unknown:
         raise UserError(
             f"{path}: unknown column {unknown[0]!r}; expected those of columns.md (docs/data.md); take it out"
@@ -233,18 +237,18 @@ def _check_rows(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame) -> None:
             named = ", ".join(word or "nothing" for word in allowed)
             raise UserError(f"{path}: {name} {wrong[0]!r}; expected one of {named}")
     for key in [*score_columns(frame), *(name for name in COUNTS if name in frame)]:
-        _check_numbers(path, frame, key)
+        _check_numbers(path, raw, frame, key)
     done, scores = frame["state"] == DONE, frame[score_columns(frame)].notna()
-    for wrong, what in (
+    for rows, what in (
         (frame[done & ~scores.any(axis=1)], "is done and has no score"),
         (frame[~done & scores.any(axis=1)], "is not done and has a score"),
     ):
-        if len(wrong):
-            raise UserError(f"{path}: {_named(wrong)} {what}; expected a score of done cells alone")
+        if len(rows):
+            raise UserError(f"{path}: {_named(rows)} {what}; expected a score of done cells alone")
 
 
-def _check_numbers(path: Path, frame: pd.DataFrame, key: str) -> None:
-    """UserError: a number that is infinite, or that no such score or count can be."""
+def _check_numbers(path: Path, raw: pd.DataFrame, frame: pd.DataFrame, key: str) -> None:
+    """UserError: a number that is not finite, or that no such score or count can be."""
     values, score = frame[key].to_numpy(dtype=np.float64), parse(key)
     metric = METRICS.get(score.metric)
     low, high = -np.inf, np.inf
@@ -254,7 +258,8 @@ def _check_numbers(path: Path, frame: pd.DataFrame, key: str) -> None:
         bound = LOUDEST if metric.unit == "dB" else 100.0
         best = min(metric.best, bound) if metric.direction == "higher" else max(metric.best, -bound)
         low, high = (-bound, best + 1e-5) if metric.direction == "higher" else (best - 1e-5, bound)
-    wrong = np.isinf(values) | (values < low) | (values > high)
+    written = raw[file_name(key)] if file_name(key) in raw else raw[key]
+    wrong = np.isinf(values) | (values < low) | (values > high) | (np.isnan(values) & (written != "").to_numpy())
     if wrong.any():
         row = frame[wrong]
         limits = f"from {low:g} to {high:g}" if np.isfinite(high) else f"of at least {low:g}" if low == 0 else "finite"

@@ -36,7 +36,7 @@ _MARKDOWN = re.compile(r"\\(?=[\\`*|~$_\]])|`")
 @dataclass(frozen=True)
 class Picture:
     """A picture of the site. name: its file, below the folder of its study; caption: what it shows, as text; of: the
-    label of the method whose capture it is (empty: none)."""
+    name of the method whose capture it is (empty: none)."""
 
     name: str
     caption: str
@@ -62,7 +62,7 @@ def thumbnails(source: Source) -> list[Picture]:
                 f"{path}: no such cell; a thumbnail is named by the column 'cell' of a done row of records.csv"
             )
         caption = f"{row['method']} on {row['condition']}, {row['target']}"
-        found.append(replace(_picture(path, caption, LONGEST_THUMBNAIL, anew=True), of=str(row["method"])))
+        found.append(replace(_picture(path, caption, LONGEST_THUMBNAIL, anew=True), of=str(row["name"])))
     return found
 
 
@@ -83,7 +83,9 @@ def sheet(source: Source, display: str) -> Picture | None:
     """The stage sheet of a display, where the folder has it."""
     wanted = f"{STAGES}{display}.png"
     path = next((path for path in _files(source.folder / FIGURES) if path.name == wanted), None)
-    return path and _picture(path, f"Stages of the simulated bench {display}", None, anew=bool(source.by))
+    if path is None:
+        return None
+    return _picture(path, f"Stages of the simulated bench {display}", None, anew=bool(source.by))
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -127,7 +129,10 @@ def _written(picture: Image.Image, form: str) -> bytes:
 
 def _captions(folder: Path) -> dict[str, str]:
     """What report.md and details.md say below each figure, as plain text."""
-    texts = [path.read_text(encoding="utf-8", errors="replace") for name in ("report.md", "details.md")
-             if (path := folder / name).is_file()]  # fmt: skip
-    found = _CAPTION.findall("\n".join(texts))
-    return {name: _MARKDOWN.sub("", caption) for name, caption in found}
+    paths = [folder / name for name in ("report.md", "details.md")]
+    texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths if _is_text(path)]
+    return {name: _MARKDOWN.sub("", caption) for name, caption in _CAPTION.findall("\n".join(texts))}
+
+
+def _is_text(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink() and path.stat().st_size <= MOST_FILE

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from ...study.plan import REFERENCE
 from ...study.versions import HARNESS
@@ -178,7 +179,7 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
                     planned=len(results.targets),
                     score=_estimate(results.row(label, condition), results.headline.key, len(set(results.clusters))),
                     above=results.above_floor(label, condition),
-                    table=results.row(label, condition).to_dict(),
+                    table={str(name): value for name, value in results.row(label, condition).items()},
                     cells=frozenset(cells["cell"]) if (cells["state"] == DONE).all() else frozenset(),
                     key=key,
                 )
@@ -186,14 +187,15 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
     return rows
 
 
-def _estimate(row: Mapping[Any, Any], key: str, clusters: int) -> Estimate:
+def _estimate(row: pd.Series, key: str, clusters: int) -> Estimate:
     """The mean of table.csv with its interval."""
     return Estimate(row[key], row[f"{key}_lo"], row[f"{key}_hi"], int(row["n"]), int(row.get("clusters", clusters)))
 
 
 def _group(rows: Sequence[Row]) -> Group:
     merged = _merged(rows)
-    baseline = next((row for row in merged if row.is_complete and _is_baseline(row)), None)
+    own_first = sorted(merged, key=lambda row: bool(row.source.by))
+    baseline = next((row for row in own_first if row.is_complete and _is_baseline(row)), None)
     first = merged[0]
     clusters = dict(zip(first.source.results.targets, map(str, first.source.results.clusters), strict=True))
     placed = _ranked([replace(row, gain=_gain(row, baseline, clusters), is_baseline=row is baseline) for row in merged])

@@ -49,6 +49,7 @@ def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> 
     [
         ("psnr_linear_db", "inf", ("psnr_linear_db inf", "expected a number from -200 to 80")),
         ("psnr_linear_db", "900", ("psnr_linear_db 900", "expected")),
+        ("psnr_linear_db", "nan", ("psnr_linear_db nan", "expected a number from")),
         ("psnr_linear_db", "much", ("psnr_linear_db", "much")),
         ("ssim_linear", "1.5", ("ssim_linear 1.5", "to 1")),
         ("captures", "-1", ("captures -1", "at least 0")),
@@ -115,6 +116,8 @@ def linked(name: str) -> Callable[[Path], None]:
         (lambda folder: (folder / "tests.csv").write_text("a\n1\n"), ("tests.csv: not the table of tests",)),
         (lambda folder: (folder / "provenance.json").write_text("[" * 10**5), ("provenance.json",)),
         (lambda folder: (folder / "provenance.json").write_text("[]"), ("not a mapping",)),
+        (lambda folder: told(folder, cpu="\ud800"), ("not Unicode",)),
+        (lambda folder: told(folder, profiles=[], files={}), ("lacks profiles",)),
         (lambda folder: told(folder, package=None), ("lacks package", "holoeval run")),
         (lambda folder: told(folder, harness=None), ("lacks harness",)),
         (lambda folder: told(folder, profiles=None), ("lacks profiles",)),
