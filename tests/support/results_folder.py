@@ -12,11 +12,13 @@ from PIL import Image
 from holobench_eval.core.hashing import digest
 from holobench_eval.display import load_profile
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.files import texts
+from holobench_eval.report.data.tables import csv_text
+from holobench_eval.report.files.tidy import tidy_records, tidy_table, tidy_tests
 from holobench_eval.study.versions import HARNESS
 from tests.support import synthetic_study as synthetic
 
 TARGETS = synthetic.TARGETS[:4]
+SCORES = ("psnr_linear", "ssim_linear", "efficiency")
 REPORT = """\
 # A title
 
@@ -32,7 +34,6 @@ Is it <b>better</b>?
 
 No.
 """
-FILES = ("records.csv", "tests.csv", "table.csv")
 
 
 def provenance(**changes: Any) -> dict[str, Any]:
@@ -54,11 +55,13 @@ def write_results(
     shown = tuple(pair for pair in pairs if pair[1] != "reference")
     panels = {record["cell"]["profile"]: (256, 256) for record in records}
     layout = synthetic.layout(targets=TARGETS, pairs=shown, panels=panels, study=folder.name)
-    results = Results(records_frame(records, layout), layout)
+    results = Results(records_frame([_short(record) for record in records], layout), layout)
     folder.mkdir(parents=True, exist_ok=True)
-    found = texts(results)
-    for name in FILES:
-        (folder / name).write_text(found[name], encoding="utf-8")
+    frames = {"records.csv": tidy_records(results.frame, layout), "tests.csv": tidy_tests(results)}
+    if by is None:
+        frames["table.csv"] = tidy_table(results)
+    for name, frame in frames.items():
+        (folder / name).write_text(csv_text(frame), encoding="utf-8")
     told = provenance(**(known or {})) | ({"by": by} if by is not None else {})
     (folder / "provenance.json").write_text(json.dumps(told))
     if by is None:
@@ -69,6 +72,11 @@ def write_results(
         path.parent.mkdir(exist_ok=True)
         Image.new("RGB", (32, 24), (200, 40, 40)).save(path)
     return folder
+
+
+def _short(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A record with few of its scores, which is quicker."""
+    return {**record, "scores": {key: value for key, value in record["scores"].items() if key in SCORES}}
 
 
 def edited(folder: Path, column: str, value: str, row: int = -1) -> None:

@@ -37,7 +37,6 @@ def told(folder: Path, **changes: Any) -> None:
 
 def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> None:
     (handed_in / "tests.csv").unlink()
-    (handed_in / "table.csv").unlink()
     assert write_site([handed_in], handed_in.parent / "site") == (1, [])
     page = (handed_in.parent / "site" / "methods" / "hil.html").read_text()
     assert "Their lab" in page
