@@ -13,7 +13,8 @@ from ..data.text import FILES
 from .intake import Source
 
 DIGITS = 8  # of a digest, in a name
-ASSUMED, FITTED, STATED = "assumed", "fitted", "as stated"  # what a profile says of where a value comes from
+PLACE = {"real": "photographed", "learned": "learned"}  # what stands in the place of a profile, in a name
+ASSUMED, FITTED, STATED = "assumed", "fitted", "stated"  # what a profile says of where a value comes from
 
 _COUNTS = {"one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6}
 _NEXT = re.compile(rf"as the next(?: ({'|'.join(_COUNTS)}))?")
@@ -53,8 +54,10 @@ def display_of(source: Source, name: str, others: Mapping[str, set[str]]) -> Dis
     digest = str(dict(source.known.get("profiles", {})).get(name, {}).get("sha256", ""))
     kind = dict(source.known.get("displays", {})).get(name) or _kind(name, digest)
     shipped = _shipped().get(name)
+    if shipped is not None and kind != "simulated":  # a study may name a profile for the optics of a real panel
+        return Display(f"{name} {PLACE[kind]} ({digest[:DIGITS]})", name, digest, kind)
     if shipped is not None and shipped.digest == digest:
-        return Display(name, name, digest, kind, shipped if kind == "simulated" else None)
+        return Display(name, name, digest, kind, shipped)
     if shipped is not None:
         return Display(f"{name} (other {digest[:DIGITS]})", name, digest, kind)
     alone = len(others.get(name, ())) < 2
@@ -105,7 +108,7 @@ def parameters(name: str) -> list[Parameter]:
 
 
 def _parameters(text: str) -> Iterator[Parameter]:
-    stage, above, left, block = "", "", 0, False
+    stage, above, left, block = "", "", 0, ""
     for line in text.splitlines():
         match = _LINE.match(line)
         if match is None:
@@ -114,8 +117,9 @@ def _parameters(text: str) -> Iterator[Parameter]:
         key, value, comment = match["key"], match["value"].strip(), match["comment"] or above
         if not match["indent"]:
             stage = key if key in STAGES or key == "panel" else ""
-            block = not value and "assumed" in comment
-        assumed = "assumed" in comment or left > 0 or (block and bool(value))
+            block = "" if value else comment
+        comment = comment or (block if "assumed" in block else "")
+        assumed = "assumed" in comment or "assumed" in block or left > 0
         following = _NEXT.search(comment)
         left = _COUNTS[following[1] or "one"] if following else max(left - 1, 0)
         above = ""

@@ -11,11 +11,12 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
-from holobench_eval.display.simulated.profile import names
+from holobench_eval.display.simulated.profile import load_profile, names
 from holobench_eval.report.site import write_site
 from holobench_eval.report.site.displays import ASSUMED, FITTED, STATED, parameters
 from holobench_eval.report.site.html import slug
 from holobench_eval.report.site.intake import read
+from holobench_eval.report.site.standing import groups
 from tests.support.results_folder import write_results
 
 from .conftest import HOSTILE, LAB, PATH, THEIRS, Site
@@ -144,22 +145,22 @@ def test_question_and_answer_of_a_report_are_shown_without_links(site: Site) -> 
     assert "report.md" not in site.text(f"studies/{slug(THEIRS)}.html").replace("has no report.md", "")
 
 
-def test_a_real_display_and_a_display_of_another_lab_are_marked(tmp_path: Path, study: list[dict[str, Any]]) -> None:
-    records = [record | {"cell": record["cell"] | {"profile": "our-bench"}} for record in study]
-    records = [
-        record | {"cell": record["cell"] | {"condition": "our-bench"}}
-        for record in records
-        if record["cell"]["condition"] != "ideal"
-    ]
-    records = [
-        record | ({"cell": record["cell"] | {"condition": "reference"}} if record["label"].startswith("floor") else {})
-        for record in records
-    ]
-    known = {"profiles": {"our-bench": {"version": 1, "sha256": "3" * 64}}, "displays": {"our-bench": "real"}}
+@pytest.mark.parametrize("name", ["our-bench", "../=cmd|<b>bench</b>"])
+def test_a_real_display_is_marked_whatever_its_name(tmp_path: Path, study: list[dict[str, Any]], name: str) -> None:
+    def renamed(record: dict[str, Any]) -> dict[str, Any]:
+        cell = record["cell"]
+        condition = name if cell["condition"] == "leto-aged" else cell["condition"]
+        return record | {"cell": cell | {"profile": name, "condition": condition}}
+
+    records = [renamed(record) for record in study if record["cell"]["condition"] != "ideal"]
+    known = {"profiles": {name: {"version": 1, "sha256": "3" * 64}}, "displays": {name: "real"}}
     write_site([write_results(tmp_path / "ours", records, known=known)], tmp_path / "site")
-    index = (tmp_path / "site" / "index.html").read_text()
-    assert '<option value="our-bench, real">' in index
-    assert "A real bench" in (tmp_path / "site" / "displays" / "our-bench.html").read_text()
+    index = Elements(tmp_path / "site" / "index.html")
+    assert ("option", {"value": f"{name}, real"}) in index.found
+    pages = list((tmp_path / "site" / "displays").iterdir())
+    assert [page.name for page in pages] == [f"{slug(name)}.html"]
+    assert "A real bench" in pages[0].read_text()
+    assert "b" not in {tag for tag, _ in Elements(pages[0]).found}
 
 
 def test_the_page_of_a_display_has_its_parameters_with_their_sources(site: Site) -> None:
@@ -190,8 +191,6 @@ def test_what_a_profile_assumes_is_read_from_its_comments() -> None:
 
 @pytest.mark.parametrize("name", names())
 def test_no_parameter_of_a_profile_is_lost(name: str) -> None:
-    from holobench_eval.display import load_profile
-
     profile = load_profile(name)
     keys = {(each.stage, each.key) for each in parameters(name)}
     assert keys
@@ -213,6 +212,7 @@ def test_a_kind_that_is_told_is_taken_and_a_network_is_recognised_without(
     known = json.loads((folder / "provenance.json").read_text())
     known["displays"] = {"ideal": "real", "leto-aged": "simulated"}
     (folder / "provenance.json").write_text(json.dumps(known))
-    from holobench_eval.report.site.standing import groups
-
-    assert {group.display.marked for group in groups([read(folder)])} == {"ideal, real", "leto-aged"}
+    assert {group.display.marked for group in groups([read(folder)])} == {
+        f"ideal photographed ({load_profile('ideal').digest[:8]}), real",
+        "leto-aged",
+    }
