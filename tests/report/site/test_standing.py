@@ -160,3 +160,18 @@ def test_a_score_above_the_constant_image_is_paired(found: list[Group]) -> None:
             assert row.above is not None
             assert row.above.n == len(row.values)
             assert math.isfinite(row.above.low)
+
+
+@pytest.mark.parametrize("name", ["table3", "table1", "budget"])
+def test_means_of_committed_reports_are_those_of_their_tables(name: str) -> None:
+    folder = Path(__file__).parents[3] / "reports" / name
+    with (folder / "table.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    label, score = ("label", "psnr_linear_db") if "label" in lines[0] else ("method", "psnr_linear")
+    expected = {(line[label], line["condition"]): line[score] for line in lines if line["condition"] != "reference"}
+    found = {
+        (row.label, group.display.name): f"{row.score.mean:.6g}"
+        for group in groups([read(folder)])
+        for row in group.rows
+    }
+    assert found == expected
