@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from importlib.resources import files
 
@@ -110,8 +109,3 @@ def _class(colour: str) -> str:
 def plain_number(value: float) -> str:
     """A number for people: three digits, a dash where it is unknown."""
     return number(float(value))
-
-
-def anchor(text: str) -> str:
-    """A name as an identifier of an element."""
-    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
