@@ -24,6 +24,7 @@ COMMANDS = (
     "new_method",
     "check",
     "reports.compare",
+    "reports.site",
     "show",
     "conformance",
     "calibrate",

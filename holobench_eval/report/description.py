@@ -99,13 +99,13 @@ def _simulated(
             _optics(profile.scaled(panel).panel),
             *_stages(profile),
         ),
-        basis=_basis(profile),
+        basis=basis(profile),
         modelled={label: tuple(name for name in effects if name in form) for label, form in forms.items()},
         effects=len(effects),
     )
 
 
-def _basis(profile: Profile) -> str:
+def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
     measured = "simulated; the parameters are assumed or from data sheets, and none was measured on a real panel"
     try:

@@ -18,6 +18,7 @@ from ..core.installed import installed
 from ..core.io import now, write_atomically
 from .cost import cpu_model
 from .definition import Study
+from .displays import Condition
 from .plan import Plan
 from .versions import HARNESS
 
@@ -48,6 +49,7 @@ def describe(
         "profiles": {
             name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
         },
+        "displays": {name: _kind(display) for name, display in displays.items()},
         "python": platform.python_version(),
         "packages": {name: installed(name) for name in PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
@@ -59,6 +61,13 @@ def describe(
         "started": now(),
         "ended": None,
     }
+
+
+def _kind(display: Condition) -> str:
+    """What a display is: one that exists, a trained network in the place of one, or a simulated bench."""
+    if display.real is not None:
+        return "real"
+    return "simulated" if display.learned is None else "learned"
 
 
 def revision() -> dict[str, Any]:

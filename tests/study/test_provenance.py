@@ -23,6 +23,7 @@ def test_a_run_says_what_it_ran_on(tmp_path: Path) -> None:
     assert known["config_sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
     assert known["config"] == "../study.yaml"
     assert known["profiles"]["ideal"]["version"] == 1
+    assert known["displays"] == {"ideal": "simulated"}
     assert known["packages"]["torch"]
     assert known["harness"] == HARNESS
     assert (known["threads"], known["workers"]) == (1, 1)

@@ -1,0 +1,204 @@
+"""The leaderboard as a table: a group of comparable rows below a line that says what they share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from ..data.statistics import Estimate
+from ..data.tables import SECONDS_COLUMN
+from ..data.text import FILES
+from .html import joined, link, plain_number, quiet, slug, swatch
+from .intake import Source
+from .standing import OLDER, UNRECORDED, Group, Row
+
+MEASURED = {
+    "picture": "captures against targets",
+    "focus": "captures of focal stacks against targets",
+    "prediction": "predictions against captures",
+    "error_budget": "predictions against captures (error budget)",
+    FILES: "photographs given as files against targets",
+}
+HEADINGS = (  # key to sort by, heading, the better direction
+    ("", "rank in category", ""),
+    ("display", "display", "up"),
+    ("score", "score", "down"),
+    ("gain", "difference to the baseline", "down"),
+    ("above", "above the constant image", "down"),
+    ("captures", "captures in total", "up"),
+    ("seconds", "seconds a target", "up"),
+    ("targets", "targets", "down"),
+    ("study", "study, whose result", "up"),
+)
+
+
+@dataclass(frozen=True)
+class Names:
+    """Where the page of each thing is: the slug of a study, by its folder. up: the way to the index."""
+
+    studies: Mapping[str, str]
+    up: str = ""
+
+    def method(self, row: Row) -> str:
+        """The page of a row's method."""
+        return f"{self.up}methods/{slug(row.method)}.html"
+
+    def display(self, title: str) -> str:
+        """The page of a display."""
+        return f"{self.up}displays/{slug(title)}.html"
+
+    def study(self, source: Source) -> Markup:
+        """A link to the page of a study."""
+        return link(f"{self.up}studies/{self.studies[str(source.folder)]}.html", source.name)
+
+
+def board(groups: Iterable[Group], names: Names, keep: Iterable[Row] | None = None) -> Markup:
+    """The table of some groups. keep: the rows that are shown (None: all)."""
+    kept = None if keep is None else {id(row) for row in keep}
+    bodies = joined(_group(group, names, kept) for group in groups)
+    heads = joined(
+        Markup('<th scope="col" data-key="{}" data-better="{}"{}>{}</th>').format(
+            key, better, Markup(' class="across"') if key == "display" else _within(key), text
+        )
+        for key, text, better in (("method", "method", "up"), *HEADINGS)
+    )
+    return Markup(
+        '<div class="scroll" tabindex="0" role="region" aria-label="Table of scores"><table class="board">'
+        '<caption class="hidden">Scores of methods in groups within which they compare</caption>'
+        "<thead><tr>{}</tr></thead>{}</table></div>"
+    ).format(heads, bodies)
+
+
+def _within(key: str) -> Markup:
+    """The class of columns that mean nothing beyond a group."""
+    return Markup(' class="within"') if key in ("", "score") else Markup("")
+
+
+def describe(group: Group, names: Names) -> Markup:
+    """What the rows of a group share, as a line."""
+    clusters = f" in {group.clusters} clusters" if group.clusters != group.targets else ""
+    facts = [
+        MEASURED[group.measure],
+        group.metric.heading,
+        f"{group.targets} targets{clusters}",
+        f"panel {group.panel} px" if group.panel else "panel not recorded",
+        *([f"{group.exposure} exposure"] if group.exposure else []),
+        f"protocol {group.protocol}",
+        f"harness {group.harness}" if group.harness else "harness not recorded",
+        f"baseline {group.baseline.label}" if group.baseline else "no baseline",
+    ]
+    mark = f", {group.version}" if group.version in (OLDER, UNRECORDED) else ""
+    return Markup("<strong>{}</strong> (group {}{}): {}.").format(
+        link(names.display(group.display.title), group.display.marked), group.number, mark, "; ".join(facts)
+    )
+
+
+def _group(group: Group, names: Names, kept: set[int] | None) -> Markup:
+    rows = [row for row in group.rows if kept is None or id(row) in kept]
+    if not rows:
+        return Markup("")
+    head = Markup('<tr class="group"><th colspan="{}" scope="rowgroup" id="group-{}"><div>{}</div></th></tr>\n').format(
+        len(HEADINGS) + 1, group.number, describe(group, names)
+    )
+    lines = joined(_row(row, group, names) for row in rows)
+    return Markup('<tbody data-version="{}">{}{}</tbody>\n').format(group.version, head, lines)
+
+
+def _row(row: Row, group: Group, names: Names) -> Markup:
+    whose = row.source.by or "own"
+    words = " ".join((row.marked, row.method, row.category, group.display.marked, row.source.name, whose)).lower()
+    values = {
+        "method": row.marked.lower(),
+        "display": group.display.marked,
+        "category": row.category,
+        "measure": group.measure,
+        "version": group.version,
+        "study": f"{row.source.name} {whose}",
+        "score": _value(row.score.mean),
+        "gain": _value(row.gain.mean if row.gain else (0.0 if row.is_baseline else math.nan)),
+        "above": _value(row.above.mean if row.above else math.nan),
+        "captures": _value(_number(row, "total_captures", "captures")),
+        "seconds": _value(_number(row, "seconds")),
+        "targets": len(row.values),
+        "text": words,
+    }
+    attributes = joined(Markup(' data-{}="{}"').format(key, value) for key, value in values.items())
+    name = Markup('<th scope="row">{}{}</th>').format(swatch(row.method), link(names.method(row), row.marked))
+    cells = (
+        ("within", _rank(row, group)),
+        ("across", Markup("{}{}").format(link(names.display(group.display.title), group.display.marked),
+                                         quiet(f"group {group.number}, {group.version}"))),
+        ("within", _estimate(row, row.score, signed=False)),
+        ("", _gain(row, group)),
+        ("", _estimate(row, row.above) if row.above else "–"),
+        ("", _captures(row)),
+        ("", _seconds(row)),
+        ("", _targets(row)),
+        ("", _study(row, names)),
+    )  # fmt: skip
+    body = joined(Markup('<td class="{}">{}</td>').format(kind, cell) for kind, cell in cells)
+    return Markup("<tr{}>{}{}</tr>\n").format(attributes, name, body)
+
+
+def _rank(row: Row, group: Group) -> Markup:
+    if row.rank is None:
+        place = "not ranked"
+    else:
+        place = f"{row.rank} of {group.ranked[row.category]}" if group.ranked[row.category] > 1 else "alone"
+    return Markup("{} {}").format(place, quiet(row.category))
+
+
+def _estimate(row: Row, estimate: Estimate, signed: bool = True) -> Markup:
+    if math.isnan(estimate.mean):
+        return Markup('<span class="hole">no score</span>')
+    text, _, interval = row.metric.estimate(estimate, signed).partition(" ")
+    return Markup("{} {}").format(text, quiet(interval) if interval else quiet("no interval"))
+
+
+def _gain(row: Row, group: Group) -> Markup:
+    if row.is_baseline:
+        return Markup("baseline")
+    if row.gain is None:
+        return Markup("–")
+    base = group.baseline.label if group.baseline else ""
+    return Markup('{}<span class="interval to">to {}</span>').format(_estimate(row, row.gain), base)
+
+
+def _captures(row: Row) -> Markup:
+    total, each, training = (_number(row, key) for key in ("total_captures", "captures", "training_captures"))
+    if math.isnan(total):
+        return Markup("{}{}").format(plain_number(each), quiet("a target") if each == each else "")
+    parts = f"{plain_number(training)} to train, " if training > 0 else ""
+    return Markup("{} {}").format(plain_number(total), quiet(f"{parts}{plain_number(each)} a target"))
+
+
+def _seconds(row: Row) -> Markup:
+    training = _number(row, SECONDS_COLUMN)
+    trained = quiet(f"{plain_number(training)} s to train") if training > 0 else ""
+    return Markup("{} {}{}").format(plain_number(_number(row, "seconds")), quiet(row.source.processor), trained)
+
+
+def _targets(row: Row) -> Markup:
+    clusters = quiet(f"in {row.score.clusters} clusters") if row.score.clusters != row.score.n else ""
+    if row.is_complete:
+        return Markup("{} {}").format(row.planned, clusters)
+    failed = f"{row.failed} failed" if row.failed else "others not measured"
+    return Markup('<span class="hole">{} of {}, {}</span> {}').format(len(row.values), row.planned, failed, clusters)
+
+
+def _study(row: Row, names: Names) -> Markup:
+    every = Markup(", ").join(names.study(source) for source in (row.source, *row.also))
+    return Markup("{} {}").format(every, quiet(row.source.by or "own"))
+
+
+def _number(row: Row, *keys: str) -> float:
+    """The first of some columns of table.csv that is known."""
+    found = (float(row.table[key]) for key in keys if key in row.table)
+    return next((value for value in found if not math.isnan(value)), math.nan)
+
+
+def _value(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.6g}"

@@ -1,0 +1,138 @@
+"""The pictures of a folder: checked before they are decoded, and those of others written anew.
+
+A picture written anew holds pixels and nothing else: no metadata, and nothing behind its end.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from PIL import Image, UnidentifiedImageError
+
+from ...core.errors import UserError
+from ...core.io import file_name
+from ..data.tables import DONE
+from .intake import Source
+
+FIGURES, THUMBNAILS = "figures", "thumbnails"
+SUFFIXES = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
+MOST_FILE = 8_000_000  # bytes
+MOST_PIXELS = 40_000_000
+LONGEST_THUMBNAIL = 1024  # pixels
+MOST_THUMBNAILS = 400  # of a folder
+ROOM = 1_200_000  # bytes of the figures of a study; the others stay in its folder
+# Which figures are taken first: what answers, then what is looked at, then charts.
+ORDER = ("answer-*", "comparison-*-1.*", "error-budget*", "quality-paired-*", "quality-*", "rank*", "comparison-*", "*")
+STAGES = "stages-"
+
+_CAPTION = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
+_MARKDOWN = re.compile(r"\\(?=[\\`*|~$_\]])|`")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the site. name: its file, below the folder of its study; caption: what it shows, as text; of: the
+    name of the method whose capture it is (empty: none)."""
+
+    name: str
+    caption: str
+    content: bytes
+    width: int
+    height: int
+    of: str = ""
+
+
+def thumbnails(source: Source) -> list[Picture]:
+    """The captures that a folder shows: ``thumbnails/CELL.png``, CELL as in records.csv, captioned by its row."""
+    folder = source.folder / THUMBNAILS
+    files = list(_files(folder))
+    if len(files) > MOST_THUMBNAILS:
+        raise UserError(f"{folder}: {len(files)} pictures; expected at most {MOST_THUMBNAILS}")
+    done = source.results.frame[source.results.frame["state"] == DONE]
+    rows = {str(row["cell"]): row for _, row in done.iterrows()}
+    found = []
+    for path in files:
+        row = rows.get(path.stem)
+        if row is None:
+            raise UserError(
+                f"{path}: no such cell; a thumbnail is named by the column 'cell' of a done row of records.csv"
+            )
+        caption = f"{row['method']} on {row['condition']}, {row['target']}"
+        found.append(replace(_picture(path, caption, LONGEST_THUMBNAIL, anew=True), of=str(row["name"])))
+    return found
+
+
+def figures(source: Source) -> tuple[list[Picture], int]:
+    """The figures of a folder that fit ``ROOM``, without stage sheets, and how many there are."""
+    files = [path for path in _files(source.folder / FIGURES) if not path.name.startswith(STAGES)]
+    ordered = list(dict.fromkeys(path for pattern in ORDER for path in files if path.match(pattern)))
+    captions, taken, room = _captions(source.folder), list[Picture](), ROOM
+    for path in ordered:
+        if path.stat().st_size <= room:
+            caption = captions.get(path.name, path.stem.replace("-", " "))
+            taken.append(_picture(path, caption, None, anew=bool(source.by)))
+            room -= path.stat().st_size
+    return taken, len(files)
+
+
+def sheet(source: Source, display: str) -> Picture | None:
+    """The stage sheet of a display, where the folder has it."""
+    wanted = f"{STAGES}{display}.png"
+    path = next((path for path in _files(source.folder / FIGURES) if path.name == wanted), None)
+    if path is None:
+        return None
+    return _picture(path, f"Stages of the simulated bench {display}", None, anew=bool(source.by))
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """The pictures of a folder by name, each a file of its own of a format and size that are taken."""
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise UserError(f"{folder}: not a folder of its own; expected one with PNG or JPEG files")
+    for path in sorted(folder.iterdir()) if folder.exists() else ():
+        if path.is_symlink() or not path.is_file():
+            raise UserError(f"{path}: a link or a folder; expected PNG or JPEG files alone, copied into this folder")
+        if path.suffix.lower() not in SUFFIXES:
+            raise UserError(f"{path}: not a PNG or JPEG; expected pictures alone, take it out")
+        if path.stat().st_size > MOST_FILE:
+            raise UserError(f"{path}: more than {MOST_FILE // 10**6} MB; save it smaller")
+        yield path
+
+
+def _picture(path: Path, caption: str, longest: int | None, anew: bool) -> Picture:
+    """A decoded picture. longest: of its sides [px]; anew: whether it is written again."""
+    form = SUFFIXES[path.suffix.lower()]
+    try:
+        with Image.open(path, formats=(form,)) as picture:
+            width, height = picture.size
+            if width * height > MOST_PIXELS or max(width, height) > (longest or MOST_PIXELS):
+                limit = f"{longest} pixels a side" if longest else f"{MOST_PIXELS // 10**6} million pixels"
+                raise UserError(f"{path}: {width} x {height} pixels; expected at most {limit}")
+            picture.load()
+            content = _written(picture, form) if anew else path.read_bytes()
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise UserError(f"{path}: not a whole {form} ({error}); save it again") from None
+    name = f"{file_name(path.stem).lower()}{path.suffix.lower()}"
+    return Picture(name, caption, content, width, height)
+
+
+def _written(picture: Image.Image, form: str) -> bytes:
+    text = io.BytesIO()
+    plain = picture.convert("L" if picture.mode in ("1", "L", "I;16", "I") else "RGB")
+    plain.info.clear()
+    plain.save(text, format=form, **({"quality": 92} if form == "JPEG" else {"optimize": False}))
+    return text.getvalue()
+
+
+def _captions(folder: Path) -> dict[str, str]:
+    """What report.md and details.md say below each figure, as plain text."""
+    paths = [folder / name for name in ("report.md", "details.md")]
+    texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths if _is_text(path)]
+    return {name: _MARKDOWN.sub("", caption) for name, caption in _CAPTION.findall("\n".join(texts))}
+
+
+def _is_text(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink() and path.stat().st_size <= MOST_FILE

@@ -1,0 +1,270 @@
+"""Who stands where: the rows of all sources, in groups within which scores compare, and their ranks.
+
+Scores compare for the same display, targets, panel, exposure, metric, protocol and version of the harness. Targets of
+one name need not be one image; the score of a constant image, which needs no display, tells: where it differs, the
+targets do. A study that lacks what is compared here is a group of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...study.plan import REFERENCE
+from ...study.versions import HARNESS
+from ..data.categories import ORACLE
+from ..data.marks import CONSTANT, marked
+from ..data.scores import Score
+from ..data.statistics import Estimate, mean_interval
+from ..data.tables import DONE
+from ..data.text import FILES
+from .displays import Display, digests, display_of
+from .intake import MEASURES, Source
+
+# How far the scores of a constant image may be apart, on two machines, for targets to be the same images.
+TOLERANCE_DB, TOLERANCE = 0.02, 0.002
+CURRENT, UNRECORDED, OLDER = "this version", "version not recorded", "older version"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method on a display in a source.
+
+    label: in its study's tables, and marked, with what must be known of the row; method: its name in configs; values:
+    headline score by target, repeats averaged, without holes; planned: targets that should have one; score: the mean;
+    gain: to the baseline of its group (None: there is none); above: the constant image; table: its row of table.csv;
+    cells: digests of what the numbers depend on; also: other studies that hold the very same row.
+    """
+
+    source: Source
+    display: Display
+    label: str
+    marked: str
+    method: str
+    category: str
+    metric: Score
+    values: Mapping[str, float]
+    planned: int
+    score: Estimate
+    above: Estimate | None
+    table: Mapping[str, Any]
+    cells: frozenset[str]
+    key: tuple[Any, ...]
+    gain: Estimate | None = None
+    is_baseline: bool = False
+    rank: int | None = None
+    also: tuple[Source, ...] = ()
+
+    @property
+    def failed(self) -> int:
+        """Cells without a score."""
+        return int(self.table["failed"])
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every target has a score: only then is its mean compared."""
+        return len(self.values) == self.planned and not self.failed
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows whose scores compare, best first. exposure: of its light; clusters, targets: their numbers; version: see
+    ``version``; baseline: the label that differences are to, and study that names it (None: none)."""
+
+    number: int
+    display: Display
+    metric: Score
+    measure: str
+    panel: str
+    exposure: str
+    protocol: str
+    harness: str
+    version: str
+    targets: int
+    clusters: int
+    baseline: Row | None
+    rows: tuple[Row, ...]
+
+    @property
+    def ranked(self) -> dict[str, int]:
+        """How many rows are ranked in each category."""
+        found = [row.category for row in self.rows if row.rank is not None]
+        return {name: found.count(name) for name in dict.fromkeys(found)}
+
+
+@dataclass
+class _Comparable:
+    """Rows of one key so far, and the scores of a constant image on their targets."""
+
+    constant: Mapping[str, float]
+    rows: list[Row] = field(default_factory=list)
+
+
+def groups(sources: Sequence[Source]) -> list[Group]:
+    """Every row of the sources in its group: those of this version first, the others last."""
+    known, found = digests(sources), dict[tuple[Any, ...], list[_Comparable]]()
+    for source in sources:
+        constant = _constant(source)
+        for row in _rows(source, known, bool(constant)):
+            same = found.setdefault(row.key, [])
+            part = next((each for each in same if _equal(each.constant, constant, row.metric)), None)
+            if part is None:
+                same.append(part := _Comparable(constant))
+            part.rows.append(row)
+    made = [_group(part.rows) for same in found.values() for part in same]
+    made.sort(key=_order)
+    return [replace(group, number=number) for number, group in enumerate(made, start=1)]
+
+
+def version(source: Source, display: Display) -> str:
+    """Whether the numbers of a source are of this version: its harness is recorded, and is that of the package."""
+    if source.measure == FILES:
+        digest = source.known.get("code_sha256")
+        return CURRENT if isinstance(digest, dict) and digest.get("metrics") == HARNESS else OLDER
+    if source.harness:
+        return CURRENT if source.harness == HARNESS else OLDER
+    return OLDER if source.earlier or "(other " in display.title else UNRECORDED
+
+
+def _constant(source: Source) -> dict[str, float]:
+    results = source.results
+    if CONSTANT not in results.floors:
+        return {}
+    values = results.values(CONSTANT, REFERENCE)
+    return {target: float(value) for target, value in zip(results.targets, values, strict=True) if np.isfinite(value)}
+
+
+def _equal(a: Mapping[str, float], b: Mapping[str, float], metric: Score) -> bool:
+    tolerance = TOLERANCE_DB if metric.unit == "dB" else TOLERANCE
+    return a.keys() == b.keys() and all(abs(a[target] - b[target]) <= tolerance for target in a)
+
+
+def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list[Row]:
+    results, rows = source.results, []
+    targets = tuple(sorted(zip(results.targets, map(str, results.clusters), strict=True)))
+    for condition in results.conditions:
+        name = str(results.frame.loc[results.frame["condition"] == condition, "profile"].iloc[0]) or condition
+        display = display_of(source, name, known)
+        for label in results.methods(condition):
+            cells = results.cells(label, condition)
+            first, values = cells.iloc[0], results.values(label, condition)
+            # A study without floors or harness, or of another person's pictures, is compared with itself alone.
+            own = "" if verified and (source.harness or source.measure == FILES) else source.name
+            key = (
+                source.measure,
+                (display.title, display.digest, display.kind),
+                condition,
+                source.panels.get(name, ""),
+                str(first["exposure"]),
+                results.headline.key,
+                str(first["protocol"]),
+                source.harness,
+                (own, source.by, str(source.folder)) if own else (),
+                targets,
+            )
+            rows.append(
+                Row(
+                    source=source,
+                    display=display,
+                    label=label,
+                    marked=marked(results, label, condition),
+                    method=str(first["name"]),
+                    category=str(first.get("track", "")) or "not recorded",
+                    metric=results.headline,
+                    values={t: float(v) for t, v in zip(results.targets, values, strict=True) if np.isfinite(v)},
+                    planned=len(results.targets),
+                    score=_estimate(results.row(label, condition), results.headline.key, len(set(results.clusters))),
+                    above=results.above_floor(label, condition),
+                    table={str(name): value for name, value in results.row(label, condition).items()},
+                    cells=frozenset(cells["cell"]) if (cells["state"] == DONE).all() else frozenset(),
+                    key=key,
+                )
+            )
+    return rows
+
+
+def _estimate(row: pd.Series, key: str, clusters: int) -> Estimate:
+    """The mean of table.csv with its interval."""
+    return Estimate(row[key], row[f"{key}_lo"], row[f"{key}_hi"], int(row["n"]), int(row.get("clusters", clusters)))
+
+
+def _group(rows: Sequence[Row]) -> Group:
+    merged = _merged(rows)
+    own_first = sorted(merged, key=lambda row: bool(row.source.by))
+    baseline = next((row for row in own_first if row.is_complete and _is_baseline(row)), None)
+    first = merged[0]
+    clusters = dict(zip(first.source.results.targets, map(str, first.source.results.clusters), strict=True))
+    placed = _ranked([replace(row, gain=_gain(row, baseline, clusters), is_baseline=row is baseline) for row in merged])
+    return Group(
+        number=0,
+        display=first.display,
+        metric=first.metric,
+        measure=first.source.measure,
+        panel=first.source.panels.get(first.display.name, ""),
+        exposure=first.key[4],
+        protocol=first.key[6],
+        harness=first.source.harness,
+        version=version(first.source, first.display),
+        targets=first.planned,
+        clusters=len(set(clusters.values())),
+        baseline=baseline,
+        rows=tuple(placed),
+    )
+
+
+def _is_baseline(row: Row) -> bool:
+    return any(row.label == source.results.layout.baseline for source in (row.source, *row.also))
+
+
+def _merged(rows: Sequence[Row]) -> list[Row]:
+    """The rows, those that two studies have from the very same cells once."""
+    found: list[Row] = []
+    for row in rows:
+        same = next((each for each in found if row.cells and _is_same(each, row)), None)
+        if same is None:
+            found.append(row)
+        else:
+            found[found.index(same)] = replace(same, also=(*same.also, row.source))
+    return found
+
+
+def _is_same(a: Row, b: Row) -> bool:
+    return (a.label, a.cells, a.values, a.source.by) == (b.label, b.cells, b.values, b.source.by)
+
+
+def _gain(row: Row, baseline: Row | None, clusters: Mapping[str, str]) -> Estimate | None:
+    """Score minus that of the baseline, target by target; None without a complete pair."""
+    if baseline is None or row is baseline or not row.is_complete:
+        return None
+    differences = np.array([row.values[target] - baseline.values[target] for target in clusters])
+    return mean_interval(differences, list(clusters.values()))
+
+
+def _ranked(rows: Sequence[Row]) -> list[Row]:
+    """The rows, best first, each with its place in its category; holes and oracles have none."""
+    sign = -1 if rows[0].metric.higher_is_better else 1
+    ordered = sorted(rows, key=lambda row: (not row.values, sign * row.score.mean if row.values else 0.0))
+    placed = []
+    for row in ordered:
+        rank = None
+        if row.is_complete and row.category not in (ORACLE, "not recorded"):
+            rivals = (each for each in rows if each.category == row.category and each.is_complete)
+            rank = 1 + sum(row.metric.better(each.score.mean, row.score.mean) for each in rivals)
+        placed.append(replace(row, rank=rank))
+    return placed
+
+
+def _order(group: Group) -> tuple[Any, ...]:
+    return (
+        (CURRENT, UNRECORDED, OLDER).index(group.version),
+        group.display.kind != "real",
+        MEASURES.index(group.measure),
+        -len(group.rows),
+        group.display.title,
+        group.rows[0].source.name,
+        group.exposure,
+    )

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.commands.test_commands import holoeval
+from tests.support import synthetic_study as synthetic
+from tests.support.results_folder import TARGETS, write_results
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    return synthetic.study(tmp_path_factory.mktemp("study"), size=16, targets=TARGETS)
+
+
+def test_the_reports_of_the_folder_make_a_site(
+    study: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_results(Path("reports/one"), study)
+    Path("reports/timings").mkdir()
+    assert holoeval(monkeypatch, "site") == 0
+    shown = capsys.readouterr().out
+    assert "reports/timings: no records.csv, left out" in shown
+    assert "site/index.html: 1 study" in shown
+    assert Path("site/methods/hil.html").is_file()
+    assert holoeval(monkeypatch, "site", "reports", "--output", "site") == 0  # an earlier site is replaced
+
+
+@pytest.mark.parametrize(
+    ("folder", "message"),
+    [
+        ("nowhere", "nowhere: no such folder; expected a report, or a folder of reports"),
+        (".", ".: no report in it; expected records.csv and provenance.json"),
+        ("bad", "bad/provenance.json: missing"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], folder: str, message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if folder == "bad":
+        Path("bad").mkdir()
+        Path("bad/records.csv").write_text("a\n")
+    assert holoeval(monkeypatch, "site", folder) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not Path("site").exists()

@@ -1,0 +1,219 @@
+"""What a folder of others has to be, and that whatever else is refused in one line that says what to do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.report.site import pictures, write_site
+from holobench_eval.report.site.intake import read
+from tests.support.results_folder import edited, write_results
+
+from .conftest import LAB, Site
+
+
+def refused(folder: Path, *words: str) -> None:
+    with pytest.raises(UserError) as error:
+        write_site([folder], folder.parent / "site")
+    text = str(error.value)
+    assert "\n" not in text
+    for word in words:
+        assert word in text
+    assert not (folder.parent / "site").exists()
+
+
+def told(folder: Path, **changes: Any) -> None:
+    """Change the provenance of a folder; None takes a key out."""
+    path = folder / "provenance.json"
+    known = json.loads(path.read_text()) | changes
+    path.write_text(json.dumps({key: value for key, value in known.items() if value is not None}))
+
+
+def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> None:
+    (handed_in / "tests.csv").unlink()
+    assert write_site([handed_in], handed_in.parent / "site") == (1, [])
+    page = (handed_in.parent / "site" / "methods" / "hil.html").read_text()
+    assert "Their lab" in page
+    assert page.count("<figure>") == 2
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("psnr_linear_db", "inf", ("psnr_linear_db inf", "expected a number from -200 to 80")),
+        ("psnr_linear_db", "900", ("psnr_linear_db 900", "expected")),
+        ("psnr_linear_db", "nan", ("psnr_linear_db nan", "expected a number from")),
+        ("psnr_linear_db", "much", ("psnr_linear_db", "much")),
+        ("ssim_linear", "1.5", ("ssim_linear 1.5", "to 1")),
+        ("captures", "-1", ("captures -1", "at least 0")),
+        ("solving_s", "inf", ("solving_s inf", "at least 0")),
+        ("state", "won", ("state 'won'", "done, failed")),
+        ("state", "failed", ("is not done and has a score",)),
+        ("category", "best", ("category 'best'", "open loop")),
+        ("measure", "beauty", ("measure 'beauty'", "picture")),
+        ("measure", "focus", ("one study a folder",)),
+        ("exposure", "bright", ("exposure 'bright'", "equal")),
+        ("label", "x" * 400, ("a name of 400 characters", "at most 300")),
+        ("display", "nobody's", ("no digest of the display", "nobody's")),
+    ],
+)
+def test_a_wrong_cell_is_refused(handed_in: Path, column: str, value: str, words: tuple[str, ...]) -> None:
+    edited(handed_in, column, value, row=0)
+    if column == "display":
+        edited(handed_in, "condition", value, row=0)
+    refused(handed_in, str(handed_in), *words)
+
+
+def without(*names: str) -> Callable[[Path], None]:
+    def change(folder: Path) -> None:
+        import pandas as pd
+
+        frame = pd.read_csv(folder / "records.csv", dtype=str, keep_default_na=False)
+        frame.drop(columns=list(names)).to_csv(folder / "records.csv", index=False)
+
+    return change
+
+
+def doubled(folder: Path) -> None:
+    text = (folder / "records.csv").read_text()
+    (folder / "records.csv").write_text(text + text.splitlines()[1] + "\n")
+
+
+def more(folder: Path) -> None:
+    lines = (folder / "records.csv").read_text().splitlines()
+    (folder / "records.csv").write_text("\n".join([f"{lines[0]},beauty", *(f"{line},1" for line in lines[1:])]) + "\n")
+
+
+def linked(name: str) -> Callable[[Path], None]:
+    def change(folder: Path) -> None:
+        (folder / name).rename(folder.parent / name)
+        (folder / name).symlink_to(folder.parent / name)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (without("protocol"), ("lacks the columns protocol",)),
+        (without("panel_width_px", "measure"), ("lacks the columns measure, panel_width_px",)),
+        (more, ("unknown column 'beauty'", "columns.md")),
+        (doubled, ("two rows for one cell",)),
+        (linked("records.csv"), ("records.csv: a link",)),
+        (linked("provenance.json"), ("provenance.json: a link",)),
+        (lambda folder: (folder / "provenance.json").unlink(), ("provenance.json: missing",)),
+        (lambda folder: (folder / "records.csv").unlink(), ("records.csv: missing",)),
+        (lambda folder: (folder / "records.csv").write_bytes(b"\xff\xfe"), ("records.csv: not UTF-8",)),
+        (lambda folder: (folder / "records.csv").write_text('a,b\n"1'), ("records.csv: not a table",)),
+        (lambda folder: (folder / "records.csv").write_text(""), ("records.csv: not a table",)),
+        (lambda folder: (folder / "tests.csv").write_text("a\n1\n"), ("tests.csv: not the table of tests",)),
+        (lambda folder: (folder / "provenance.json").write_text("[" * 10**5), ("provenance.json",)),
+        (lambda folder: (folder / "provenance.json").write_text("[]"), ("not a mapping",)),
+        (lambda folder: told(folder, cpu="\ud800"), ("not Unicode",)),
+        (lambda folder: told(folder, profiles=[], files={}), ("lacks profiles",)),
+        (lambda folder: told(folder, package=None), ("lacks package", "holoeval run")),
+        (lambda folder: told(folder, harness=None), ("lacks harness",)),
+        (lambda folder: told(folder, profiles=None), ("lacks profiles",)),
+        (lambda folder: told(folder, profiles={"ideal": {"sha256": "12"}}), ("profile 'ideal' has no digest",)),
+        (lambda folder: told(folder, by=None), ('lacks "by"', "Our lab")),
+        (lambda folder: told(folder, by=" "), ('"by" is not a name',)),
+        (lambda folder: told(folder, by=["a"]), ('"by" is not a name',)),
+        (lambda folder: told(folder, displays={"ideal": "magic"}), ("simulated, real, learned",)),
+        (lambda folder: told(folder, displays={"ideal": []}), ("simulated, real, learned",)),
+    ],
+)
+def test_a_wrong_folder_is_refused(handed_in: Path, change: Callable[[Path], object], words: tuple[str, ...]) -> None:
+    change(handed_in)
+    refused(handed_in, str(handed_in), *words)
+
+
+def picture(folder: Path) -> Path:
+    return sorted((folder / "thumbnails").iterdir())[0]
+
+
+def truncated(folder: Path) -> None:
+    picture(folder).write_bytes(picture(folder).read_bytes()[:60])
+
+
+def escaping(folder: Path) -> None:
+    outside = folder.parent / "outside.png"
+    picture(folder).rename(outside)
+    (folder / "thumbnails" / outside.name).symlink_to(outside)
+
+
+def elsewhere(folder: Path) -> None:
+    (folder / "thumbnails").rename(folder.parent / "thumbnails")
+    (folder / "thumbnails").symlink_to(folder.parent / "thumbnails")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda folder: Image.new("RGB", (2000, 20)).save(picture(folder)), ("2000 x 20 pixels", "at most 1024")),
+        (lambda folder: Image.new("RGB", (8, 8)).save(picture(folder), "GIF"), ("not a whole PNG",)),
+        (lambda folder: picture(folder).write_text("<svg onload=alert(1)>"), ("not a whole PNG",)),
+        (truncated, ("not a whole PNG",)),
+        (lambda folder: (folder / "thumbnails" / "a.svg").write_text("<svg>"), ("a.svg: not a PNG or JPEG",)),
+        (lambda folder: (folder / "thumbnails" / "a").mkdir(), ("a: a link or a folder",)),
+        (lambda folder: picture(folder).rename(folder / "thumbnails" / "a.png"), ("a.png: no such cell",)),
+        (escaping, ("outside.png: a link",)),
+        (elsewhere, ("thumbnails: not a folder of its own",)),
+    ],
+)
+def test_a_wrong_picture_is_refused(handed_in: Path, change: Callable[[Path], object], words: tuple[str, ...]) -> None:
+    change(handed_in)
+    refused(handed_in, "thumbnails", *words)
+
+
+def test_a_picture_of_too_many_bytes_or_pixels_is_refused_before_it_is_decoded(
+    handed_in: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Image.Image, "load", lambda self: pytest.fail("decoded"))
+    monkeypatch.setattr(pictures, "MOST_PIXELS", 100)
+    refused(handed_in, "32 x 24 pixels")
+    monkeypatch.setattr(pictures, "MOST_FILE", 10)
+    refused(handed_in, "save it smaller")
+
+
+def test_a_thumbnail_of_others_is_written_anew_pixel_for_pixel(handed_in: Path) -> None:
+    path = picture(handed_in)
+    before = Image.open(path).convert("RGB").tobytes()
+    path.write_bytes(path.read_bytes() + b"<script>alert(1)</script>")
+    found = pictures.thumbnails(read(handed_in))
+    assert all(b"script" not in each.content for each in found)
+    assert found[0].width == 32
+    path.write_bytes(found[0].content)
+    assert Image.open(path).convert("RGB").tobytes() == before
+
+
+def test_one_bad_folder_among_good_ones_stops_the_site(site: Site, tmp_path: Path, study: list[dict[str, Any]]) -> None:
+    write_results(tmp_path / "all" / "good", study)
+    bad = write_results(tmp_path / "all" / "bad", study)
+    (bad / "records.csv").unlink()
+    with pytest.raises(UserError, match=r"bad/records.csv: missing"):
+        write_site([tmp_path / "all"], tmp_path / "site")
+
+
+def test_a_folder_without_records_is_named(tmp_path: Path, study: list[dict[str, Any]]) -> None:
+    write_results(tmp_path / "all" / "good", study)
+    (tmp_path / "all" / "timings").mkdir()
+    assert write_site([tmp_path / "all"], tmp_path / "site") == (1, [tmp_path / "all" / "timings"])
+    assert "timings: no records.csv, left out" in (tmp_path / "site" / "index.html").read_text()
+
+
+def test_an_output_that_is_no_site_or_overlaps_is_refused(site: Site, tmp_path: Path) -> None:
+    (tmp_path / "kept.txt").write_text("mine")
+    for output, word in ((tmp_path, "no site"), (site.own / "site", "overlaps"), (site.own.parent, "no site")):
+        with pytest.raises(UserError, match=word):
+            write_site([site.own], output)
+    assert [path.name for path in tmp_path.iterdir()] == ["kept.txt"]
+
+
+def test_whose_result_it_is_stands_in_the_provenance(site: Site) -> None:
+    assert (read(site.own).by, read(site.other).by) == ("", LAB)
