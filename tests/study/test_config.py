@@ -109,7 +109,7 @@ CHANGES = [
     ("iterations: 12", "iterations: many", "10:64: method 'gerchberg_saxton': parameter 'iterations'"),
     ("params: {iterations: 12}", "parms: {}", "10:43: unknown key 'parms' in methods[1]; did you mean 'params'?"),
     ("profiles: [ideal]}", "profiles: [idael]}", "10:80: 'idael' is not in display.profiles; did you mean 'ideal'?"),
-    ('label: "GS"', 'label: "Wirtinger "', "share the label 'Wirtinger ', but for spaces and capitals; give one"),
+    ('label: "GS"', 'label: "Wirtinger "', "10:37: methods[1] and methods[0] share the label 'Wirtinger ', but"),
     ('label: "GS"', "label: wirtinger", "10:37: methods[1] and methods[0] share the label 'wirtinger'"),
     ('label: "GS"', "label: floor_black", "10:37: label 'floor_black' should be"),
     ('label: "GS"', 'label: "a\\nb"', "10:37: label 'a\\nb' should be printable"),
