@@ -39,6 +39,7 @@ exclude_patterns = ["**/.*", "artifacts", "build", "methods", "datasets", "tests
 exclude_patterns += ["docs/gallery"]  # its pages are docs/examples, which the build writes
 
 myst_heading_anchors = 3
+smartquotes = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
@@ -66,6 +67,7 @@ sphinx_gallery_conf = {
 html_theme = "furo"
 html_title = "holobench_eval"
 html_static_path = ["static"]
+html_extra_path = ["extra"]  # index.html, which leads to the first page
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False

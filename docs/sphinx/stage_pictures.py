@@ -48,6 +48,7 @@ class Shown:
     gain: float = 1.0
 
 
+shipped = cache(load_profile)
 FINE = {"sampling": 3}
 SHOWN: dict[str, Shown] = {
     "panel": Shown("4 bits in the place of 8", {"bits": 4}, "ideal"),
@@ -59,7 +60,7 @@ SHOWN: dict[str, Shown] = {
     "spectrum": Shown(
         "light-emitting diodes of 30 nm, behind the blaze and the iris of `leto-2020`",
         {"width": (3e-8, 3e-8, 3e-8), "lines": 9},
-        base={"panel": load_profile("leto-2020").panel},
+        base={"panel": shipped("leto-2020").panel},
     ),
     "illumination": Shown("the values of `leto-2020`", of="leto-2020"),
     "coherent_noise": Shown(
@@ -82,7 +83,7 @@ SHOWN: dict[str, Shown] = {
         "365 days at the rates of `leto-2020`, on a panel as dirty as that profile's",
         {"days": 365.0},
         "leto-2020",
-        base={"coherent_noise": replace(load_profile("leto-2020").coherent_noise, plane_specks=0)},
+        base={"coherent_noise": replace(shipped("leto-2020").coherent_noise, plane_specks=0)},
     ),
 }
 
@@ -90,11 +91,11 @@ SHOWN: dict[str, Shown] = {
 def with_stage(name: str) -> tuple[Profile, Profile]:
     """The profile without a stage, as ``SHOWN`` has it, and with the stage."""
     shown = SHOWN[name]
-    without = replace(load_profile("ideal"), **dict(shown.base))
+    without = replace(shipped("ideal"), **dict(shown.base))
     if name == "dust_plane":  # its parameters are those of the coherent noise
-        dirt = load_profile("leto-2020").coherent_noise
+        dirt = shipped("leto-2020").coherent_noise
         return without, replace(without, coherent_noise=replace(dirt, specks=0, scratches=0, roughness=0.0))
-    stage = getattr(load_profile(shown.of) if shown.of else without, name)
+    stage = getattr(shipped(shown.of) if shown.of else without, name)
     return without, replace(without, **{name: replace(stage, **dict(shown.values))})
 
 
@@ -109,10 +110,13 @@ class Seen:
 @cache
 def hologram(panel: Panel) -> tuple[Tensor, Tensor]:
     """The target ``(C, h, w)`` in linear light and a phase ``(C, H, W)`` [rad] for the nominal optics of a panel."""
-    bench = open_bench(replace(load_profile("ideal"), panel=panel), PANEL)
+    bench = open_bench(replace(shipped("ideal"), panel=panel), PANEL)
     target = Photographs(names=(TARGET,)).load(TARGET, bench.spec.region.shape)
     method = Wirtinger(iterations=STEPS)
     return target, method.solve(target[None], bench.for_method(method, "", target, TARGET, 0))[0]
+
+
+_without: dict[str, Seen] = {}
 
 
 @torch.no_grad()
@@ -140,7 +144,10 @@ def draw(name: str, path: Path) -> None:
     without, profile = with_stage(name)
     shown = SHOWN[name]
     target, phase = hologram(without.panel)
-    before, after = seen(without, phase, target, replace(shown, gain=1.0)), seen(profile, phase, target, shown)
+    key = f"{shown.base} {shown.at}"  # most stages have one picture without them
+    if key not in _without:
+        _without[key] = seen(without, phase, target, replace(shown, gain=1.0))
+    before, after = _without[key], seen(profile, phase, target, shown)
     with style():
         figure = new_figure(1100, 365)
         axes = [figure.add_axes((left, 0.02, 0.3, 0.88)) for left in (0.0, 0.305, 0.61)]  # a layout engine is slow

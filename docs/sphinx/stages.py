@@ -18,10 +18,9 @@ import torch
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
-from stage_pictures import SHOWN, draw
+from stage_pictures import SHOWN, draw, shipped
 
 import holobench_eval.display.simulated
-from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.profile import STAGES
 
 PROFILES = ("leto-2020", "leto-aged")
@@ -68,7 +67,7 @@ def as_code(text: str, names: list[str]) -> str:
 def table(stage: type[Any], key: str, keys: list[Field[Any]]) -> Iterator[str]:
     """Every parameter: default, what is allowed, and the values of two profiles."""
     hints = get_type_hints(stage, include_extras=True)
-    values = [getattr(load_profile(profile), key) for profile in PROFILES]
+    values = [getattr(shipped(profile), key) for profile in PROFILES]
     yield f"| parameter | default | allowed | {' | '.join(f'`{name}`' for name in PROFILES)} |"
     yield f"|---|---|---|{'---|' * len(PROFILES)}"
     for each in keys:
