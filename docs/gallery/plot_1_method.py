@@ -33,17 +33,11 @@ class Backprojection:
 
     def solve(self, target, bench):
         """Linear intensity (B, C, h, w) in [0, 1] to phase (B, C, H, W) [rad]."""
-        amplitude = bench.spec.region.embed(target.sqrt(), bench.spec.shape).to(
-            torch.complex64
-        )
-        channels = range(target.shape[1])
-        return torch.stack(
-            [
-                bench.spec.propagator(c).adjoint(amplitude[:, c]).angle()
-                for c in channels
-            ],
-            dim=1,
-        )
+        spec = bench.spec
+        field = spec.region.embed(target.sqrt(), spec.shape).to(torch.complex64)
+        colours = range(field.shape[1])
+        back = [spec.propagator(c).adjoint(field[:, c]) for c in colours]
+        return torch.stack(back, dim=1).angle()
 
 
 # %%
@@ -65,10 +59,9 @@ target = Photographs().load("astronaut", bench.spec.region.shape)
 # and compares it with the target in linear light.
 
 pictures = {"target": target}
-for name, method in {
-    "backprojection": Backprojection(),
-    "wirtinger": Wirtinger(iterations=100),
-}.items():
+wirtinger = Wirtinger(iterations=100)
+methods = {"backprojection": Backprojection(), "wirtinger": wirtinger}
+for name, method in methods.items():
     handle = bench.for_method(method, name, target, item="astronaut", repeat=0)
     phase = method.solve(target[None], handle)[0]
     capture = bench.photograph(phase, target, item="astronaut", repeat=0).image
@@ -76,9 +69,8 @@ for name, method in {
     pictures[f"{name}: {psnr:.1f} dB"] = match(capture, target)[0]
     print(f"{name}: {psnr:.2f} dB")
 
-constant = score(
-    torch.ones_like(target), target, metrics=["psnr"], refine=False, blur=()
-)["psnr_linear"]
+gray = torch.ones_like(target)
+constant = score(gray, target, metrics=["psnr"], refine=False)["psnr_linear"]
 print(f"a constant image: {constant:.2f} dB")
 
 # %%

@@ -39,7 +39,7 @@ exclude_patterns = ["**/.*", "artifacts", "build", "methods", "datasets", "tests
 exclude_patterns += ["docs/gallery"]  # its pages are docs/examples, which the build writes
 
 myst_heading_anchors = 3
-smartquotes = False
+smartquotes_action = "D"  # dashes; quotes stay as they are
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
