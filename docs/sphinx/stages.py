@@ -43,7 +43,7 @@ class StageDirective(SphinxDirective):
 def markdown(key: str) -> Iterator[str]:
     """The lines of a stage."""
     stage = STAGES[key]
-    yield from ("", f"**Model.** {stage.model[0].upper()}{stage.model[1:]}.", "")
+    yield from ("", f"**Model:** {stage.model}.", "")
     yield from (f"```{{figure}} /{FOLDER}/{key}.png", f":alt: {stage.title}, without and with")
     yield from (f"One hologram on `ideal`, without the stage and with it: {SHOWN[key].words}.", "```", "")
     keys = [each for each in fields(stage) if each.metadata.get("key", True)]
