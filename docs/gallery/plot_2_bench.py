@@ -77,9 +77,8 @@ axes[0].set_title("target")
 axes[0].imshow(srgb_encode(target).permute(1, 2, 0))
 for axis, source in zip(axes[1:], ("leto-mild", str(profile)), strict=True):
     bench = open_bench(load_profile(source), panel=(144, 144))
-    phase = method.solve(
-        target[None], bench.for_method(method, "wirtinger", target, "coffee", 0)
-    )[0]
+    handle = bench.for_method(method, "wirtinger", target, "coffee", 0)
+    phase = method.solve(target[None], handle)[0]
     capture = bench.photograph(phase, target, "coffee", 0).image
     psnr = score(capture, target, metrics=["psnr"])["psnr_linear"]
     axis.set_title(f"{bench.spec.name}: {psnr:.1f} dB")

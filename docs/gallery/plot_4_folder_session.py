@@ -51,13 +51,8 @@ with chdir(folder):
 
 with (session / "patterns" / "round-1" / "order.csv").open() as file:
     order = list(csv.DictReader(file))
-print(
-    pd.DataFrame(order)[
-        ["show", "role", "wavelength_nm", "relative_exposure", "laser"]
-    ]
-    .iloc[::10]
-    .to_string(index=False)
-)
+columns = ["show", "role", "wavelength_nm", "relative_exposure", "laser"]
+print(pd.DataFrame(order)[columns].iloc[::10].to_string(index=False))
 
 # %%
 # Photograph
@@ -69,40 +64,39 @@ print(
 # and noisy.
 
 profile = load_profile("leto-mild").scaled((144, 144))
-pose = Relay(
-    magnification=1.5, rotation=4.0, shift=(0.01, -0.005), perspective=(0.03, -0.02)
-)
+pose = Relay(magnification=1.5, rotation=4.0, perspective=(0.03, -0.02))
 bench = SimulatedBench(replace(profile, relay=pose))
 draw = torch.Generator().manual_seed(1)
-colours = sorted({row["wavelength_nm"] for row in order}, key=float, reverse=True)
-FULL, DARK, PEAK = (
-    65535,
-    900,
-    0.5,
-)  # counts; share of the range that the first lit pattern fills
+wavelengths = {row["wavelength_nm"] for row in order}
+colours = sorted(wavelengths, key=float, reverse=True)
+FULL, DARK, NOISE = 65535, 900, 20  # counts
 counts_per_light = None
 
 
+def levels(row):
+    """The picture for the panel."""
+    return cv2.imread(str(session / row["show"]), cv2.IMREAD_UNCHANGED)
+
+
+def light(row):
+    """What falls on the sensor."""
+    if row["laser"] == "blocked":
+        return torch.zeros(bench.response.shape)
+    phase = torch.from_numpy(levels(row).astype(np.float32)) * (2 * torch.pi / 256)
+    image = bench.integrated(phase, colours.index(row["wavelength_nm"]))
+    seen = sample(image, bench.grid, bench.image_samples)
+    return seen * float(row["relative_exposure"])
+
+
 def photograph(row):
-    """Counts of one row of the table."""
+    """Counts of the camera; the first lit pattern fills half of its range."""
     global counts_per_light
-    levels = cv2.imread(str(session / row["show"]), cv2.IMREAD_UNCHANGED)
-    light = torch.zeros(bench.response.shape)
-    if row["laser"] == "on":
-        phase = torch.from_numpy(levels.astype(np.float32)) * (2 * torch.pi / 256)
-        image = bench.integrated(phase, colours.index(row["wavelength_nm"]))
-        light = sample(image, bench.grid, bench.image_samples) * float(
-            row["relative_exposure"]
-        )
-        counts_per_light = counts_per_light or PEAK * FULL / float(light.max())
-    noise = 20 * torch.randn(light.shape, generator=draw)
-    return (
-        (light * (counts_per_light or 0) + DARK + noise)
-        .round()
-        .clamp(0, FULL)
-        .numpy()
-        .astype(np.uint16)
-    )
+    arrived = light(row)
+    if counts_per_light is None and row["laser"] == "on":
+        counts_per_light = 0.5 * FULL / float(arrived.max())
+    noise = NOISE * torch.randn(arrived.shape, generator=draw)
+    counts = arrived * (counts_per_light or 0) + DARK + noise
+    return counts.round().clamp(0, FULL).numpy().astype(np.uint16)
 
 
 for row in order:
@@ -110,23 +104,22 @@ for row in order:
     path.parent.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(path), photograph(row))
 
-shown = [
-    next(row for row in order if row["role"] == role)
-    for role in ("fiducial", "hologram")
-]
+# %%
+# A hologram of circles, which registers the camera, and one of a method:
+
 figure, axes = plt.subplots(2, 2, figsize=(8, 7.6), layout="constrained")
-for (left, right), row in zip(axes, shown, strict=True):
-    left.imshow(
-        cv2.imread(str(session / row["show"]), cv2.IMREAD_UNCHANGED), cmap="gray"
+for pair, role in zip(axes, ("fiducial", "hologram"), strict=True):
+    row = next(row for row in order if row["role"] == role)
+    saved = cv2.imread(
+        str(session / row["save_photograph_as"]), cv2.IMREAD_UNCHANGED
     )
-    left.set_title(f"{row['role']}: pattern")
-    right.imshow(
-        cv2.imread(str(session / row["save_photograph_as"]), cv2.IMREAD_UNCHANGED),
-        cmap="gray",
-    )
-    right.set_title(f"photograph at {row['wavelength_nm']} nm")
-    left.set_axis_off()
-    right.set_axis_off()
+    titles = f"{role}: pattern", f"photograph at {row['wavelength_nm']} nm"
+    for axis, picture, title in zip(
+        pair, (levels(row), saved), titles, strict=True
+    ):
+        axis.imshow(picture, cmap="gray")
+        axis.set_title(title)
+        axis.set_axis_off()
 
 # %%
 # Import
@@ -150,9 +143,6 @@ axis.set_axis_off()
 # %%
 # And the scores, from the same protocol as any other study:
 
-table = pd.read_csv(session / "report" / "table.csv")
-print(
-    table[table.category != "floor"][
-        ["label", "condition", "n", "psnr_linear_db", "ssim_linear"]
-    ].to_string(index=False)
-)
+table = pd.read_csv(session / "report" / "table.csv").query("category != 'floor'")
+columns = ["label", "condition", "n", "psnr_linear_db", "ssim_linear"]
+print(table[columns].to_string(index=False))
