@@ -37,7 +37,7 @@ class Objective:
     def evaluate(self, phase: Tensor) -> tuple[Tensor, Tensor]:
         """Loss ``(B,)`` and gradient ``(B, H, W)`` at a phase ``(B, H, W)`` [rad].
 
-        For E = P(exp(i phi)) and I = |E|^2, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
+        For E = P(exp(i phi)) and ``I = |E|^2``, the Wirtinger derivative of L(I) with respect to conj(E) is (dL/dI) E,
         and so dL/dphi = 2 Re(-i exp(-i phi) P*((dL/dI) E)).
         """
         light = PhasePropagation(self.model, self.region, phase)  # E

@@ -1,17 +1,17 @@
 """The squared error of a capture, and what of it a prediction explains, at matched brightness and in linear light.
 
 For a target T, a capture Y of a hologram of it, and any prediction P of that capture, all ``(C, h, w)`` linear light,
-the unexplained error is, per colour channel,
+the unexplained error is, per colour channel::
 
     e(P) = (|T|^2 / |Y|^2) min_c |Y - c P|^2 = |T|^2 (1 - cos^2(Y, P)),    c >= 0,
 
-where norms and cosine are those of the pixels as a vector. The factor |T|^2 / |Y|^2 is the unit of light: it makes
-e(T) = min_s |s Y - T|^2, the error of the capture against its target after the protocol's match and before its clip to
-[0, 1]. So the target is the first prediction of a capture, every better prediction leaves less, and the differences
+where norms and cosine are those of the pixels as a vector. The factor ``|T|^2 / |Y|^2`` is the unit of light: it makes
+``e(T) = min_s |s Y - T|^2``, the error of the capture against its target after the protocol's match and before its clip
+to [0, 1]. So the target is the first prediction of a capture, every better prediction leaves less, and the differences
 between the e of one prediction and of the next add up to e(T) exactly, whatever the predictions are.
 
 Two captures Y, Y' of the same hologram, each the noise-free picture M plus independent noise of the same power, have
-cos(Y, Y') = cos^2(Y, M) up to the noise's own chance. So |T|^2 (1 - cos(Y, Y')) is e(M), what the best prediction
+cos(Y, Y') = cos^2(Y, M) up to the noise's own chance. So ``|T|^2 (1 - cos(Y, Y'))`` is e(M), what the best prediction
 leaves: about half the squared difference of the two, since both have the noise.
 """
 

@@ -173,7 +173,7 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     Raises
     ------
     UserError
-        There is no such profile, or its file has a fault, with file:line:column.
+        There is no such profile, or its file has a fault, with ``file:line:column``.
     """
     documents = _documents(name, folder)
     text = "".join(each.text for each in documents)
