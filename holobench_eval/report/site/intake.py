@@ -213,7 +213,7 @@ def _check_columns(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame, strict:
     unknown = [name for name in raw if column(RECORDS, str(name)) is None] if "label" in raw else []
     if unknown:
         raise UserError(
-            f"{path}: unknown column {unknown[0]!r}; expected those of columns.md (docs/data.md); take it out"
+            f"{path}: unknown column {unknown[0]!r}; expected those of columns.md (docs/results/data.md); take it out"
         )
     if not any(parse(key).metric in METRICS for key in score_columns(frame)):
         raise UserError(f"{path}: no column of a score; expected one such as psnr_linear_db")

@@ -1,4 +1,4 @@
-"""The lines of pandas in docs/data.md answer what they say they do."""
+"""The lines of pandas in docs/results/data.md answer what they say they do."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from holobench_eval.report.files import write_files
 from holobench_eval.study.config import load_study
 
 ROOT = Path(__file__).parents[3]
-EXAMPLES = re.findall(r"<!-- pandas -->\n```python\n(.*?)```", (ROOT / "docs" / "data.md").read_text(), re.DOTALL)
+EXAMPLES = re.findall(
+    r"<!-- pandas -->\n```python\n(.*?)```", (ROOT / "docs" / "results" / "data.md").read_text(), re.DOTALL
+)
 
 
 @pytest.fixture(scope="module")
