@@ -39,7 +39,7 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
     if missing == len(records):
         changed = "the study, the code or the metrics that this machine can compute have changed"
         raise UserError(f"{folder}: no cell of this study has a record here ({changed}); {again} computes them")
-    known = provenance.read(folder) if missing else provenance.restate(folder, study)
+    known = provenance.read(folder) if missing else provenance.restate(folder, study, grid)
     results = write_report(console(), study, records, folder, known, keep_pictures=not raw)
     if print_to is not None:
         for path in print_figures(Report(results, records, folder, known, describe(study)), print_to):

@@ -38,18 +38,13 @@ def describe(
 
     device: as requested; gpu: its name, empty for a CPU or an unknown GPU.
     """
-    displays = {display.name: display for task in plan.tasks for display in task.conditions}
     return {
         "package": __version__,
         **revision(),
-        "harness": HARNESS,
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
-        "profiles": {
-            name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
-        },
-        "displays": {name: _kind(display) for name, display in displays.items()},
+        **_basis(plan),
         "python": platform.python_version(),
         "packages": {name: installed(name) for name in PACKAGES},
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
@@ -102,11 +97,24 @@ def end(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:
     return _write(output, {**provenance, "ended": now()})
 
 
-def restate(output: Path, study: Study) -> dict[str, Any]:
-    """Note the text of the config that a report is written from again, beside the provenance of what was computed."""
+def restate(output: Path, study: Study, plan: Plan) -> dict[str, Any]:
+    """Note the text of the config that a report is written from again, and what its cells were computed with, beside
+    the provenance of the runs; all cells of the plan have a record."""
     known = read(output)
     config = {"config": os.path.relpath(study.file, output), "config_sha256": text_digest(study.text)}
-    return _write(output, {**known, **config}) if known else known
+    return _write(output, {**known, **config, **_basis(plan)}) if known else known
+
+
+def _basis(plan: Plan) -> dict[str, Any]:
+    """What the identities of a plan's cells depend on: the harness, and the displays."""
+    displays = {display.name: display for task in plan.tasks for display in task.conditions}
+    return {
+        "harness": HARNESS,
+        "profiles": {
+            name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
+        },
+        "displays": {name: _kind(display) for name, display in displays.items()},
+    }
 
 
 def _write(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
+from ...study.plan import REFERENCE
 from ..data.categories import OFFLINE, ONLINE
 from ..data.marks import marked
 from ..data.phrases import difference, relation, tested, value, verdict
@@ -28,11 +30,20 @@ def against_baseline(results: Results, label: str) -> str:
     score, baseline = results.headline, str(results.layout.baseline)
     parts = [
         f"on {condition} {relation(score, test)} ({value(results, label, condition)} against "
-        f"{value(results, baseline, condition)})"
+        f"{value(results, baseline, condition)}{_published(results, label, condition)})"
         for condition in results.conditions
         if (test := tested(results, label, condition))
     ]
     return f"{label}: {'; '.join(parts)}." if parts else ""
+
+
+def _published(results: Results, label: str, condition: str) -> str:
+    """The published difference, where the config has the figures of both."""
+    score, layout = results.headline, results.layout
+    own, other = (layout.published(name, condition).get(score.metric) for name in (label, str(layout.baseline)))
+    if own is None or other is None:
+        return ""
+    return f"; published, on other hardware and images: {score.with_unit(own - other, signed=True)}"
 
 
 def best(results: Results) -> str:
@@ -82,13 +93,18 @@ def floor(results: Results) -> Iterator[str]:
         below = [label for label, gap in scored.items() if not results.headline.better(gap.mean, 0.0)]
         if below:
             parts.append(f"{words(below)} on {condition}")
+    constant = f"a constant image in the place of a {results.layout.text.scored}"
     if parts:
-        yield f"No better on average than a constant image in the place of a {results.layout.text.scored}: " + (
-            f"{'; '.join(parts)}."
-        )
+        yield f"No better on average than {constant}{_score_of_floor(results)}: {'; '.join(parts)}."
     elif known:
         every = "Every method" if whole else "Every method with a score for every target"
-        yield f"{every} is better on average than a constant image in the place of a {results.layout.text.scored}."
+        yield f"{every} is better on average than {constant}{_score_of_floor(results)}."
+
+
+def _score_of_floor(results: Results) -> str:
+    """What the constant image scores, where it does for every target."""
+    mean = float(results.values("floor_constant", REFERENCE).mean())
+    return "" if math.isnan(mean) else f" ({results.headline.with_unit(mean)})"
 
 
 def oracle(results: Results) -> Iterator[str]:

@@ -17,8 +17,16 @@ def sentences(results: Results) -> Iterator[str]:
     found = budgets(results)
     if not found:
         yield "No display has the scores of all methods for all targets, so none has a budget."
+    if found:
+        largest = [f"on {budget.condition} {_most(budget)}" for budget in found]
+        yield f"What explains most of the squared error: {'; '.join(largest)}."
     for budget in found:
         yield _reading(budget)
+
+
+def _most(budget: Budget) -> str:
+    part = max(budget.parts, key=lambda part: part.share.mean)
+    return f"{part.label}, {_percent(part)} %"
 
 
 def _reading(budget: Budget) -> str:
@@ -26,8 +34,9 @@ def _reading(budget: Budget) -> str:
     gains = [f"{_gain(part)} with {part.label}" for part in budget.explained]
     return (
         f"On {budget.condition} the captures have a PSNR of {_decibel(budget.psnr)}, and their squared error splits "
-        f"into {words(shares)}; removing the parts in this order, each with all before it, would raise the PSNR by at "
-        f"most {words(gains)} (means over images, which do not follow from the mean shares)."
+        f"into {words(shares)}; removing the parts in this order, each with all before it, would raise the PSNR, "
+        f"with the models that were tried, by {words(gains)} (means over images, which do not follow from the mean "
+        "shares)."
     )
 
 
@@ -61,7 +70,7 @@ def rows(results: Results) -> Markdown | None:
         for budget in budgets(results)
         for part in budget.parts
     ]
-    columns = ["display", "explained by", "share of the squared error [%]", "PSNR gained at most, with all above [dB]"]
+    columns = ["display", "explained by", "share of the squared error [%]", "PSNR gained, with all above [dB]"]
     return table([*columns, "left by it alone [%]"], lines) if lines else None
 
 

@@ -12,6 +12,7 @@ from ..markdown import Markdown
 
 MOST_SENTENCES = 5
 MOST_COLUMNS = 6
+PAPER = "Chakravarthula et al. 2020, ACM Trans. Graph. 39(6), 186, doi:10.1145/3414685.3417846."
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def subjects(results: Results) -> list[str]:
 
 def named(results: Results, text: str) -> dict[str, str]:
     """What the methods and displays are whose names stand in a text, by name, in its order."""
-    about = results.layout.about
+    about = {**results.layout.about, "the paper": PAPER}
     return {name: about[name] for name in _mentioned((*results.layout.methods, *about), text) if name in about}
 
 

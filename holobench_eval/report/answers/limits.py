@@ -48,15 +48,17 @@ def _sample(report: Report) -> str:
     )
     trained = ", nor with another training of a method" if report.trainings else ""
     parts = [
-        f"{targets} target{'s' * (targets != 1)}{among}; brackets hold 95 % intervals of how a mean varies with other "
-        f"images of the kind, not with other displays{trained}."
+        f"{targets} target{'s' * (targets != 1)}{among}{_dataset(report)}; brackets hold 95 % intervals of how a mean "
+        f"varies with other images of the kind, not with other displays{trained}."
     ]
     tests = sum(np.isfinite(test.p) for test in results.against_baseline)
     if tests:
         smallest = 2.0 ** (1 - clusters)
         parts.append(
-            f"p is adjusted for {tests} comparison{'s' * int(tests > 1)} with {results.layout.baseline}, intervals are "
-            f"not; a difference is shown at p < {SIGNIFICANCE}; not shown does not mean that there is none."
+            f"p comes from sign flips of the {'clusters' if clusters < targets else 'targets'}, adjusted for "
+            f"{tests} comparison{'s' * int(tests > 1)} with {results.layout.baseline}; a bracket is for one difference "
+            f"alone, so one that excludes zero beside p above {SIGNIFICANCE} is a hint. A difference is shown at p < "
+            f"{SIGNIFICANCE}; not shown does not mean that there is none."
         )
         if smallest >= SIGNIFICANCE:
             parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")
@@ -68,6 +70,12 @@ def _sample(report: Report) -> str:
             f"{holes} planned cells have no score (details.md says why); a method that lacks one is not ranked."
         )
     return " ".join(parts)
+
+
+def _dataset(report: Report) -> str:
+    """Of which dataset the targets are, where they come from one."""
+    names = {record["cell"].get("dataset", "") for record in report.records} - {""}
+    return f", of the dataset {words(sorted(names))}" if names else ""
 
 
 def _displays(report: Report) -> Iterator[str]:

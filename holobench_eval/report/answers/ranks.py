@@ -58,9 +58,9 @@ def _turning(each: Ranks) -> str:
     still = len(each.pairs) - len(turning)
     groups = [list(group) for _, group in itertools.groupby(turning, lambda pair: (pair.flips, pair.first))]
     named = [
-        f"{group[0].first} over {words([pair.second for pair in group])} ({percent(group[0].flipped)} % of draws"
-        f"{' each' * (len(group) > 1)}, nominally {_nominal(each, group)}"
-        f"{', in which that display is not typical of its draws' * (2 * group[0].flips > len(each.used))})"
+        f"on {each.swept.before} {group[0].first} is above {words([pair.second for pair in group])} by "
+        f"{_nominal(each, group)}, and below {'each ' * (len(group) > 1)}in {percent(group[0].flipped)} % of draws"
+        f"{', so that this display is the exception' * (2 * group[0].flips > len(each.used))}"
         for group in groups[:CLOSEST]
     ]
     most = f"; most often reversed: {'; '.join(named)}" if named else ""
@@ -70,7 +70,7 @@ def _turning(each: Ranks) -> str:
 def _nominal(each: Ranks, group: Sequence[Pair]) -> str:
     """The lead of the first of each pair before any draw, or its range."""
     ends = [extreme(pair.nominal for pair in group) for extreme in (min, max)]
-    return " to ".join(dict.fromkeys(each.results.headline.with_unit(end, signed=True) for end in ends))
+    return " to ".join(dict.fromkeys(each.results.headline.with_unit(end) for end in ends))
 
 
 def _cause(each: Ranks) -> Iterator[str]:

@@ -25,6 +25,7 @@ def sentences(results: Results) -> Iterator[str]:
         same = [sweep for sweep in found if sweep.swept.kind == kind]
         if kind == "refocus":
             yield from _range(results, same)
+            yield from _blind(results, [sweep for sweep in found if sweep.swept.kind == "other_plane"])
         if kind in OWN and results.layout.baseline:
             yield from _worst(results, same, results.layout.baseline)
         for remedy in REMEDIES.get(kind, ()):
@@ -58,17 +59,31 @@ def _worst(results: Results, found: list[Sweep], label: str) -> Iterator[str]:
         here = [sweep for sweep in found if sweep.swept.before == before and label in sweep.methods]
         losses = [(loss, sweep, value) for sweep in here if (worst := sweep.worst(label)) for value, loss in [worst]]
         if losses:
-            loss, sweep, value = max(losses, key=lambda entry: entry[0].mean)
-            above = sum(any(one.low > SMALL for one in sweep.losses(label).values()) for sweep in here)
-            many = f", and {above} of {len(losses)} kinds of change have a loss whose interval is above {SMALL:g} dB"
+            losses.sort(key=lambda entry: -entry[0].mean)
+            loss, sweep, value = losses[0]
+            many = _others(results, losses)
             known, points = sum(len(sweep.losses(label)) for sweep in here), sum(len(s.swept.points) for s in here)
             parts.append(
                 f"on {before} {difference(score, loss)} ({sweep.kind.words}, {value_text(sweep, value)})"
-                f"{many if score.unit == 'dB' and len(losses) > 1 else ''}"
+                f"{many if len(losses) > 1 else ''}"
                 f"{f', of the {known} of {points} changes that have every score' if known < points else ''}"
             )
     if parts:
         yield f"The largest mean loss of {label} is {'; '.join(parts)}."
+
+
+def _others(results: Results, losses: list[tuple[Estimate, Sweep, float | str]]) -> str:
+    """The losses after the largest, and which kinds of change are shown to cost more than a little."""
+    score = results.headline
+    rest = [f"{sweep.kind.words} {difference(score, loss)}" for loss, sweep, _ in losses[1:][:MOST]]
+    less = f", at most as much for {len(losses) - 1 - MOST} more kinds" if len(losses) - 1 > MOST else ""
+    text = f", then {', '.join(rest)}{less}"
+    if score.unit != "dB":
+        return text
+    shown = [sweep.kind.words for loss, sweep, _ in losses if loss.low > SMALL]
+    open_ = [sweep.kind.words for loss, sweep, _ in losses if loss.low <= SMALL < loss.high]
+    text += f"; shown to cost more than {SMALL:g} dB: {words(shown) if shown else 'none'}"
+    return f"{text}; not excluded: {words(open_)}" if open_ else text
 
 
 def _leads(results: Results, found: list[Sweep]) -> Iterator[str]:
@@ -124,6 +139,20 @@ def _range(results: Results, same: list[Sweep]) -> Iterator[str]:
         )
 
 
+def _blind(results: Results, planes: list[Sweep]) -> Iterator[str]:
+    """Displays on which a camera out of the image plane, without a lens, costs the baseline little."""
+    baseline, parts = str(results.layout.baseline), []
+    for sweep in planes:
+        if baseline in sweep.methods and (worst := sweep.worst(baseline)) and worst[1].high < SMALL:
+            loss = f"{difference(results.headline, worst[1])} at {value_text(sweep, worst[0])}"
+            parts.append(f"{sweep.swept.before} ({loss})")
+    if parts:
+        yield (
+            f"On {words(parts)} a camera out of the image plane, without a lens, costs {baseline} as little, so that "
+            "the range there says nothing of a lens."
+        )
+
+
 def _recovered(results: Results, same: list[Sweep], remedies: list[Sweep]) -> Iterator[str]:
     """What share of a loss a remedy gets back, from the worst to the best value."""
     parts, baseline = [], str(results.layout.baseline)
@@ -134,7 +163,9 @@ def _recovered(results: Results, same: list[Sweep], remedies: list[Sweep]) -> It
                 if shares:
                     each = [f"{percent(share)} % at {value}" for value, share in (shares[0], shares[-1])]
                     parts.append(f"on {sweep.swept.before} {' up to '.join(dict.fromkeys(each))}")
-    if parts:
+                else:
+                    parts.append(f"none is told on {sweep.swept.before}, where no loss is clear and above {SMALL:g} dB")
+    if any(not part.startswith("none") for part in parts):
         yield f"Of the loss of {baseline}, this share is recovered ({remedies[0].kind.words}): {'; '.join(parts)}."
 
 

@@ -118,7 +118,7 @@ KINDS: Mapping[str, Kind] = {
         low=0, high=3650, moves=True, per=30,
     ),
     "sensor": Kind(
-        "camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)), camera.SENSOR_MODEL,
+        "another camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)), camera.SENSOR_MODEL,
         nominal=None, moves=True,
     ),
     "distance": Kind(

@@ -70,7 +70,7 @@ def test_names_are_explained_where_the_answer_has_them(page: str) -> None:
 def test_the_limits_name_sample_holes_display_inverse_crime_tuning_and_oracle(page: str) -> None:
     limits = page.partition("### Limits")[2].partition("\n## ")[0]
     for phrase in (
-        "- **Sample.** 3 targets; brackets hold 95 % intervals",
+        "- **Sample.** 3 targets, of the dataset photographs; brackets hold 95 % intervals",
         "With 3 clusters no p can be below 0.25: no difference can be shown.",
         "1 planned cells have no score",
         "- **Display leto-aged.** Simulated; x was fitted to published PSNR.",
