@@ -118,8 +118,8 @@ KINDS: Mapping[str, Kind] = {
         low=0, high=3650, moves=True, per=30,
     ),
     "sensor": Kind(
-        "another camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)), camera.SENSOR_MODEL,
-        nominal=None, moves=True,
+        "another camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)),
+        camera.SENSOR_MODEL, nominal=None, moves=True,
     ),
     "distance": Kind(
         "error of the propagation distance", "%", ("propagation",), number(_distance),
