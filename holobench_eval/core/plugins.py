@@ -71,6 +71,11 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
         raise UserError(f"{kind[:-1]} '{name}' cannot be imported: {error}") from error
 
 
+def is_shipped(kind: Kind, name: str, folder: Path | None = None) -> bool:
+    """Whether a plug-in's code is that of this package. UserError as `find`."""
+    return not _is_file(name) and find(kind, name, folder).__module__.startswith(f"{__package__.partition('.')[0]}.")
+
+
 def _is_file(name: str) -> bool:
     return ".py:" in name
 

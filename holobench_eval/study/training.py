@@ -25,6 +25,7 @@ from . import opening
 from .artifacts import LOG, RECORDS, Artifacts, provenance_of
 from .displays import Preparation
 from .plan import Plan
+from .scoring.reference import guarded
 from .versions import HARNESS, method_version
 
 WAITS = "waits for photographs"  # in place of the reason of a failure
@@ -72,7 +73,8 @@ def _train(preparation: Preparation, artifacts: Artifacts, threads: int, device:
         preparation.captures,
         preparation.seed,
     )
-    state = method.prepare(bench)
+    with guarded(preparation.method, preparation.folder, preparation.display, preparation.seed):
+        state = method.prepare(bench)
     if not isinstance(state, Mapping):
         raise CellError(f"{preparation.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
     state = moved(state, CPU)

@@ -16,7 +16,7 @@ from torch import Tensor
 from holobench_eval.core.seeds import generator
 from holobench_eval.display import CalibratedBench, MeteredDisplay, load_profile
 from holobench_eval.study import opening
-from holobench_eval.study.scoring import picture
+from holobench_eval.study.scoring import picture, reference
 from holobench_eval.study.scoring.cell import work
 from holobench_eval.study.scoring.job import Job
 from holobench_eval.study.store import Record
@@ -195,6 +195,7 @@ def fake_score(image: Tensor, target: Tensor, **_: Any) -> dict[str, float]:
 FAKES: tuple[tuple[types.ModuleType, str, Any], ...] = (
     (opening, "open_display", fake_display),
     (picture, "score", fake_score),
+    (reference, "digits", lambda display, seed: {}),
 )
 """Where the machinery calls the physics, and what stands there instead."""
 

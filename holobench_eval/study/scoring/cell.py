@@ -14,6 +14,7 @@ from ..plan import Cell
 from ..store import Record
 from . import error_budget, focus, picture, prediction
 from .job import Job, Measure, Measured
+from .reference import guarded
 
 MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
     "picture": picture.picture,
@@ -36,7 +37,7 @@ def work(job: Job) -> list[Record]:
     """
     with repeatable(job.setting.threads, job.device):
         try:
-            measured = (FLOORS if job.task.is_floor else MEASURES)[job.task.cells[0].measure](job)
+            measured = _measured(job)
         except StopError:
             raise
         except Pending:
@@ -45,6 +46,14 @@ def work(job: Job) -> list[Record]:
             return [_note_failure(job, cell, error) for cell, _ in job.cells]
         records = [_recorded(job, cell, display, measured) for cell, display in job.cells]
         return [record for record in records if record is not None]
+
+
+def _measured(job: Job) -> Measured:
+    first = job.task.cells[0]
+    if job.task.is_floor:
+        return FLOORS[first.measure](job)
+    with guarded(first.method, job.setting.folder, job.task.conditions[0], first.seed):
+        return MEASURES[first.measure](job)
 
 
 def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> Record | None:

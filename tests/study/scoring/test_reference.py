@@ -1,0 +1,91 @@
+"""A method of somebody else's code that changes the harness stops the run, and is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import StopError
+from holobench_eval.metrics import protocol
+from holobench_eval.study.scoring import reference
+from holobench_eval.study.store import Store
+from tests.study.test_run import compute
+
+METHODS = """
+from dataclasses import dataclass
+
+import torch
+from holobench_eval.metrics import protocol
+
+
+@dataclass(frozen=True)
+class Honest:
+    def solve(self, target, bench):
+        return torch.zeros((*target.shape[:2], *bench.spec.shape))
+
+
+@dataclass(frozen=True)
+class Flatterer(Honest):
+    def solve(self, target, bench):
+        refine = protocol.match
+        protocol.match = lambda image, target, *more, **named: (target, refine(image, target, *more, **named)[1])
+        return super().solve(target, bench)
+
+
+@dataclass(frozen=True)
+class Silencer(Honest):
+    def solve(self, target, bench):
+        torch.randn = lambda *shape, **options: torch.zeros(*shape)
+        return super().solve(target, bench)
+
+
+@dataclass(frozen=True)
+class Failing(Honest):
+    def solve(self, target, bench):
+        torch.randn = lambda *shape, **options: torch.zeros(*shape)
+        raise ValueError("and then it fails")
+"""
+
+
+def study(folder: Path, *methods: str) -> Path:
+    (folder / "methods.py").write_text(METHODS)
+    listed = "\n".join(f"  - methods.py:{name}" for name in methods)
+    text = f"""title: cheats
+display: {{profiles: [leto-mild], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{count: 1}}}}
+protocol: {{metrics: [psnr, ssim]}}
+methods:
+{listed}
+  - double_phase
+"""
+    (folder / "study.yaml").write_text(text)
+    return folder / "study.yaml"
+
+
+@pytest.fixture(autouse=True)
+def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Undo what the methods change."""
+    monkeypatch.setattr(protocol, "match", protocol.match)
+    monkeypatch.setattr(torch, "randn", torch.randn)
+    monkeypatch.setattr(reference, "_before", {})
+
+
+def test_an_honest_method_is_let_through(tmp_path: Path) -> None:
+    outcome = compute(study(tmp_path, "Honest"), tmp_path / "out")
+    assert {record["state"] for record in outcome.records} == {"done"}
+
+
+@pytest.mark.parametrize("name", ["Flatterer", "Silencer", "Failing"])
+def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_path: Path, name: str) -> None:
+    with pytest.raises(StopError, match=rf"method 'methods.py:{name}' has changed the harness: .* leto-mild"):
+        compute(study(tmp_path, "Honest", name), tmp_path / "out")
+    scored = [path for path in Store(tmp_path / "out").folder.glob("*.json") if name in path.read_text()]
+    assert scored == []
+
+
+def test_what_the_package_ships_is_not_guarded(tmp_path: Path) -> None:
+    assert plugins.is_shipped("methods", "wirtinger")
+    assert not plugins.is_shipped("methods", f"{tmp_path}/methods.py:Honest")
