@@ -131,18 +131,18 @@ def _refuse_short_png(image: Image.Image, content: bytes, name: str) -> None:
     samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(content[25], 0)  # by colour type: specification, section 11.2.1
     row = 1 + (image.width * content[24] * samples + 7) // 8
     interlaced = content[28] != 0  # rows of other lengths, which no camera and no renderer writes
-    if not interlaced and _inflated(content) < image.height * row:
+    if not interlaced and _inflated(content, image.height * row) < image.height * row:
         raise UserError(f"{name}: truncated or damaged: rows of the PNG are missing; {RIGHT}")
 
 
-def _inflated(content: bytes) -> int:
-    """Bytes of a PNG's pixels once decompressed; those up to a fault."""
+def _inflated(content: bytes, most: int) -> int:
+    """Bytes of a PNG's pixels once decompressed; those up to a fault, and not many more than ``most``."""
     stream, size, at = zlib.decompressobj(), 0, 8
-    while at + 8 <= len(content):
+    while at + 8 <= len(content) and size < most:
         length, kind = int.from_bytes(content[at : at + 4], "big"), content[at + 4 : at + 8]
         rest = content[at + 8 : at + 8 + length] if kind == b"IDAT" else b""
         try:
-            while rest:
+            while rest and size < most:
                 size += len(stream.decompress(rest, 1 << 20))
                 rest = stream.unconsumed_tail
         except zlib.error:

@@ -37,6 +37,12 @@ class Pending(BaseException):
     """
 
 
+def reason(error: BaseException) -> str:
+    """What failed, in one line of at most 300 characters that any file can hold."""
+    text = f"{type(error).__name__}: {error}".encode("utf-8", "backslashreplace").decode()  # names of files
+    return " ".join(text.split())[:300]
+
+
 def suggest(word: str, allowed: Iterable[str]) -> str:
     """``"did you mean 'x'? "`` for a near miss, then the allowed words; for the end of an error line."""
     words = sorted(allowed)

@@ -19,7 +19,7 @@ from typing import Any
 
 import torch
 
-from ..core.errors import UserError
+from ..core.errors import UserError, reason
 from ..core.hashing import digest
 from ..core.io import TEMPORARY, file_name, write_atomically
 from .displays import Preparation
@@ -88,10 +88,10 @@ class Artifacts:
 
     def fail(self, preparation: Preparation, error: BaseException) -> str:
         """Write down the traceback of a failed training and return the reason in one line."""
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-        trace = "".join(traceback.format_exception(error))
-        write_atomically(self.folder_of(preparation) / FAILURE, f"{reason}\n\n{trace}".encode())
-        return reason
+        line = reason(error)
+        text = "\n\n".join([line, "".join(traceback.format_exception(error))])
+        write_atomically(self.folder_of(preparation) / FAILURE, text.encode("utf-8", "backslashreplace"))
+        return line
 
     def has_failed(self, preparation: Preparation) -> bool:
         """Whether the last attempt to make the artifact failed."""

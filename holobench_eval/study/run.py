@@ -13,6 +13,7 @@ from typing import Any, Protocol
 from ..core import plugins
 from ..core.device import find, gpu_name
 from ..core.errors import StopError, UserError
+from ..core.errors import reason as one_line
 from ..core.hashing import canonical
 from ..metrics import catalogue
 from . import cost, provenance
@@ -389,5 +390,5 @@ def _reason(name: str, params: dict[str, Any], folder: Path) -> str | None:
     try:
         reason: str | None = ask()
     except Exception as error:  # a stranger's code
-        return " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        return one_line(error)
     return reason

@@ -98,12 +98,17 @@ class Store:
         return self.folder / f"target-{file_name(target)}.png"
 
     def write(self, record: Record) -> None:
-        """Write a record atomically. A failure never replaces a score: that cell was only to be timed again."""
+        """Write a record atomically. A failure never replaces a score: that cell was only to be timed again.
+
+        UserError for what `read` would refuse.
+        """
         if record.state == "failed" and (earlier := self.read(record.id)) is not None and earlier.state == "done":
             return
         content = {**vars(record), "schema": SCHEMA}
+        path = self.path(record.id)
         text = json.dumps({**content, "sha256": digest(content)}, indent=1, sort_keys=True, allow_nan=False)
-        write_atomically(self.path(record.id), f"{text}\n".encode())
+        _checked(path, record.id, json.loads(text) if len(text) < MOST_BYTES else None)
+        write_atomically(path, f"{text}\n".encode())
 
     def read(self, identity: str) -> Record | None:
         """The record of a cell, None if there is none. UserError for a file that is not that record."""
@@ -192,7 +197,7 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
     if not isinstance(content, dict):
         raise UserError(f"{path}: not a record; {AGAIN}")
     schema, stated = content.get("schema", 1), content.pop("sha256", None)
-    if schema not in (1, SCHEMA):
+    if type(schema) is not int or schema not in (1, SCHEMA):
         raise UserError(f"{path}: a record of schema {schema!r}, and this version reads up to {SCHEMA}; {AGAIN}")
     if schema == SCHEMA and stated != digest(content):
         raise UserError(f"{path}: the record is not as it was written, its digest is another; {AGAIN}")

@@ -14,7 +14,7 @@ import torch
 from .. import __version__
 from ..core import plugins
 from ..core.device import CPU, find, gpu_name, moved, repeatable
-from ..core.errors import CellError, Pending, StopError
+from ..core.errors import CellError, Pending, StopError, reason
 from ..core.io import now, write_atomically
 from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
@@ -109,7 +109,7 @@ def diagnosis(method: object, state: Mapping[str, Any], display_bench: Calibrate
                 effect.text for effect in display_bench.bench.profile.effects() if effect.name not in form
             ]
     except Exception as error:  # must not cost what was learned
-        findings["diagnosis_failed"] = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        findings["diagnosis_failed"] = reason(error)
     return findings
 
 

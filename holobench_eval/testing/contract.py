@@ -12,6 +12,7 @@ from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
 from ..display import CalibratedBench, MeteredDisplay, load_profile
+from ..display.api import is_plain
 from ..study.opening import open_bench
 from ..study.versions import method_version
 
@@ -77,7 +78,7 @@ def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, camera:
     name, before = type(method).__name__, target.clone()
     shape = (*target.shape[:2], *bench.spec.shape)
     phase, handle = _solve(method, bench, target)
-    assert isinstance(phase, Tensor), f"{name}.solve returned {type(phase).__name__}, not a tensor"
+    assert is_plain(phase), f"{name}.solve returned {type(phase).__name__}, not a plain torch.Tensor"
     assert tuple(phase.shape) == shape, f"{name}.solve returned {tuple(phase.shape)} for {shape}"
     assert phase.is_floating_point(), f"{name}.solve returned {phase.dtype}, not a phase in radians"
     assert bool(phase.isfinite().all()), f"{name}.solve returned a phase with NaN or infinite values"

@@ -117,6 +117,12 @@ def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path: Path, executor: E
     assert {record["state"] for record in compute(config, output, executor=executor).records} == {"done"}
 
 
+def test_a_reason_that_is_no_unicode_is_kept_as_text(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Nameless"}',), count=1)
+    assert compute(config, tmp_path / "out").records[-1]["reason"] == r"ValueError: \udcff.png"
+    assert compute(config, tmp_path / "out").computed == 0
+
+
 def test_failed_cells_run_again_only_when_asked(tmp_path: Path) -> None:
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no"}}',))
     compute(config, tmp_path / "out")

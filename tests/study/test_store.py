@@ -59,6 +59,7 @@ def corrupt(text: str) -> dict[str, str]:
         "without a digest": json.dumps({key: value for key, value in content.items() if key != "sha256"}),
         "later": edited(schema=3),
         "schema": edited(schema="2"),
+        "schema of another kind": edited(schema=True),
         "moved": edited(cell={**content["cell"], "repeat": 9}),
         "state": edited(state="fine"),
         "huge": json.dumps({**earlier, "captures": 10**400}),
@@ -77,6 +78,7 @@ def corrupt(text: str) -> dict[str, str]:
 
 FAULTS = [
     *("truncated", "empty", "list", "foreign", "nested", "long", "edited", "without a digest", "later", "schema"),
+    "schema of another kind",
     *("moved", "state", "huge", "negative", "part of a capture", "back in time", "more than all", "infinite", "score"),
     *("truth", "label", "learned", "alone"),
 ]
@@ -129,6 +131,13 @@ def test_records_of_other_studies_are_left_alone(tmp_path: Path, grid: Plan) -> 
 def test_a_score_that_json_cannot_hold_is_not_written(tmp_path: Path, grid: Plan) -> None:
     with pytest.raises(UserError, match="finite numbers"):
         Store(tmp_path).write(record_of(grid, scores={"psnr_linear": float("inf")}))
+    assert not list(Store(tmp_path).folder.glob("*.json"))
+
+
+@pytest.mark.parametrize("wrong", [{"captures": 3.0}, {"memory_mib": -1.0}, {"reason": "x" * 2_000_000}])
+def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, grid: Plan, wrong: dict[str, Any]) -> None:
+    with pytest.raises(UserError, match="delete the file"):
+        Store(tmp_path).write(record_of(grid, **wrong))
     assert not list(Store(tmp_path).folder.glob("*.json"))
 
 

@@ -74,6 +74,12 @@ class Toy:
         return torch.full(shape, self.value) + 0.01 * torch.rand(shape, generator=bench.generator("toy"))
 
 
+@dataclass(frozen=True)
+class Nameless(Toy):
+    def solve(self, target, bench):
+        raise ValueError(chr(0xDCFF) + ".png")
+
+
 class Target(torch.Tensor):
     """Would answer the display's own questions with the target."""
 

@@ -36,16 +36,16 @@ class Kind:
         if len(found) <= MOST_SENTENCES:
             return found
         kept = found[: MOST_SENTENCES - 1]
-        return [*kept, f"Of {len(found) - len(kept)} more findings, the first section of details.md has the sentences."]
+        return [*kept, f"{len(found) - len(kept)} more findings are in the first section of details.md."]
 
     def whole_answer(self, results: Results) -> list[str]:
         """All sentences of the answer."""
         if not results.conditions or results.done.empty:
             return ["No cell of the study has a score, so there is no answer."]
         found = [sentence for sentence in self.sentences(results) if sentence]
-        untold = [label for label in subjects(results) if not any(label in sentence for sentence in found)]
-        if untold:
-            found.append(f"Nothing is said of {words(untold)}: a score is missing, of a target or of the baseline.")
+        told = _mentioned(results.layout.methods, " ".join(found))
+        if untold := [label for label in subjects(results) if label not in told]:
+            found[:0] = [f"Nothing is said of {words(untold)}: a score is missing, of a target or of the baseline."]
         return found or ["Too many scores are missing for an answer."]
 
 

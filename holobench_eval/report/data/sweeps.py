@@ -121,7 +121,8 @@ class Sweep:
         return crossings
 
     def small_range(self, label: str) -> tuple[float, float] | None:
-        """The values around the nominal one up to which the mean changes by at most ``SMALL``; None without numbers."""
+        """The values around the nominal one up to which the mean changes by at most ``SMALL``; None without numbers,
+        and where the next value has no score."""
         if self.kind.nominal is None:
             return None
         losses = self.losses(label)
@@ -131,22 +132,23 @@ class Sweep:
             for value, condition in sorted(self.swept.points, key=lambda point: abs(float(point[0]))):
                 away = side * (float(value) - self.kind.nominal)
                 if away > 0:
-                    if condition not in losses or abs(losses[condition].mean) > SMALL:
+                    if condition not in losses:
+                        return None
+                    if abs(losses[condition].mean) > SMALL:
                         break
                     reach = away
             ends.append(self.kind.nominal + side * reach)
         return ends[0], ends[1]
 
     def small_range_text(self, label: str) -> str | None:
-        """``small_range`` with its unit; ``at least`` where nothing larger was tested, ``nowhere`` for no change."""
+        """``small_range`` with its unit: ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``."""
         if (ends := self.small_range(label)) is None:
             return None
         if ends[0] == ends[1]:
             return "nowhere"
         tested = [float(value) for value, _ in self.swept.points]
-        low, high = (
-            f"{'at least ' * (end == extreme(tested))}{end:g}" for end, extreme in zip(ends, (min, max), strict=True)
-        )
+        low = f"{ends[0]:g}{' or less' * (ends[0] == min(tested))}"
+        high = f"{ends[1]:g}{' or more' * (ends[1] == max(tested))}"
         return f"{low} to {high} {self.kind.unit}".strip()
 
     def recovered(self, label: str, remedy: Sweep) -> dict[str, Estimate]:

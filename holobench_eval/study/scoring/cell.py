@@ -77,5 +77,7 @@ def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> R
 def _note_failure(job: Job, cell: Cell, error: BaseException) -> Record:
     record = job.failed(cell, error)
     job.store.write(record)
-    write_atomically(job.store.log(cell.id), "".join(traceback.format_exception(error)).encode())
+    write_atomically(
+        job.store.log(cell.id), "".join(traceback.format_exception(error)).encode("utf-8", "backslashreplace")
+    )
     return record

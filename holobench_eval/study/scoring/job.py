@@ -14,7 +14,7 @@ from torch import Tensor
 
 from ...core import plugins
 from ...core.device import find, gpu_name, moved
-from ...core.errors import CellError, Pending
+from ...core.errors import CellError, Pending, reason
 from ...core.hashing import canonical
 from ...display import CalibratedBench
 from ...display.learned import LearnedBench
@@ -93,9 +93,8 @@ class Job:
 
     def failed(self, cell: Cell, error: BaseException) -> Record:
         """The record of a cell that has no score, with the reason in one line."""
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         label = cell.method if self.task.is_floor else self.task.label
-        return Record(cell.description(), "failed", label, reason)
+        return Record(cell.description(), "failed", label, reason(error))
 
     def method(self, name: str, params: Any) -> Any:
         """An instance of a method, built anew: no cell may depend on those computed before."""

@@ -229,7 +229,7 @@ def test_refocusing_says_how_far_a_lens_moves_the_picture() -> None:
     means |= {f"{label}@{name}": 20.0 - loss[label] * abs(value) for label in loss for value, name in points}
     found = results_of(means, sweeps=(Swept("refocus", "bench", points),))
     first, second = kind_of(found).answer(found)
-    assert "at most 1 dB, from and to: on bench at least -2 to at least 2 mm (old) and nowhere (new)." in first
+    assert "at most 1 dB, from and to: on bench -2 or less to 2 or more mm (old) and nowhere (new)." in first
     assert "The largest mean loss of old is on bench +0.60 dB [+0.60, +0.60] (image moved by a lens phase" in second
 
 
@@ -293,7 +293,7 @@ def test_a_long_answer_says_where_the_rest_of_it_stands() -> None:
     found = results_of({"old": 20.0})
     assert kind.answer(found) == [
         *(f"Finding {number} of old." for number in range(4)),
-        "Of 3 more findings, the first section of details.md has the sentences.",
+        "3 more findings are in the first section of details.md.",
     ]
     assert len(kind.whole_answer(found)) == 7
 
