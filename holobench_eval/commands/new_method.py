@@ -21,7 +21,10 @@ def new_method(
 ) -> None:
     """Write a method that works, to be changed, and its test."""
     method, test, source = write_method(name, folder)
-    print(f"{method}\n{test}\nnext: pytest {test} (pip install pytest brings it); name it in a config as '{source}'")
+    print(
+        f"{method}\n{test}\nnext: pytest {test} (in a clone of holobench_eval, after pip install -e '.[dev]'); "
+        f"name it in a config as '{source}'"
+    )
 
 
 def write_method(name: str, folder: Path) -> tuple[Path, Path, str]:

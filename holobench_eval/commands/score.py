@@ -40,7 +40,10 @@ def score(
     console = open_console()
     report, results = score_folders(captures, targets, output, values, baseline, weights, console)
     print_headline(console, results)
-    print(f"{report}\n{output / 'table.csv'}\n{output / 'records.csv'}")
+    for hole in results.holes.to_dict("records"):
+        text = f"{hole['state']}: {hole['method']} · {hole['target']}: {hole['reason']}"
+        console.print(text, style="red", markup=False, highlight=False, soft_wrap=True)
+    print(f"{report}\n{output / 'report.html'}\n{output / 'table.csv'}\n{output / 'records.csv'}")
     raise typer.Exit(1 if len(results.holes) else 0)
 
 

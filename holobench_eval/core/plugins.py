@@ -63,6 +63,8 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
     if _is_file(name):
         return _from_file(kind, name, folder)
     entries = _entries(kind)
+    if name.endswith(".py"):
+        raise UserError(f"{kind[:-1]} '{name}': a file without its class; expected {name}:Class")
     if name not in entries:
         raise UserError(f"unknown {kind[:-1]} '{name}'; {suggest(name, entries)}, or path/to/file.py:Class")
     try:

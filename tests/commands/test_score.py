@@ -13,9 +13,11 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
+import typer
 from PIL import Image
 from rich.console import Console
 
+from holobench_eval.commands.score import score as command
 from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.imaging.align import Alignment
@@ -181,6 +183,15 @@ def test_a_capture_of_another_picture_and_a_lacking_one_are_holes(pictures, quic
     holes = cells[cells["state"] != "done"]
     assert sorted(holes["state"]) == ["failed", "missing"]
     assert holes["psnr_stored_db"].isna().all()
+
+
+def test_what_has_no_score_is_told_on_the_terminal_with_its_reason(pictures, quick, capsys):
+    (pictures / "captures" / "clean" / "astronaut.png").unlink()
+    with pytest.raises(typer.Exit) as left:
+        command(pictures / "captures", pictures / "targets", pictures / "out")
+    assert left.value.exit_code == 1
+    text = capsys.readouterr()
+    assert "missing: clean · astronaut: no capture of 'astronaut' in the folder of clean" in text.out + text.err
 
 
 def test_gray_and_colour_do_not_mix_and_gray_alone_is_scored(pictures, quick):

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core import plugins
+from holobench_eval.core.errors import UserError
 
 METHOD = """
 import dataclasses
@@ -99,3 +100,8 @@ def test_parameters_may_be_lists_and_init_variables_beside_annotations_for_types
     (tmp_path / "mine.py").write_text(ABOUT_ITSELF)
     method = plugins.build("methods", "mine.py:Mine", {"steps": [1, 2], "start": 5}, tmp_path)
     assert (method.steps, method.begun) == ((1, 2), 5)
+
+
+def test_a_file_without_its_class_is_told_what_is_missing() -> None:
+    with pytest.raises(UserError, match=r"method 'mine\.py': a file without its class; expected mine\.py:Class"):
+        plugins.find("methods", "mine.py")

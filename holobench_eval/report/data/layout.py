@@ -226,7 +226,7 @@ def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
     methods = {
         entry.label: (inspect.getdoc(plugins.find("methods", entry.name, study.folder)) or "").partition("\n\n")[0]
         for entry in study.methods
-        if entry.label == entry.name
+        if entry.label == entry.name.rpartition(":")[2]
     }
     profiles = {
         condition.name: load_profile(source, study.folder).description
