@@ -56,7 +56,8 @@ def _first(each: Ranks) -> str:
 def _turning(each: Ranks) -> str:
     turning = sorted((pair for pair in each.pairs if pair.flips), key=lambda pair: (-pair.flips, pair.first))
     still = len(each.pairs) - len(turning)
-    groups = [list(group) for _, group in itertools.groupby(turning, lambda pair: (pair.flips, pair.first))]
+    apart = [pair for pair in turning if _is_apart(each, pair)]
+    groups = [list(group) for _, group in itertools.groupby(apart, lambda pair: (pair.flips, pair.first))]
     named = [
         f"on {each.swept.before} {group[0].first} is above {words([pair.second for pair in group])} by "
         f"{_nominal(each, group)}, and below {'each ' * (len(group) > 1)}in {percent(group[0].flipped)} % of draws"
@@ -67,6 +68,12 @@ def _turning(each: Ranks) -> str:
     return f"{still} of {len(each.pairs)} pairs of methods keep their order in every draw{most}."
 
 
+def _is_apart(each: Ranks, pair: Pair) -> bool:
+    """Whether two methods differ at all on the display itself, to the digits of the score."""
+    number = each.results.headline.number
+    return number(abs(pair.nominal)) != number(0.0)
+
+
 def _nominal(each: Ranks, group: Sequence[Pair]) -> str:
     """The lead of the first of each pair before any draw, or its range."""
     ends = [extreme(pair.nominal for pair in group) for extreme in (min, max)]
@@ -75,7 +82,7 @@ def _nominal(each: Ranks, group: Sequence[Pair]) -> str:
 
 def _cause(each: Ranks) -> Iterator[str]:
     groups: dict[str, list[tuple[str, Cause]]] = {}
-    for pair in sorted((pair for pair in each.pairs if pair.cause), key=lambda pair: -pair.flips):
+    for pair in sorted((pair for pair in each.pairs if _is_apart(each, pair)), key=lambda pair: -pair.flips):
         if cause := pair.cause:
             gains, loses = (pair.first, pair.second) if cause.correlation > 0 else (pair.second, pair.first)
             form = "" if cause.feature.form == "value" else f" ({cause.feature.form})"
