@@ -27,7 +27,7 @@ OF_NUMBERS = ("quality-*.png", "training-*.png")
 STAGES = "stages-*.png"
 REPORT, DETAILS = "report.md", "details.md"
 
-_FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
+FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
 
 
 def build_report(
@@ -76,7 +76,7 @@ def _kept(output: Path) -> dict[str, Markdown]:
     texts = [path.read_text(encoding="utf-8") for name in (REPORT, DETAILS) if (path := output / name).is_file()]
     return {
         name: Markdown(caption)
-        for name, caption in _FIGURE.findall("\n".join(texts))
+        for name, caption in FIGURE.findall("\n".join(texts))
         if any(fnmatch(name, pattern) for pattern in OF_PICTURES) and (output / "figures" / name).is_file()
     }
 

@@ -160,7 +160,7 @@ def test_older_versions_are_left_out_until_they_are_asked_for(
     from holobench_eval.report.site import write_site
     from tests.support.results_folder import write_results
 
-    write_site([write_results(tmp_path / "old", study, known={"harness": "3"})], tmp_path / "site")
+    write_site([write_results(tmp_path / "old", study, known={"harness": "3"})], tmp_path / "site", tmp_path)
     page = browser.new_page()
     reader = Reader(page, tmp_path / "site").open()
     assert reader.names() == []

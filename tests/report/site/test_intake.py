@@ -17,10 +17,12 @@ from tests.support.results_folder import edited, write_results
 
 from .conftest import LAB, Site
 
+OWN = Path("reports")
+
 
 def refused(folder: Path, *words: str) -> None:
     with pytest.raises(UserError) as error:
-        write_site([folder], folder.parent / "site")
+        write_site([folder], folder.parent / "site", OWN)
     text = str(error.value)
     assert "\n" not in text
     for word in words:
@@ -37,7 +39,7 @@ def told(folder: Path, **changes: Any) -> None:
 
 def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> None:
     (handed_in / "tests.csv").unlink()
-    assert write_site([handed_in], handed_in.parent / "site") == (1, [])
+    assert write_site([handed_in], handed_in.parent / "site", OWN) == (1, [])
     page = (handed_in.parent / "site" / "methods" / "hil.html").read_text()
     assert "Their lab" in page
     assert page.count("<figure>") == 2
@@ -185,7 +187,7 @@ def test_a_thumbnail_of_others_is_written_anew_pixel_for_pixel(handed_in: Path) 
     path = picture(handed_in)
     before = Image.open(path).convert("RGB").tobytes()
     path.write_bytes(path.read_bytes() + b"<script>alert(1)</script>")
-    found = pictures.thumbnails(read(handed_in))
+    found = pictures.thumbnails(read(handed_in, OWN))
     assert all(b"script" not in each.content for each in found)
     assert found[0].width == 32
     path.write_bytes(found[0].content)
@@ -197,13 +199,13 @@ def test_one_bad_folder_among_good_ones_stops_the_site(site: Site, tmp_path: Pat
     bad = write_results(tmp_path / "all" / "bad", study)
     (bad / "records.csv").unlink()
     with pytest.raises(UserError, match=r"bad/records.csv: missing"):
-        write_site([tmp_path / "all"], tmp_path / "site")
+        write_site([tmp_path / "all"], tmp_path / "site", tmp_path / "all")
 
 
 def test_a_folder_without_records_is_named(tmp_path: Path, study: list[dict[str, Any]]) -> None:
     write_results(tmp_path / "all" / "good", study)
     (tmp_path / "all" / "timings").mkdir()
-    assert write_site([tmp_path / "all"], tmp_path / "site") == (1, [tmp_path / "all" / "timings"])
+    assert write_site([tmp_path / "all"], tmp_path / "site", tmp_path / "all") == (1, [tmp_path / "all" / "timings"])
     assert "timings: no records.csv, left out" in (tmp_path / "site" / "index.html").read_text()
 
 
@@ -211,9 +213,9 @@ def test_an_output_that_is_no_site_or_overlaps_is_refused(site: Site, tmp_path: 
     (tmp_path / "kept.txt").write_text("mine")
     for output, word in ((tmp_path, "no site"), (site.own / "site", "overlaps"), (site.own.parent, "no site")):
         with pytest.raises(UserError, match=word):
-            write_site([site.own], output)
+            write_site([site.own], output, site.own)
     assert [path.name for path in tmp_path.iterdir()] == ["kept.txt"]
 
 
 def test_whose_result_it_is_stands_in_the_provenance(site: Site) -> None:
-    assert (read(site.own).by, read(site.other).by) == ("", LAB)
+    assert (read(site.own, site.own).by, read(site.other, site.own).by) == ("", LAB)

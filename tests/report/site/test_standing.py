@@ -9,18 +9,24 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.report.site.intake import read
+from holobench_eval.report.site.intake import Source, read
 from holobench_eval.report.site.standing import CURRENT, OLDER, UNRECORDED, Group, groups
 from tests.support.results_folder import write_results
 
 from .conftest import HOSTILE, OTHER, Site, of_others
+
+
+def taken(folder: Path) -> Source:
+    """A folder whose place makes it own, unless it says whose it is."""
+    return read(folder, folder)
+
 
 Records = list[dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
 def found(site: Site) -> list[Group]:
-    return groups([read(site.own), read(site.other)])
+    return groups([taken(site.own), taken(site.other)])
 
 
 def of(found: list[Group], display: str) -> Group:
@@ -31,7 +37,7 @@ def test_means_and_intervals_are_those_of_table_csv(site: Site) -> None:
     with (site.own / "table.csv").open(newline="") as file:
         expected = {(row["label"], row["condition"]): row for row in csv.DictReader(file)}
     compared = 0
-    for group in groups([read(site.own)]):
+    for group in groups([taken(site.own)]):
         for row in group.rows:
             line = expected[row.label, group.display.name]
             for value, name in (
@@ -49,7 +55,7 @@ def test_means_and_intervals_are_those_of_table_csv(site: Site) -> None:
 def test_differences_are_those_of_tests_csv(site: Site) -> None:
     with (site.own / "tests.csv").open(newline="") as file:
         expected = {(row["label"], row["condition"]): row for row in csv.DictReader(file)}
-    gains = [(row, group) for group in groups([read(site.own)]) for row in group.rows if row.gain]
+    gains = [(row, group) for group in groups([taken(site.own)]) for row in group.rows if row.gain]
     assert len(gains) == 9  # of 12 rows, without the baselines and the row with a hole
     for row, group in gains:
         assert row.gain is not None
@@ -115,7 +121,7 @@ def test_what_differs_in_anything_that_matters_is_another_group(
     if "cluster" in change:
         text = (other / "records.csv").read_text().replace(",astronaut,astronaut,", ",astronaut,coffee,")
         (other / "records.csv").write_text(text)
-    found = groups([read(site.own), read(other)])
+    found = groups([taken(site.own), taken(other)])
     assert len(found) == 4
     assert all(len({row.source.by for row in group.rows}) == 1 for group in found)
 
@@ -127,12 +133,12 @@ def test_a_floor_that_differs_by_rounding_alone_is_the_same_group(site: Site, st
         if record["scores"]
     ]
     other = write_results(tmp_path / "theirs", records, by="Lab")
-    assert len(groups([read(site.own), read(other)])) == 2
+    assert len(groups([taken(site.own), taken(other)])) == 2
 
 
 def test_the_very_same_cells_in_two_studies_are_one_row(site: Site, study: Records, tmp_path: Path) -> None:
     again = write_results(tmp_path / "again", study)
-    rows = of(groups([read(site.own), read(again)]), "ideal").rows
+    rows = of(groups([taken(site.own), taken(again)]), "ideal").rows
     assert len(rows) == 6
     assert all([source.name for source in row.also] == ["again"] for row in rows)
 
@@ -142,7 +148,7 @@ def test_a_profile_of_the_package_with_another_digest_is_a_display_of_its_own(
 ) -> None:
     known = {"profiles": {name: {"version": 1, "sha256": OTHER} for name in ("leto-aged", "ideal")}}
     other = write_results(tmp_path / "theirs", study, by="Lab", known=known)
-    titles = {group.display.title for group in groups([read(site.own), read(other)])}
+    titles = {group.display.title for group in groups([taken(site.own), taken(other)])}
     assert titles == {"leto-aged", "ideal", "leto-aged (other 22222222)", "ideal (other 22222222)"}
 
 
@@ -150,7 +156,7 @@ def test_versions_are_told_apart(study: Records, tmp_path: Path) -> None:
     versions = {}
     for name, harness in (("new", {}), ("old", {"harness": "3: of old"}), ("unknown", {"harness": ""})):
         folder = write_results(tmp_path / name, study, known=harness)
-        versions[name] = {group.version for group in groups([read(folder)])}
+        versions[name] = {group.version for group in groups([taken(folder)])}
     assert versions == {"new": {CURRENT}, "old": {OLDER}, "unknown": {UNRECORDED}}
 
 
@@ -171,7 +177,7 @@ def test_means_of_committed_reports_are_those_of_their_tables(name: str) -> None
     expected = {(line[label], line["condition"]): line[score] for line in lines if line["condition"] != "reference"}
     found = {
         (row.label, group.display.name): f"{row.score.mean:.6g}"
-        for group in groups([read(folder)])
+        for group in groups([taken(folder)])
         for row in group.rows
     }
     assert found == expected
