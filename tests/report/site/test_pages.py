@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from html.parser import HTMLParser
 from pathlib import Path
@@ -197,11 +198,30 @@ def test_no_parameter_of_a_profile_is_lost(name: str) -> None:
         assert {("panel", "pitch"), ("panel", "wavelengths"), ("panel", "distance")} <= keys
 
 
-@pytest.mark.parametrize("pair", [("HIL", "hil"), ("a/b", "a_b"), ("..", "."), ("é", "e"), ("x" * 200, "x" * 201)])
+@pytest.mark.parametrize(
+    "pair", [("HIL", "hil"), ("a/b", "a_b"), ("..", "."), ("é", "e"), ("x" * 200, "x" * 201), ("a b", slug("a b"))]
+)
 def test_no_two_names_share_a_file_on_any_file_system(pair: tuple[str, str]) -> None:
     first, second = map(slug, pair)
     assert first.lower() != second.lower()
     assert all("/" not in name and name.strip(".") for name in (first, second))
+
+
+@pytest.mark.parametrize("name", ["con", "nul", "COM1", "com1.x", "lpt9", "a.", ""])
+def test_no_name_is_that_of_a_device_or_ends_in_a_dot(name: str) -> None:
+    assert re.fullmatch(r"[a-z0-9_.]*-[0-9a-f]{8}", slug(name))
+    assert "." not in slug(name)
+
+
+def test_no_report_of_others_and_no_linked_report_is_named(tmp_path: Path, study: list[dict[str, Any]]) -> None:
+    other = write_results(tmp_path / "theirs", study, by="Lab")
+    (other / "report.html").write_text("<script>alert(1)</script>")
+    own = write_results(tmp_path / "ours", study)
+    (own / "report.html").symlink_to("/etc/hostname")
+    write_site([other, own], tmp_path / "site", tmp_path)
+    theirs, ours = (Elements(tmp_path / "site" / "studies" / f"{name}.html") for name in ("theirs", "ours"))
+    assert "report.html" not in theirs.text + ours.text
+    assert "ours/report.md" in ours.text
 
 
 def test_a_kind_that_is_told_is_taken_and_a_network_is_recognised_without(
