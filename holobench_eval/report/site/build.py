@@ -63,9 +63,9 @@ def _earlier(output: Path, found: Sequence[Path]) -> set[str]:
                 )
             if not path.is_dir():
                 present.add(name)
-    for folder in found:
-        if output.resolve().is_relative_to(folder.resolve()) or folder.resolve().is_relative_to(output.resolve()):
-            raise UserError(f"--output {output}: overlaps with {folder}; expected another folder")
+    for report in found:
+        if output.resolve().is_relative_to(report.resolve()) or report.resolve().is_relative_to(output.resolve()):
+            raise UserError(f"--output {output}: overlaps with {report}; expected another folder")
     return present - {MARK}
 
 

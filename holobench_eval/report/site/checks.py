@@ -56,9 +56,11 @@ def check_names(folder: Path, raw: pd.DataFrame) -> None:
                 raise UserError(f"{where} {name!r}: characters that cannot be seen; take them out")
             if (other := seen.setdefault(folded(name), name)) != name or name != name.strip():
                 raise UserError(f"{where} {name!r}: differs by case or space alone from {other.strip()!r}; use one")
-    count = raw["label" if "label" in raw else "method"].nunique() if {"label", "method"} & set(raw) else 0
-    if count > MOST_LABELS:
-        raise UserError(f"{folder / RECORDS}: {count} labels; expected at most {MOST_LABELS}")
+    label = next((name for name in ("label", "method") if name in raw), None)
+    count = raw[label].nunique() if label else 0
+    for number, most, what in ((len(raw), MOST_ROWS, "rows"), (count, MOST_LABELS, "labels")):
+        if number > most:
+            raise UserError(f"{folder / RECORDS}: {number} {what}; expected at most {most} in a study")
 
 
 def check_provenance(folder: Path, known: Mapping[str, Any], strict: bool) -> None:
