@@ -13,7 +13,7 @@ from ..data.tables import SECONDS_COLUMN
 from ..data.text import FILES
 from .html import joined, link, plain_number, quiet, slug, swatch
 from .intake import Source
-from .standing import OLDER, UNRECORDED, Group, Row
+from .standing import ANOTHER, UNRECORDED, Group, Row
 
 MEASURED = {
     "picture": "captures against targets",
@@ -94,7 +94,7 @@ def describe(group: Group, names: Names) -> Markup:
         f"harness {group.harness}" if group.harness else "harness not recorded",
         f"baseline {' or '.join(group.baselines)}" if group.baselines else "no baseline",
     ]
-    mark = f", {group.version}" if group.version in (OLDER, UNRECORDED) else ""
+    mark = f", {group.version}" if group.version in (ANOTHER, UNRECORDED) else ""
     return Markup("<strong>{}</strong> (group {}{}): {}.").format(
         link(names.display(group.display.title), group.display.marked), group.number, mark, "; ".join(facts)
     )

@@ -11,7 +11,7 @@ from ..data.categories import meanings
 from .board import MEASURED, Names, board, measured
 from .html import joined, link, listed, page, swatch, table
 from .intake import Source
-from .standing import OLDER, UNRECORDED, Group, Row
+from .standing import ANOTHER, UNRECORDED, Group, Row
 
 FACTS = (
     "A group has one display, set of targets, panel, exposure rule, metric, protocol and version of the harness. Only "
@@ -25,7 +25,7 @@ FACTS = (
     "Above the constant image: the score minus that of an even picture in the place of a capture. Below zero, the "
     "capture is no better than an even picture.",
     "Seconds were taken on the processor beside them. They do not compare between processors.",
-    f'"{OLDER.capitalize()}": another version of the harness, of the files of a report, or of a profile. '
+    f'"{ANOTHER.capitalize()}": the harness, the files of the report or the profile are not those of this version. '
     f'"{UNRECORDED.capitalize()}": the report does not say.',
     '"Own": the folder names nobody else.',
 )
@@ -71,7 +71,7 @@ def _controls(groups: Sequence[Group], rows: Sequence[Row]) -> Markup:
         "display": ("Display", [("", "all displays"), *((name, name) for name in displays)]),
         "category": ("Category", [("", "all categories"), *((name, name) for name in categories)]),
         "measure": ("Measured", [("", "everything"), *measures]),
-        "version": ("Versions", [("new", "without older ones"), ("", "all versions")]),
+        "version": ("Versions", [("new", "without other ones"), ("", "all versions")]),
     }
     selects = joined(
         Markup('<label>{} <select id="{}">{}</select></label>\n').format(

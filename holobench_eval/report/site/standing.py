@@ -8,6 +8,7 @@ target. Differences are paired with the baseline of a row's own study: no folder
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -29,7 +30,9 @@ from .intake import OWN, Source
 
 # How far the scores of a constant image may be apart, on two machines, for targets to be the same images.
 TOLERANCE_DB, TOLERANCE = 0.02, 0.002
-CURRENT, UNRECORDED, OLDER = "this version", "version not recorded", "older version"
+CURRENT, UNRECORDED, ANOTHER = "this version", "version not recorded", "another version"
+
+_SEED = re.compile(r'"seed": -?\d+(, )?')
 
 
 @dataclass(frozen=True)
@@ -81,9 +84,9 @@ class Row:
 
     @property
     def contestant(self) -> tuple[str, ...]:
-        """What is ranked once: a method with its parameters. A file of one name is another in every lab."""
+        """What is ranked once: a method with its parameters but seeds. A file of one name is another in every lab."""
         lab = self.source.by if ":" in self.method else ""
-        return self.method, self.source.parameters.get(self.label) or self.label, lab
+        return self.method, _SEED.sub("", self.source.parameters.get(self.label) or self.label), lab
 
     @property
     def failed(self) -> int:
@@ -149,13 +152,13 @@ def groups(sources: Sequence[Source]) -> list[Group]:
 def version(source: Source, display: Display) -> str:
     """Whether numbers are of this version: their display and recorded harness are those of the package."""
     if display.is_other:
-        return OLDER
+        return ANOTHER
     if source.measure == FILES:
         digest = source.known.get("code_sha256")
-        return CURRENT if isinstance(digest, dict) and digest.get("metrics") == HARNESS else OLDER
+        return CURRENT if isinstance(digest, dict) and digest.get("metrics") == HARNESS else ANOTHER
     if source.harness:
-        return CURRENT if source.harness == HARNESS else OLDER
-    return OLDER if source.earlier else UNRECORDED
+        return CURRENT if source.harness == HARNESS else ANOTHER
+    return ANOTHER if source.earlier else UNRECORDED
 
 
 def _constant(source: Source) -> dict[str, float]:
@@ -291,7 +294,7 @@ def _ranked(rows: Sequence[Row]) -> list[Row]:
 
 def _order(group: Group) -> tuple[Any, ...]:
     return (
-        (CURRENT, UNRECORDED, OLDER).index(group.version),
+        (CURRENT, UNRECORDED, ANOTHER).index(group.version),
         group.display.kind != "real",
         MEASURES.index(group.measure),
         -len(group.rows),

@@ -181,14 +181,14 @@ def test_going_to_a_part_of_the_page_keeps_the_view(reader: Reader) -> None:
     assert len(reader.names()) == 12
 
 
-def test_older_versions_are_left_out_until_they_are_asked_for(
+def test_other_versions_are_left_out_until_they_are_asked_for(
     browser: Any, tmp_path: Path, study: list[dict[str, Any]]
 ) -> None:
     write_site([write_results(tmp_path / "old", study, known={"harness": "3"})], tmp_path / "site", tmp_path)
     page = browser.new_page()
     reader = Reader(page, tmp_path / "site").open()
     assert reader.names() == []
-    assert "12 rows of older versions are left out" in page.inner_text("#status")
+    assert "12 rows of other versions are left out" in page.inner_text("#status")
     page.select_option("#version", "")
     assert len(reader.names()) == 12
     assert reader.view() == "#version="

@@ -13,7 +13,7 @@ import pytest
 
 from holobench_eval.report.site.board import Names, board
 from holobench_eval.report.site.intake import Source, read
-from holobench_eval.report.site.standing import CURRENT, OLDER, UNRECORDED, Group, groups
+from holobench_eval.report.site.standing import ANOTHER, CURRENT, UNRECORDED, Group, groups
 from holobench_eval.study.versions import HARNESS
 from tests.support.results_folder import TARGETS, write_results
 
@@ -159,6 +159,9 @@ def test_ranks_count_methods_with_their_parameters_and_not_their_runs(
     site: Site, study: Records, tmp_path: Path
 ) -> None:
     again = write_results(tmp_path / "another", [r | {"cell": {**r["cell"], "seed": 5}} for r in study], by="Lab")
+    frame = pd.read_csv(again / "records.csv", dtype=str, keep_default_na=False)
+    frame["parameters"] = '{"seed": 5}'
+    frame.to_csv(again / "records.csv", index=False)
     alone, both = of(groups([taken(site.own)]), "ideal"), of(groups([taken(again), taken(site.own)]), "ideal")
     assert both.ranked == alone.ranked
     own = {row.label: row.rank for row in both.rows if not row.source.by}
@@ -248,7 +251,7 @@ def test_a_profile_of_the_package_with_another_digest_is_a_display_of_its_own(
     known = {"profiles": {name: {"version": 1, "sha256": OTHER} for name in ("leto-aged", "ideal")}}
     other = write_results(tmp_path / "theirs", study, by="Lab", known=known)
     found = groups([taken(site.own), taken(other)])
-    assert {(group.display.is_other, group.version) for group in found} == {(False, CURRENT), (True, OLDER)}
+    assert {(group.display.is_other, group.version) for group in found} == {(False, CURRENT), (True, ANOTHER)}
     titles = {group.display.title for group in found}
     assert titles == {"leto-aged", "ideal", "leto-aged (other 22222222)", "ideal (other 22222222)"}
 
@@ -258,7 +261,7 @@ def test_versions_are_told_apart(study: Records, tmp_path: Path) -> None:
     for name, harness in (("new", {}), ("old", {"harness": "3: of old"}), ("unknown", {"harness": ""})):
         folder = write_results(tmp_path / name, study, known=harness)
         versions[name] = {group.version for group in groups([taken(folder)])}
-    assert versions == {"new": {CURRENT}, "old": {OLDER}, "unknown": {UNRECORDED}}
+    assert versions == {"new": {CURRENT}, "old": {ANOTHER}, "unknown": {UNRECORDED}}
 
 
 def test_a_score_above_the_constant_image_is_paired(found: list[Group]) -> None:

@@ -16,7 +16,7 @@ const DEFAULTS = {
   display: "",
   category: "",
   measure: "",
-  version: "new", // without older ones; empty: all
+  version: "new", // without other ones; empty: all
   captures: "", // at most
   seconds: "",
   text: "",
@@ -64,7 +64,7 @@ function passes(row) {
   const below = (key) => state[key] === "" || (known[key] !== "" && Number(known[key]) <= Number(state[key]));
   return (
     ["display", "category", "measure"].every((key) => state[key] === "" || known[key] === state[key]) &&
-    (state.version === "" || known.version !== "older version") &&
+    (state.version === "" || known.version !== "another version") &&
     below("captures") &&
     below("seconds") &&
     words.every((word) => known.text.includes(word))
@@ -93,10 +93,10 @@ function draw() {
   for (const group of groups) group.hidden = together || ![...group.rows].some((row) => shown.has(row));
   table.classList.toggle("all", together);
   for (const cell of headings) mark(cell, key);
-  const older = state.version === "" ? 0 : rows.filter((row) => row.dataset.version === "older version").length;
+  const older = state.version === "" ? 0 : rows.filter((row) => row.dataset.version === "another version").length;
   byId("status").textContent =
     `${shown.size} of ${rows.length} rows.` +
-    (older ? ` ${older} rows of older versions are left out.` : "") +
+    (older ? ` ${older} rows of other versions are left out.` : "") +
     (together ? " Scores of different groups do not compare: differences in one metric, each to the baseline of its study, are shown." : "");
 }
 
