@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
@@ -16,7 +15,7 @@ from .data.results import Results
 from .data.tables import read_records, records_frame
 from .description import Description, describe
 from .files import texts, write_files
-from .markdown import Markdown, blocks
+from .markdown import FIGURE, Markdown, blocks
 from .page import write_page
 from .section import Report
 from .sections import sections
@@ -26,8 +25,6 @@ OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
 OF_NUMBERS = ("quality-*.png", "training-*.png")
 STAGES = "stages-*.png"
 REPORT, DETAILS = "report.md", "details.md"
-
-FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
 
 
 def build_report(

@@ -14,8 +14,8 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from ...core.errors import UserError
-from ..build import DETAILS, FIGURE, REPORT
 from ..data.tables import DONE
+from ..markdown import FIGURE
 from .html import slug
 from .intake import Source
 
@@ -134,7 +134,7 @@ def _written(picture: Image.Image, form: str) -> bytes:
 
 def _captions(folder: Path) -> dict[str, str]:
     """What report.md and details.md say below each figure, as plain text."""
-    paths = [folder / name for name in (REPORT, DETAILS)]
+    paths = [folder / name for name in ("report.md", "details.md")]
     texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths if _is_text(path)]
     return {name: _MARKDOWN.sub("", caption) for name, caption in FIGURE.findall("\n".join(texts))}
 
