@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
@@ -16,7 +15,7 @@ from .data.results import Results
 from .data.tables import read_records, records_frame
 from .description import Description, describe
 from .files import texts, write_files
-from .markdown import Markdown, blocks
+from .markdown import FIGURE, Markdown, blocks
 from .page import write_page
 from .section import Report
 from .sections import sections
@@ -26,8 +25,6 @@ OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
 OF_NUMBERS = ("quality-*.png", "training-*.png")
 STAGES = "stages-*.png"
 REPORT, DETAILS = "report.md", "details.md"
-
-_FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
 
 
 def build_report(
@@ -76,7 +73,7 @@ def _kept(output: Path) -> dict[str, Markdown]:
     texts = [path.read_text(encoding="utf-8") for name in (REPORT, DETAILS) if (path := output / name).is_file()]
     return {
         name: Markdown(caption)
-        for name, caption in _FIGURE.findall("\n".join(texts))
+        for name, caption in FIGURE.findall("\n".join(texts))
         if any(fnmatch(name, pattern) for pattern in OF_PICTURES) and (output / "figures" / name).is_file()
     }
 

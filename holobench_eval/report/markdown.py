@@ -13,6 +13,9 @@ from typing import Any, Self
 
 from markupsafe import Markup
 
+# (file, caption) of a figure in a report
+FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
+
 _SPECIAL = re.compile(r"[\\`*|~$]|\](?=[(\[:])|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")
 _TAG = re.compile(r"<(?=[A-Za-z/!?])")
 _ENTITY = re.compile(r"&(?=[#A-Za-z])")

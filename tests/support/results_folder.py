@@ -54,7 +54,8 @@ def write_results(
     pairs = tuple(dict.fromkeys((r["label"], r["cell"]["condition"]) for r in records))
     shown = tuple(pair for pair in pairs if pair[1] != "reference")
     panels = {record["cell"]["profile"]: (256, 256) for record in records}
-    layout = synthetic.layout(targets=TARGETS, pairs=shown, panels=panels, study=folder.name)
+    camera = frozenset(r["label"] for r in records if r["scores"].get("captures", r.get("captures", 0)))
+    layout = synthetic.layout(targets=TARGETS, pairs=shown, panels=panels, study=folder.name, camera=camera)
     results = Results(records_frame([_short(record) for record in records], layout), layout)
     folder.mkdir(parents=True, exist_ok=True)
     frames = {"records.csv": tidy_records(results.frame, layout), "tests.csv": tidy_tests(results)}

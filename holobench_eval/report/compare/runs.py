@@ -31,18 +31,26 @@ class Run:
 
 def read_run(folder: Path) -> Run:
     """Read a report. UserError: the folder holds no records.csv, or one that names a cell twice."""
-    path = folder / "records.csv"
     try:
-        records = read_records(path.read_text(encoding="utf-8"))
+        text = (folder / "records.csv").read_text(encoding="utf-8")
     except FileNotFoundError:
         raise UserError(f"{folder}: no records.csv in this folder; expected the folder of a report") from None
+    except ValueError as error:
+        raise UserError(f"{folder}: {error}") from None
+    return Run(folder, records_of(folder, text), provenance.read(folder))
+
+
+def records_of(folder: Path, text: str) -> pd.DataFrame:
+    """The records in the text of the records.csv of a folder. UserError: it is none, or names a cell twice."""
+    try:
+        records = read_records(text)
     except (UserError, ValueError) as error:
         raise UserError(f"{folder}: {error}") from None
     twice = records[records.duplicated(list(CELL))]
     if len(twice):
         named = ", ".join(str(twice.iloc[0][column]) for column in CELL[:3])
-        raise UserError(f"{path}: two rows for one cell ({named}); expected a row a cell")
-    return Run(folder, records, provenance.read(folder))
+        raise UserError(f"{folder / 'records.csv'}: two rows for one cell ({named}); expected a row a cell")
+    return records
 
 
 def provenance_differences(a: Run, b: Run) -> list[tuple[str, str, str]]:

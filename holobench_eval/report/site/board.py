@@ -13,7 +13,7 @@ from ..data.tables import SECONDS_COLUMN
 from ..data.text import FILES
 from .html import joined, link, plain_number, quiet, slug, swatch
 from .intake import Source
-from .standing import OLDER, UNRECORDED, Group, Row
+from .standing import ANOTHER, UNRECORDED, Group, Row
 
 MEASURED = {
     "picture": "captures against targets",
@@ -74,23 +74,27 @@ def board(groups: Iterable[Group], names: Names, keep: Iterable[Row] | None = No
 
 def _within(key: str) -> Markup:
     """The class of columns that mean nothing beyond a group."""
-    return Markup(' class="within"') if key in ("", "score") else Markup("")
+    return Markup(' class="within"') if key in ("", "score", "above") else Markup("")
+
+
+def measured(group: Group) -> tuple[str, str]:
+    """What was measured, by which metric: its key in a view, and in words."""
+    return f"{group.measure} {group.metric.key}", f"{MEASURED[group.measure]}, {group.metric.heading}"
 
 
 def describe(group: Group, names: Names) -> Markup:
     """What the rows of a group share, as a line."""
     clusters = f" in {group.clusters} clusters" if group.clusters != group.targets else ""
     facts = [
-        MEASURED[group.measure],
-        group.metric.heading,
+        measured(group)[1],
         f"{group.targets} targets{clusters}",
         f"panel {group.panel} px" if group.panel else "panel not recorded",
         *([f"{group.exposure} exposure"] if group.exposure else []),
         f"protocol {group.protocol}",
         f"harness {group.harness}" if group.harness else "harness not recorded",
-        f"baseline {group.baseline.label}" if group.baseline else "no baseline",
+        f"baseline {' or '.join(group.baselines)}" if group.baselines else "no baseline",
     ]
-    mark = f", {group.version}" if group.version in (OLDER, UNRECORDED) else ""
+    mark = f", {group.version}" if group.version in (ANOTHER, UNRECORDED) else ""
     return Markup("<strong>{}</strong> (group {}{}): {}.").format(
         link(names.display(group.display.title), group.display.marked), group.number, mark, "; ".join(facts)
     )
@@ -108,18 +112,20 @@ def _group(group: Group, names: Names, kept: set[int] | None) -> Markup:
 
 
 def _row(row: Row, group: Group, names: Names) -> Markup:
-    whose = row.source.by or "own"
-    words = " ".join((row.marked, row.method, row.category, group.display.marked, row.source.name, whose)).lower()
+    studies = " ".join(source.name for source in row.sources)
+    words = " ".join((row.marked, row.method, row.category, group.display.marked, studies, row.whose)).lower()
+    sign = 1 if row.metric.higher_is_better else -1  # sorting is by what is better
+    gain = 0.0 if row.is_baseline else math.nan
     values = {
         "method": row.marked.lower(),
         "display": group.display.marked,
         "category": row.category,
-        "measure": group.measure,
+        "measure": measured(group)[0],
         "version": group.version,
-        "study": f"{row.source.name} {whose}",
-        "score": _value(row.score.mean),
-        "gain": _value(row.gain.mean if row.gain else (0.0 if row.is_baseline else math.nan)),
-        "above": _value(row.above.mean if row.above else math.nan),
+        "study": f"{studies} {row.whose}",
+        "score": _value(sign * row.score.mean),
+        "gain": _value(sign * row.gain.mean if row.gain else gain),
+        "above": _value(sign * row.above.mean if row.above else math.nan),
         "captures": _value(_number(row, "total_captures", "captures")),
         "seconds": _value(_number(row, "seconds")),
         "targets": len(row.values),
@@ -130,10 +136,10 @@ def _row(row: Row, group: Group, names: Names) -> Markup:
     cells = (
         ("within", _rank(row, group)),
         ("across", Markup("{}{}").format(link(names.display(group.display.title), group.display.marked),
-                                         quiet(f"group {group.number}, {group.version}"))),
+                                         quiet(f"group {group.number}, {group.metric.heading}, {group.version}"))),
         ("within", _estimate(row, row.score, signed=False)),
         ("", _gain(row, group)),
-        ("", _estimate(row, row.above) if row.above else "–"),
+        ("within", _estimate(row, row.above) if row.above else "–"),
         ("", _captures(row)),
         ("", _seconds(row)),
         ("", _targets(row)),
@@ -145,7 +151,7 @@ def _row(row: Row, group: Group, names: Names) -> Markup:
 
 def _rank(row: Row, group: Group) -> Markup:
     if row.rank is None:
-        place = "not ranked"
+        place = "further run" if row.is_further else "not ranked"
     else:
         place = f"{row.rank} of {group.ranked[row.category]}" if group.ranked[row.category] > 1 else "alone"
     return Markup("{} {}").format(place, quiet(row.category))
@@ -163,8 +169,8 @@ def _gain(row: Row, group: Group) -> Markup:
         return Markup("baseline")
     if row.gain is None:
         return Markup("–")
-    base = group.baseline.label if group.baseline else ""
-    return Markup('{}<span class="interval to">to {}</span>').format(_estimate(row, row.gain), base)
+    kind = "interval" if len(group.baselines) > 1 else "interval to"
+    return Markup('{}<span class="{}">to {}</span>').format(_estimate(row, row.gain), kind, row.baseline)
 
 
 def _captures(row: Row) -> Markup:
@@ -190,8 +196,8 @@ def _targets(row: Row) -> Markup:
 
 
 def _study(row: Row, names: Names) -> Markup:
-    every = Markup(", ").join(names.study(source) for source in (row.source, *row.also))
-    return Markup("{} {}").format(every, quiet(row.source.by or "own"))
+    every = Markup(", ").join(names.study(source) for source in row.sources)
+    return Markup("{} {}").format(every, quiet(row.whose))
 
 
 def _number(row: Row, *keys: str) -> float:

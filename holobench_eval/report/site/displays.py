@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 
+from ...core.hashing import digest as digest_of
 from ...display.simulated.profile import STAGES, Profile, load_profile, names
 from ..data.text import FILES
 from .intake import Source
@@ -31,8 +32,9 @@ class Display:
     """A display of the site.
 
     title: its name, with what tells it from another of the same name; name: in its reports; digest: of its profile or
-    bench file (empty: none); kind: ``simulated``, ``real``, ``learned`` (a trained network in its place) or ``files``;
-    profile: that of the package, where it is one.
+    bench file, of photographs that of whose they are and how they came about (empty: none); kind: ``simulated``,
+    ``real``, ``learned`` (a trained network in its place) or ``files``; profile: that of the package, where it is one;
+    is_other: whether it has the name of a profile of the package, and another digest.
     """
 
     title: str
@@ -40,6 +42,7 @@ class Display:
     digest: str
     kind: str
     profile: Profile | None = None
+    is_other: bool = False
 
     @property
     def marked(self) -> str:
@@ -55,7 +58,8 @@ class Display:
 def display_of(source: Source, name: str, others: Mapping[str, set[str]]) -> Display:
     """The display that a source calls by a name. others: every digest that a name has, over all sources."""
     if source.measure == FILES:
-        return Display(f"{name} ({source.name})", name, source.name, FILES)
+        digest = digest_of({"by": source.by, "known": source.known})
+        return Display(f"{name} ({source.name} {digest[:DIGITS]})", name, digest, FILES)
     digest = str(dict(source.known.get("profiles", {})).get(name, {}).get("sha256", ""))
     kind = dict(source.known.get("displays", {})).get(name) or _kind(name, digest)
     shipped = _shipped().get(name)
@@ -64,7 +68,7 @@ def display_of(source: Source, name: str, others: Mapping[str, set[str]]) -> Dis
     if shipped is not None and shipped.digest == digest:
         return Display(name, name, digest, kind, shipped)
     if shipped is not None:
-        return Display(f"{name} (other {digest[:DIGITS]})", name, digest, kind)
+        return Display(f"{name} (other {digest[:DIGITS]})", name, digest, kind, is_other=True)
     alone = len(others.get(name, ())) < 2
     return Display(name if alone else f"{name} ({digest[:DIGITS]})", name, digest, kind)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from importlib.resources import files
 
 from markupsafe import Markup, escape
 
 from ...core.hashing import digest
-from ...core.io import file_name
 from ..charts.look.methods import BLACK, NEUTRAL, REGISTRY, look
 from ..data.text import number
 
@@ -16,6 +16,8 @@ from ..data.text import number
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'"
 )
+# Names that become those of other names, or those of devices (on Windows).
+_TAKEN = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])?|.*-[0-9a-f]{8}")
 STYLES, SCRIPTS = ("page.css", "site.css"), ("leaderboard.js",)
 # Markers in a box of 20 x 20, by matplotlib's names.
 _SHAPES = {
@@ -35,7 +37,8 @@ _SHAPES = {
 
 def slug(text: str) -> str:
     """A name as that of a file: no two names share one, on any file system."""
-    return file_name(text) if text == text.lower() else f"{file_name(text.lower())}-{digest(text)[:8]}"
+    plain = re.sub(r"[^a-z0-9_-]", "_", text.lower())[:100]
+    return plain if plain == text and not _TAKEN.fullmatch(plain) else f"{plain}-{digest(text)[:8]}"
 
 
 def page(title: str, body: Markup, depth: int = 0, scripts: bool = False) -> bytes:

@@ -8,22 +8,24 @@ from pathlib import Path
 from markupsafe import Markup
 
 from ..data.categories import meanings
-from .board import MEASURED, Names, board
+from .board import MEASURED, Names, board, measured
 from .html import joined, link, listed, page, swatch, table
 from .intake import Source
-from .standing import OLDER, UNRECORDED, Group, Row
+from .standing import ANOTHER, UNRECORDED, Group, Row
 
 FACTS = (
     "A group has one display, set of targets, panel, exposure rule, metric, protocol and version of the harness. Only "
     "within it are scores compared and ranked, each category by itself, and only rows with a score for every target.",
     "Targets of one name are taken for the same image where a constant image has the same score on each of them. A "
-    "study without such a score, or without a recorded version of the harness, is a group of its own.",
+    "study without such a score for every target, or without a recorded version of the harness, is a group of its own.",
     "Scores of different groups do not compare: targets, displays or exposures differ. The view across groups shows "
-    "the paired difference to the baseline of each group instead. It says less than a rank: baselines differ, too.",
+    "paired differences in one metric instead. They say less than a rank: baselines differ, too.",
+    "Differences are paired with the baseline of the row's own study. Ranks count methods with their parameters: the "
+    'row of an own study before those of others; any more are "further runs".',
     "Above the constant image: the score minus that of an even picture in the place of a capture. Below zero, the "
     "capture is no better than an even picture.",
     "Seconds were taken on the processor beside them. They do not compare between processors.",
-    f'"{OLDER.capitalize()}": another version of the harness, of the files of a report, or of a profile. '
+    f'"{ANOTHER.capitalize()}": the harness, the files of the report or the profile are not those of this version. '
     f'"{UNRECORDED.capitalize()}": the report does not say.',
     '"Own": the folder names nobody else.',
 )
@@ -62,14 +64,14 @@ def index(groups: Sequence[Group], sources: Sequence[Source], without: Sequence[
 
 def _controls(groups: Sequence[Group], rows: Sequence[Row]) -> Markup:
     displays = sorted({group.display.marked for group in groups})
-    measures = [name for name in MEASURED if any(group.measure == name for group in groups)]
+    measures = dict.fromkeys(map(measured, groups))
     categories = [name for name, _ in meanings({row.category for row in rows})]
     choices = {
         "arrange": ("Compared", [("within", "within groups"), ("across", "across groups")]),
         "display": ("Display", [("", "all displays"), *((name, name) for name in displays)]),
         "category": ("Category", [("", "all categories"), *((name, name) for name in categories)]),
-        "measure": ("Measured", [("", "everything"), *((name, MEASURED[name]) for name in measures)]),
-        "version": ("Versions", [("new", "without older ones"), ("", "all versions")]),
+        "measure": ("Measured", [("", "everything"), *measures]),
+        "version": ("Versions", [("new", "without other ones"), ("", "all versions")]),
     }
     selects = joined(
         Markup('<label>{} <select id="{}">{}</select></label>\n').format(
@@ -139,7 +141,7 @@ def _study_list(groups: Sequence[Group], sources: Sequence[Source], names: Names
 
 def _version(groups: Iterable[Group], source: Source) -> str:
     rows = ((group, row) for group in groups for row in group.rows)
-    return next((group.version for group, row in rows if source in (row.source, *row.also)), "")
+    return next((group.version for group, row in rows if source in row.sources), "")
 
 
 def _compared(categories: set[str]) -> Markup:

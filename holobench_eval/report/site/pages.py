@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from inspect import getdoc
 from pathlib import Path
-from urllib.parse import quote
 
 from markdown_it import MarkdownIt
 from markupsafe import Markup
@@ -19,11 +17,12 @@ from ..data.error_budget import budgets
 from ..data.text import FILES, percent
 from ..description import basis
 from .board import MEASURED, Names, board
+from .checks import LONGEST
 from .displays import Display, ancestors, counted, parameters, stage_title
-from .html import joined, link, listed, page, slug, swatch, table
-from .intake import LONGEST, Source
+from .html import joined, listed, page, slug, swatch, table
+from .intake import Source
 from .pictures import Picture
-from .standing import Group, Row
+from .standing import Group
 
 REPORT = ("report.html", "report.md")
 ANSWERS = ("## Question", "## Answer", "## Findings")
@@ -56,7 +55,7 @@ def method_page(method: str, groups: Sequence[Group], names: Names, pictures: Se
         swatch(method),
         about(method),
         f"Category: {categories}. Displays: {len({row.display.title for row in rows})}. Scores compare within a group; "
-        "ranks are those among all rows of the group.",
+        "ranks are those among all methods of the group.",
         board(groups, names, rows),
         Markup("<details><summary>Parameters</summary>{}</details>").format(listed(settings)) if settings else "",
         _gallery("Captures", pictures),
@@ -108,7 +107,7 @@ def _what(display: Display) -> Markup:
     }[display.kind]
     other = (
         f" The package has another profile by the name {display.name}; scores of the two do not compare."
-        if "(other " in display.title
+        if display.is_other
         else ""
     )
     digest = Markup("<p>sha256 {}.</p>").format(display.digest) if display.kind != FILES else ""
@@ -169,10 +168,10 @@ def _stages(display: Display) -> Markup:
     )
 
 
-def study_page(source: Source, groups: Sequence[Group], names: Names, shown: Shown, output: Path) -> bytes:
+def study_page(source: Source, groups: Sequence[Group], names: Names, shown: Shown) -> bytes:
     """The page of a study: its question and answer, its scores, where its numbers come from, and pictures."""
     names = replace(names, up="../")
-    rows = [row for group in groups for row in group.rows if source.folder in (row.source.folder, *_also(row))]
+    rows = [row for group in groups for row in group.rows if source in row.sources]
     own = [group for group in groups if any(row in rows for row in group.rows)]
     folder = names.studies[str(source.folder)]
     figures = [(f"../pictures/{folder}/{picture.name}", picture) for picture in shown.figures]
@@ -182,7 +181,7 @@ def study_page(source: Source, groups: Sequence[Group], names: Names, shown: Sho
     changed = f" {source.changed} changes of its displays are in the report alone." if source.changed else ""
     body = Markup("<p>{}</p>{}\n{}\n<h2>Scores</h2>{}\n{}\n{}{}").format(
         f"{sentence(MEASURED[source.measure])} Whose result: {source.by or 'own'}.{changed}{more}",
-        _reports(source, output),
+        _reports(source),
         _answer(source.folder),
         board(own, names, rows),
         _origin(source),
@@ -192,19 +191,14 @@ def study_page(source: Source, groups: Sequence[Group], names: Names, shown: Sho
     return page(f"Study {source.name}", body, depth=1)
 
 
-def _also(row: Row) -> list[Path]:
-    return [source.folder for source in row.also]
-
-
-def _reports(source: Source, output: Path) -> Markup:
-    """The way to the report, where its folder lies beside the site or below."""
-    files = [name for name in REPORT if (source.folder / name).is_file()]
-    beside = source.folder.resolve().is_relative_to(output.resolve().parent)
-    if not files or not beside:
+def _reports(source: Source) -> Markup:
+    """Where an own report lies, as text: it is no part of the site, and need not be near it."""
+    files = [name for name in REPORT if (path := source.folder / name).is_file() and not path.is_symlink()]
+    if source.by or not files:
         return Markup("")
-    way = Path(os.path.relpath(source.folder.resolve(), output.resolve() / "studies")).as_posix()
-    links = Markup(", ").join(link(quote(f"{way}/{name}"), name) for name in files)
-    return Markup("<p>In its folder, which is no part of this site: {}.</p>").format(links)
+    folder = "/".join(source.folder.resolve().parts[-2:])
+    paths = Markup(", ").join(Markup("<code>{}/{}</code>").format(folder, name) for name in files)
+    return Markup("<p>Its report, which is no part of this site: {}.</p>").format(paths)
 
 
 def _answer(folder: Path) -> Markup:

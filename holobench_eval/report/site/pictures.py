@@ -14,12 +14,14 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from ...core.errors import UserError
-from ...core.io import file_name
 from ..data.tables import DONE
+from ..markdown import FIGURE
+from .html import slug
 from .intake import Source
 
 FIGURES, THUMBNAILS = "figures", "thumbnails"
 SUFFIXES = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
+MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "CMYK")  # of 8 bits a channel
 MOST_FILE = 8_000_000  # bytes
 MOST_PIXELS = 40_000_000
 LONGEST_THUMBNAIL = 1024  # pixels
@@ -29,21 +31,20 @@ ROOM = 1_200_000  # bytes of the figures of a study; the others stay in its fold
 ORDER = ("answer-*", "comparison-*-1.*", "error-budget*", "quality-paired-*", "quality-*", "rank*", "comparison-*", "*")
 STAGES = "stages-"
 
-_CAPTION = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
 _MARKDOWN = re.compile(r"\\(?=[\\`*|~$_\]])|`")
 
 
 @dataclass(frozen=True)
 class Picture:
     """A picture of the site. name: its file, below the folder of its study; caption: what it shows, as text; of: the
-    name of the method whose capture it is (empty: none)."""
+    name of the method whose capture it is, or a figure's name in its folder."""
 
     name: str
     caption: str
     content: bytes
     width: int
     height: int
-    of: str = ""
+    of: str
 
 
 def thumbnails(source: Source) -> list[Picture]:
@@ -62,7 +63,8 @@ def thumbnails(source: Source) -> list[Picture]:
                 f"{path}: no such cell; a thumbnail is named by the column 'cell' of a done row of records.csv"
             )
         caption = f"{row['method']} on {row['condition']}, {row['target']}"
-        found.append(replace(_picture(path, caption, LONGEST_THUMBNAIL, anew=True), of=str(row["name"])))
+        taken = _picture(path, caption, LONGEST_THUMBNAIL, anew=True)
+        found.append(replace(taken, name=f"captures/{taken.name}", of=str(row["name"])))
     return found
 
 
@@ -93,6 +95,8 @@ def _files(folder: Path) -> Iterator[Path]:
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UserError(f"{folder}: not a folder of its own; expected one with PNG or JPEG files")
     for path in sorted(folder.iterdir()) if folder.exists() else ():
+        if not path.name.isprintable():
+            raise UserError(f"{folder}: the file name {path.name!r}; expected characters that can be seen, rename it")
         if path.is_symlink() or not path.is_file():
             raise UserError(f"{path}: a link or a folder; expected PNG or JPEG files alone, copied into this folder")
         if path.suffix.lower() not in SUFFIXES:
@@ -111,17 +115,18 @@ def _picture(path: Path, caption: str, longest: int | None, anew: bool) -> Pictu
             if width * height > MOST_PIXELS or max(width, height) > (longest or MOST_PIXELS):
                 limit = f"{longest} pixels a side" if longest else f"{MOST_PIXELS // 10**6} million pixels"
                 raise UserError(f"{path}: {width} x {height} pixels; expected at most {limit}")
+            if anew and picture.mode not in MODES:
+                raise UserError(f"{path}: more than 8 bits a channel; expected 8, save it again")
             picture.load()
             content = _written(picture, form) if anew else path.read_bytes()
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise UserError(f"{path}: not a whole {form} ({error}); save it again") from None
-    name = f"{file_name(path.stem).lower()}{path.suffix.lower()}"
-    return Picture(name, caption, content, width, height)
+    return Picture(f"{slug(path.stem)}{path.suffix.lower()}", caption, content, width, height, path.stem)
 
 
 def _written(picture: Image.Image, form: str) -> bytes:
     text = io.BytesIO()
-    plain = picture.convert("L" if picture.mode in ("1", "L", "I;16", "I") else "RGB")
+    plain = picture.convert("L" if picture.mode in ("1", "L") else "RGB")
     plain.info.clear()
     plain.save(text, format=form, **({"quality": 92} if form == "JPEG" else {"optimize": False}))
     return text.getvalue()
@@ -131,7 +136,7 @@ def _captions(folder: Path) -> dict[str, str]:
     """What report.md and details.md say below each figure, as plain text."""
     paths = [folder / name for name in ("report.md", "details.md")]
     texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths if _is_text(path)]
-    return {name: _MARKDOWN.sub("", caption) for name, caption in _CAPTION.findall("\n".join(texts))}
+    return {name: _MARKDOWN.sub("", caption) for name, caption in FIGURE.findall("\n".join(texts))}
 
 
 def _is_text(path: Path) -> bool:

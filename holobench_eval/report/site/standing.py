@@ -2,11 +2,13 @@
 
 Scores compare for the same display, targets, panel, exposure, metric, protocol and version of the harness. Targets of
 one name need not be one image; the score of a constant image, which needs no display, tells: where it differs, the
-targets do. A study that lacks what is compared here is a group of its own.
+targets do. A study that lacks what is compared here is a group of its own, and so is one without such a score for every
+target. Differences are paired with the baseline of a row's own study: no folder sets the baseline of another.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -22,12 +24,15 @@ from ..data.scores import Score
 from ..data.statistics import Estimate, mean_interval
 from ..data.tables import DONE
 from ..data.text import FILES
+from .checks import MEASURES
 from .displays import Display, digests, display_of
-from .intake import MEASURES, Source
+from .intake import OWN, Source
 
 # How far the scores of a constant image may be apart, on two machines, for targets to be the same images.
 TOLERANCE_DB, TOLERANCE = 0.02, 0.002
-CURRENT, UNRECORDED, OLDER = "this version", "version not recorded", "older version"
+CURRENT, UNRECORDED, ANOTHER = "this version", "version not recorded", "another version"
+
+_SEED = re.compile(r'"seed": -?\d+(, )?')
 
 
 @dataclass(frozen=True)
@@ -36,8 +41,10 @@ class Row:
 
     label: in its study's tables, and marked, with what must be known of the row; method: its name in configs; values:
     headline score by target, repeats averaged, without holes; planned: targets that should have one; score: the mean;
-    gain: to the baseline of its group (None: there is none); above: the constant image; table: its row of table.csv;
-    cells: digests of what the numbers depend on; also: other studies that hold the very same row.
+    baseline: the label that differences are to in its study (empty: none; its own: it is the baseline); gain: to that
+    (None: there is none); above: the constant image; table: its row of table.csv; cells: digests of what the numbers
+    depend on; rank: None without one; is_further: of a method and parameters that another row of the group stands for;
+    also: other studies that hold the very same row.
     """
 
     source: Source
@@ -54,10 +61,32 @@ class Row:
     table: Mapping[str, Any]
     cells: frozenset[str]
     key: tuple[Any, ...]
+    baseline: str = ""
     gain: Estimate | None = None
-    is_baseline: bool = False
     rank: int | None = None
+    is_further: bool = False
     also: tuple[Source, ...] = ()
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Every study that holds the row."""
+        return (self.source, *self.also)
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether differences are to it."""
+        return self.baseline == self.label
+
+    @property
+    def whose(self) -> str:
+        """Whose result it is."""
+        return ", ".join(dict.fromkeys(source.by or OWN for source in self.sources))
+
+    @property
+    def contestant(self) -> tuple[str, ...]:
+        """What is ranked once: a method with its parameters but seeds. A file of one name is another in every lab."""
+        lab = self.source.by if ":" in self.method else ""
+        return self.method, _SEED.sub("", self.source.parameters.get(self.label) or self.label), lab
 
     @property
     def failed(self) -> int:
@@ -73,7 +102,7 @@ class Row:
 @dataclass(frozen=True)
 class Group:
     """Rows whose scores compare, best first. exposure: of its light; clusters, targets: their numbers; version: see
-    ``version``; baseline: the label that differences are to, and study that names it (None: none)."""
+    ``version``; baselines: the labels that differences are to, by study, each once."""
 
     number: int
     display: Display
@@ -86,7 +115,7 @@ class Group:
     version: str
     targets: int
     clusters: int
-    baseline: Row | None
+    baselines: tuple[str, ...]
     rows: tuple[Row, ...]
 
     @property
@@ -109,7 +138,7 @@ def groups(sources: Sequence[Source]) -> list[Group]:
     known, found = digests(sources), dict[tuple[Any, ...], list[_Comparable]]()
     for source in sources:
         constant = _constant(source)
-        for row in _rows(source, known, bool(constant)):
+        for row in _rows(source, known, constant.keys() == set(source.results.targets)):
             same = found.setdefault(row.key, [])
             part = next((each for each in same if _equal(each.constant, constant, row.metric)), None)
             if part is None:
@@ -121,13 +150,15 @@ def groups(sources: Sequence[Source]) -> list[Group]:
 
 
 def version(source: Source, display: Display) -> str:
-    """Whether the numbers of a source are of this version: its harness is recorded, and is that of the package."""
+    """Whether numbers are of this version: their display and recorded harness are those of the package."""
+    if display.is_other:
+        return ANOTHER
     if source.measure == FILES:
         digest = source.known.get("code_sha256")
-        return CURRENT if isinstance(digest, dict) and digest.get("metrics") == HARNESS else OLDER
+        return CURRENT if isinstance(digest, dict) and digest.get("metrics") == HARNESS else ANOTHER
     if source.harness:
-        return CURRENT if source.harness == HARNESS else OLDER
-    return OLDER if source.earlier or "(other " in display.title else UNRECORDED
+        return CURRENT if source.harness == HARNESS else ANOTHER
+    return ANOTHER if source.earlier else UNRECORDED
 
 
 def _constant(source: Source) -> dict[str, float]:
@@ -140,7 +171,7 @@ def _constant(source: Source) -> dict[str, float]:
 
 def _equal(a: Mapping[str, float], b: Mapping[str, float], metric: Score) -> bool:
     tolerance = TOLERANCE_DB if metric.unit == "dB" else TOLERANCE
-    return a.keys() == b.keys() and all(abs(a[target] - b[target]) <= tolerance for target in a)
+    return all(abs(a[target] - b[target]) <= tolerance for target in a)
 
 
 def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list[Row]:
@@ -193,12 +224,10 @@ def _estimate(row: pd.Series, key: str, clusters: int) -> Estimate:
 
 
 def _group(rows: Sequence[Row]) -> Group:
-    merged = _merged(rows)
-    own_first = sorted(merged, key=lambda row: bool(row.source.by))
-    baseline = next((row for row in own_first if row.is_complete and _is_baseline(row)), None)
+    merged = _merged(sorted(rows, key=lambda row: (bool(row.source.by), row.source.by, row.source.name)))
     first = merged[0]
     clusters = dict(zip(first.source.results.targets, map(str, first.source.results.clusters), strict=True))
-    placed = _ranked([replace(row, gain=_gain(row, baseline, clusters), is_baseline=row is baseline) for row in merged])
+    placed = _ranked([_paired(row, merged, clusters) for row in merged])
     return Group(
         number=0,
         display=first.display,
@@ -211,17 +240,13 @@ def _group(rows: Sequence[Row]) -> Group:
         version=version(first.source, first.display),
         targets=first.planned,
         clusters=len(set(clusters.values())),
-        baseline=baseline,
+        baselines=tuple(dict.fromkeys(row.baseline for row in placed if row.baseline)),
         rows=tuple(placed),
     )
 
 
-def _is_baseline(row: Row) -> bool:
-    return any(row.label == source.results.layout.baseline for source in (row.source, *row.also))
-
-
 def _merged(rows: Sequence[Row]) -> list[Row]:
-    """The rows, those that two studies have from the very same cells once."""
+    """The rows, those that two studies have from the very same cells with the same scores once."""
     found: list[Row] = []
     for row in rows:
         same = next((each for each in found if row.cells and _is_same(each, row)), None)
@@ -233,34 +258,43 @@ def _merged(rows: Sequence[Row]) -> list[Row]:
 
 
 def _is_same(a: Row, b: Row) -> bool:
-    return (a.label, a.cells, a.values, a.source.by) == (b.label, b.cells, b.values, b.source.by)
+    return (a.label, a.cells, a.values) == (b.label, b.cells, b.values)
 
 
-def _gain(row: Row, baseline: Row | None, clusters: Mapping[str, str]) -> Estimate | None:
-    """Score minus that of the baseline, target by target; None without a complete pair."""
-    if baseline is None or row is baseline or not row.is_complete:
-        return None
-    differences = np.array([row.values[target] - baseline.values[target] for target in clusters])
-    return mean_interval(differences, list(clusters.values()))
+def _paired(row: Row, rows: Sequence[Row], clusters: Mapping[str, str]) -> Row:
+    """The row with its score minus that of the baseline, target by target, of the first of its studies that has one."""
+    for source in row.sources if row.is_complete else ():
+        for other in rows:
+            if source in other.sources and other.label == source.results.layout.baseline and other.is_complete:
+                differences = np.array([row.values[target] - other.values[target] for target in clusters])
+                gain = None if other is row else mean_interval(differences, list(clusters.values()))
+                return replace(row, baseline=other.label, gain=gain)
+    return row
 
 
 def _ranked(rows: Sequence[Row]) -> list[Row]:
-    """The rows, best first, each with its place in its category; holes and oracles have none."""
+    """The rows, best first, each with its place in its category; holes, oracles and further runs have none."""
+    ranked: dict[tuple[str, ...], Row] = {}
+    for row in rows:
+        if row.is_complete and row.category not in (ORACLE, "not recorded"):
+            ranked.setdefault(row.contestant, row)
     sign = -1 if rows[0].metric.higher_is_better else 1
     ordered = sorted(rows, key=lambda row: (not row.values, sign * row.score.mean if row.values else 0.0))
     placed = []
     for row in ordered:
-        rank = None
-        if row.is_complete and row.category not in (ORACLE, "not recorded"):
-            rivals = (each for each in rows if each.category == row.category and each.is_complete)
-            rank = 1 + sum(row.metric.better(each.score.mean, row.score.mean) for each in rivals)
+        first = ranked.get(row.contestant)
+        if first is not row:
+            placed.append(replace(row, is_further=first is not None and row.is_complete))
+            continue
+        rivals = (each for each in ranked.values() if each.category == row.category)
+        rank = 1 + sum(row.metric.better(each.score.mean, row.score.mean) for each in rivals)
         placed.append(replace(row, rank=rank))
     return placed
 
 
 def _order(group: Group) -> tuple[Any, ...]:
     return (
-        (CURRENT, UNRECORDED, OLDER).index(group.version),
+        (CURRENT, UNRECORDED, ANOTHER).index(group.version),
         group.display.kind != "real",
         MEASURES.index(group.measure),
         -len(group.rows),

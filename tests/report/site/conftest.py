@@ -57,7 +57,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, study: list[dict[str, Any]]) 
     folder = tmp_path_factory.mktemp("site")
     own = write_results(folder / "reports" / "ours", study)
     other = write_results(folder / "others" / THEIRS, of_others(study), by=LAB)
-    write_site([own.parent, other], folder / "site")
+    write_site([own.parent, other], folder / "site", own.parent)
     return Site(own, other, folder / "site")
 
 

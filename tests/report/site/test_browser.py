@@ -10,7 +10,11 @@ from typing import Any
 
 import pytest
 
+from holobench_eval.report.site import write_site
+from tests.support.results_folder import write_results
+
 from .conftest import HOSTILE, Site
+from .test_standing import in_another_metric
 
 NAMES = "rows => rows.filter(row => row.checkVisibility()).map(row => row.cells[0].textContent)"
 
@@ -118,12 +122,35 @@ def test_across_groups_scores_and_ranks_are_gone_and_differences_sort(reader: Re
     assert reader.page.locator("td.within:visible").count() == 0
     assert reader.page.locator("tr.group:visible").count() == 0
     assert reader.page.locator("td.across:visible").count() == 24
+    assert reader.page.input_value("#measure") == "picture psnr_linear"
+    assert reader.page.locator("th[data-key=above]:visible").count() == 0
     gains = reader.numbers("gain")
     assert gains == sorted(gains, reverse=True)
     assert "do not compare" in reader.page.inner_text("#status")
     reader.page.select_option("#arrange", "within")
     assert reader.page.locator("tr.group:visible").count() == 2
-    assert reader.page.locator("td.within:visible").count() == 48
+    assert reader.page.locator("td.within:visible").count() == 72
+
+
+def test_across_groups_there_is_one_measure_and_one_metric(
+    browser: Any, tmp_path: Path, site: Site, study: list[dict[str, Any]]
+) -> None:
+    other = in_another_metric(write_results(tmp_path / "theirs", study, by="Lab"))
+    write_site([site.own, other], tmp_path / "site", site.own)
+    page = browser.new_page()
+    reader = Reader(page, tmp_path / "site").open()
+    assert len(reader.names()) == 24
+    for metric in ("psnr_linear", "flip_srgb"):
+        page.select_option("#measure", f"picture {metric}")
+        page.select_option("#arrange", "across")
+        assert len(reader.names()) == 12
+        title = {"psnr_linear": "PSNR", "flip_srgb": "FLIP"}[metric]
+        assert all(title in text for text in page.locator("td.across:visible").all_inner_texts())
+    page.select_option("#measure", "")
+    assert len(reader.names()) == 12
+    assert len(reader.open(view="#arrange=across").names()) == 12
+    assert not reader.wrong
+    page.close()
 
 
 def test_a_link_leads_to_the_same_view(reader: Reader) -> None:
@@ -154,17 +181,14 @@ def test_going_to_a_part_of_the_page_keeps_the_view(reader: Reader) -> None:
     assert len(reader.names()) == 12
 
 
-def test_older_versions_are_left_out_until_they_are_asked_for(
+def test_other_versions_are_left_out_until_they_are_asked_for(
     browser: Any, tmp_path: Path, study: list[dict[str, Any]]
 ) -> None:
-    from holobench_eval.report.site import write_site
-    from tests.support.results_folder import write_results
-
-    write_site([write_results(tmp_path / "old", study, known={"harness": "3"})], tmp_path / "site")
+    write_site([write_results(tmp_path / "old", study, known={"harness": "3"})], tmp_path / "site", tmp_path)
     page = browser.new_page()
     reader = Reader(page, tmp_path / "site").open()
     assert reader.names() == []
-    assert "12 rows of older versions are left out" in page.inner_text("#status")
+    assert "12 rows of other versions are left out" in page.inner_text("#status")
     page.select_option("#version", "")
     assert len(reader.names()) == 12
     assert reader.view() == "#version="

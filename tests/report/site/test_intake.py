@@ -11,16 +11,18 @@ import pytest
 from PIL import Image
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report.site import pictures, write_site
+from holobench_eval.report.site import checks, pictures, write_site
 from holobench_eval.report.site.intake import read
 from tests.support.results_folder import edited, write_results
 
 from .conftest import LAB, Site
 
+OWN = Path("reports")
+
 
 def refused(folder: Path, *words: str) -> None:
     with pytest.raises(UserError) as error:
-        write_site([folder], folder.parent / "site")
+        write_site([folder], folder.parent / "site", OWN)
     text = str(error.value)
     assert "\n" not in text
     for word in words:
@@ -35,9 +37,15 @@ def told(folder: Path, **changes: Any) -> None:
     path.write_text(json.dumps({key: value for key, value in known.items() if value is not None}))
 
 
+def pretending(folder: Path) -> None:
+    """No word of whose it is, and a report as own folders have it."""
+    told(folder, by=None)
+    (folder / "report.md").write_text("# Mine")
+
+
 def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> None:
     (handed_in / "tests.csv").unlink()
-    assert write_site([handed_in], handed_in.parent / "site") == (1, [])
+    assert write_site([handed_in], handed_in.parent / "site", OWN) == (1, [])
     page = (handed_in.parent / "site" / "methods" / "hil.html").read_text()
     assert "Their lab" in page
     assert page.count("<figure>") == 2
@@ -51,8 +59,8 @@ def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> 
         ("psnr_linear_db", "nan", ("psnr_linear_db nan", "expected a number from")),
         ("psnr_linear_db", "much", ("psnr_linear_db", "much")),
         ("ssim_linear", "1.5", ("ssim_linear 1.5", "to 1")),
-        ("captures", "-1", ("captures -1", "at least 0")),
-        ("solving_s", "inf", ("solving_s inf", "at least 0")),
+        ("captures", "-1", ("captures -1", "from 0 to 1e+09")),
+        ("solving_s", "inf", ("solving_s inf", "from 0 to")),
         ("state", "won", ("state 'won'", "done, failed")),
         ("state", "failed", ("is not done and has a score",)),
         ("category", "best", ("category 'best'", "open loop")),
@@ -61,6 +69,13 @@ def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> 
         ("exposure", "bright", ("exposure 'bright'", "equal")),
         ("label", "x" * 400, ("a name of 400 characters", "at most 300")),
         ("display", "nobody's", ("no digest of the display", "nobody's")),
+        ("display", "no\nbody", ("display 'no\\nbody'", "cannot be seen")),
+        ("label", "\u202eevil", ("label '\\u202eevil'", "cannot be seen")),
+        ("label", "hil", ("differs by case or space alone from",)),
+        ("target", "Astro\u200bnaut", ("target", "cannot be seen")),
+        ("captures", "2e9", ("captures 2e+09", "from 0 to 1e+09")),
+        ("captures", "30", ("is open loop and has captures",)),
+        ("panel_height_px", "-256", ("panel_height_px '-256'", "from 1 to 99999")),
     ],
 )
 def test_a_wrong_cell_is_refused(handed_in: Path, column: str, value: str, words: tuple[str, ...]) -> None:
@@ -122,8 +137,13 @@ def linked(name: str) -> Callable[[Path], None]:
         (lambda folder: told(folder, profiles=None), ("lacks profiles",)),
         (lambda folder: told(folder, profiles={"ideal": {"sha256": "12"}}), ("profile 'ideal' has no digest",)),
         (lambda folder: told(folder, by=None), ('lacks "by"', "Our lab")),
+        (pretending, ('lacks "by"', "own ones lie below reports, see --own")),
         (lambda folder: told(folder, by=" "), ('"by" is not a name',)),
         (lambda folder: told(folder, by=["a"]), ('"by" is not a name',)),
+        (lambda folder: told(folder, by="a\nlab"), ('"by" is not a name',)),
+        (lambda folder: told(folder, by=" OWN"), ("which nobody is called here",)),
+        (lambda folder: told(folder, profiles={"a\nb": {}}), ("profile 'a\\nb' has no digest",)),
+        (lambda folder: told(folder, cpu=float("nan")), ("not finite",)),
         (lambda folder: told(folder, displays={"ideal": "magic"}), ("simulated, real, learned",)),
         (lambda folder: told(folder, displays={"ideal": []}), ("simulated, real, learned",)),
     ],
@@ -164,6 +184,8 @@ def elsewhere(folder: Path) -> None:
         (lambda folder: picture(folder).rename(folder / "thumbnails" / "a.png"), ("a.png: no such cell",)),
         (escaping, ("outside.png: a link",)),
         (elsewhere, ("thumbnails: not a folder of its own",)),
+        (lambda folder: Image.new("I;16", (8, 8)).save(picture(folder)), ("more than 8 bits a channel",)),
+        (lambda folder: picture(folder).rename(folder / "thumbnails" / "a\nb.png"), ("'a\\nb.png'", "rename it")),
     ],
 )
 def test_a_wrong_picture_is_refused(handed_in: Path, change: Callable[[Path], object], words: tuple[str, ...]) -> None:
@@ -185,11 +207,35 @@ def test_a_thumbnail_of_others_is_written_anew_pixel_for_pixel(handed_in: Path) 
     path = picture(handed_in)
     before = Image.open(path).convert("RGB").tobytes()
     path.write_bytes(path.read_bytes() + b"<script>alert(1)</script>")
-    found = pictures.thumbnails(read(handed_in))
+    found = pictures.thumbnails(read(handed_in, OWN))
     assert all(b"script" not in each.content for each in found)
     assert found[0].width == 32
     path.write_bytes(found[0].content)
     assert Image.open(path).convert("RGB").tobytes() == before
+
+
+@pytest.mark.parametrize(("limit", "words"), [("MOST_ROWS", "rows; expected"), ("MOST_LABELS", "labels; expected")])
+def test_a_folder_of_too_many_rows_or_labels_is_refused(
+    handed_in: Path, monkeypatch: pytest.MonkeyPatch, limit: str, words: str
+) -> None:
+    monkeypatch.setattr(checks, limit, 5)
+    refused(handed_in, words, "at most 5")
+
+
+def test_a_linked_report_in_a_folder_of_reports_is_refused(tmp_path: Path, passing: Path) -> None:
+    (tmp_path / "all").mkdir()
+    (tmp_path / "all" / "linked").symlink_to(passing)
+    with pytest.raises(UserError, match="linked: a link"):
+        write_site([tmp_path / "all"], tmp_path / "site", OWN)
+
+
+def test_own_is_what_lies_below_the_folder_of_own_reports_and_names_nobody(
+    tmp_path: Path, study: list[dict[str, Any]]
+) -> None:
+    ours, kept = write_results(tmp_path / "a" / "b", study), write_results(tmp_path / "a" / "c", study, by="Lab")
+    assert (read(ours, tmp_path / "a").by, read(kept, tmp_path / "a").by) == ("", "Lab")
+    with pytest.raises(UserError, match='lacks "by"'):
+        read(ours, tmp_path / "others")
 
 
 def test_one_bad_folder_among_good_ones_stops_the_site(site: Site, tmp_path: Path, study: list[dict[str, Any]]) -> None:
@@ -197,23 +243,23 @@ def test_one_bad_folder_among_good_ones_stops_the_site(site: Site, tmp_path: Pat
     bad = write_results(tmp_path / "all" / "bad", study)
     (bad / "records.csv").unlink()
     with pytest.raises(UserError, match=r"bad/records.csv: missing"):
-        write_site([tmp_path / "all"], tmp_path / "site")
+        write_site([tmp_path / "all"], tmp_path / "site", tmp_path / "all")
 
 
 def test_a_folder_without_records_is_named(tmp_path: Path, study: list[dict[str, Any]]) -> None:
     write_results(tmp_path / "all" / "good", study)
     (tmp_path / "all" / "timings").mkdir()
-    assert write_site([tmp_path / "all"], tmp_path / "site") == (1, [tmp_path / "all" / "timings"])
+    assert write_site([tmp_path / "all"], tmp_path / "site", tmp_path / "all") == (1, [tmp_path / "all" / "timings"])
     assert "timings: no records.csv, left out" in (tmp_path / "site" / "index.html").read_text()
 
 
 def test_an_output_that_is_no_site_or_overlaps_is_refused(site: Site, tmp_path: Path) -> None:
     (tmp_path / "kept.txt").write_text("mine")
-    for output, word in ((tmp_path, "no site"), (site.own / "site", "overlaps"), (site.own.parent, "no site")):
+    for output, word in ((tmp_path, "no file of"), (site.own / "site", "overlaps"), (site.own.parent, "no file of")):
         with pytest.raises(UserError, match=word):
-            write_site([site.own], output)
+            write_site([site.own], output, site.own)
     assert [path.name for path in tmp_path.iterdir()] == ["kept.txt"]
 
 
 def test_whose_result_it_is_stands_in_the_provenance(site: Site) -> None:
-    assert (read(site.own).by, read(site.other).by) == ("", LAB)
+    assert (read(site.own, site.own).by, read(site.other, site.own).by) == ("", LAB)

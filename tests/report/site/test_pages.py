@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from html.parser import HTMLParser
 from pathlib import Path
@@ -51,9 +52,7 @@ def pages(site: Site) -> dict[Path, Elements]:
     return {path: Elements(path) for path in sorted(site.output.rglob("*.html"))}
 
 
-def test_every_link_leads_to_a_file_and_all_but_the_reports_are_in_the_site(
-    site: Site, pages: dict[Path, Elements]
-) -> None:
+def test_every_link_leads_to_a_file_of_the_site(site: Site, pages: dict[Path, Elements]) -> None:
     followed = 0
     for path, page in pages.items():
         for address in page.addresses:
@@ -64,7 +63,7 @@ def test_every_link_leads_to_a_file_and_all_but_the_reports_are_in_the_site(
             assert not parts.netloc
             there = (path.parent / unquote(parts.path)).resolve() if parts.path else path
             assert there.is_file(), address
-            assert there.is_relative_to(site.output) or there.parent == site.own
+            assert there.is_relative_to(site.output)
             if parts.fragment:
                 assert parts.fragment in pages[there].ids
             followed += 1
@@ -107,8 +106,8 @@ def test_equal_folders_give_equal_bytes_and_nothing_of_an_earlier_site_is_left(
     shutil.copytree(site.own, moved / "reports" / "ours")
     shutil.copytree(site.other, moved / "others" / site.other.name)
     stale = write_results(moved / "stale", study, known={"harness": "3"})
-    write_site([stale], moved / "site")
-    write_site([moved / "reports", moved / "others"], moved / "site")
+    write_site([stale], moved / "site", moved)
+    write_site([moved / "reports", moved / "others"], moved / "site", moved / "reports")
     first, second = (
         {path.relative_to(root): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
         for root in (site.output, moved / "site")
@@ -129,7 +128,7 @@ def test_a_row_without_any_score_says_so(tmp_path: Path, study: list[dict[str, A
         record | ({"state": "failed", "scores": {}, "reason": "no light"} if record["label"] == "SGD" else {})
         for record in study
     ]
-    write_site([write_results(tmp_path / "ours", records)], tmp_path / "site")
+    write_site([write_results(tmp_path / "ours", records)], tmp_path / "site", tmp_path)
     page = (tmp_path / "site" / "methods" / "sgd.html").read_text()
     assert '<span class="hole">no score</span>' in page
     assert "0 of 4, 4 failed" in page
@@ -141,7 +140,8 @@ def test_question_and_answer_of_a_report_are_shown_without_links(site: Site) -> 
     assert "Is it &lt;b&gt;better&lt;/b&gt;?" in page
     assert "[Yes](https://example.org)" in page
     assert "<h2>More</h2>" not in page
-    assert 'href="../../reports/ours/report.md"' in page
+    assert "reports/ours/report.md" in page
+    assert 'href="../../' not in page
     assert "report.md" not in site.text(f"studies/{slug(THEIRS)}.html").replace("has no report.md", "")
 
 
@@ -154,7 +154,7 @@ def test_a_real_display_is_marked_whatever_its_name(tmp_path: Path, study: list[
 
     records = [renamed(record) for record in study if record["cell"]["condition"] != "ideal"]
     known = {"profiles": {name: {"version": 1, "sha256": "3" * 64}}, "displays": {name: "real"}}
-    write_site([write_results(tmp_path / "ours", records, known=known)], tmp_path / "site")
+    write_site([write_results(tmp_path / "ours", records, known=known)], tmp_path / "site", tmp_path)
     index = Elements(tmp_path / "site" / "index.html")
     assert ("option", {"value": f"{name}, real"}) in index.found
     pages = list((tmp_path / "site" / "displays").iterdir())
@@ -198,11 +198,30 @@ def test_no_parameter_of_a_profile_is_lost(name: str) -> None:
         assert {("panel", "pitch"), ("panel", "wavelengths"), ("panel", "distance")} <= keys
 
 
-@pytest.mark.parametrize("pair", [("HIL", "hil"), ("a/b", "a_b"), ("..", "."), ("é", "e"), ("x" * 200, "x" * 201)])
+@pytest.mark.parametrize(
+    "pair", [("HIL", "hil"), ("a/b", "a_b"), ("..", "."), ("é", "e"), ("x" * 200, "x" * 201), ("a b", slug("a b"))]
+)
 def test_no_two_names_share_a_file_on_any_file_system(pair: tuple[str, str]) -> None:
     first, second = map(slug, pair)
     assert first.lower() != second.lower()
     assert all("/" not in name and name.strip(".") for name in (first, second))
+
+
+@pytest.mark.parametrize("name", ["con", "nul", "COM1", "com1.x", "lpt9", "a.", ""])
+def test_no_name_is_that_of_a_device_or_ends_in_a_dot(name: str) -> None:
+    assert re.fullmatch(r"[a-z0-9_.]*-[0-9a-f]{8}", slug(name))
+    assert "." not in slug(name)
+
+
+def test_no_report_of_others_and_no_linked_report_is_named(tmp_path: Path, study: list[dict[str, Any]]) -> None:
+    other = write_results(tmp_path / "theirs", study, by="Lab")
+    (other / "report.html").write_text("<script>alert(1)</script>")
+    own = write_results(tmp_path / "ours", study)
+    (own / "report.html").symlink_to("/etc/hostname")
+    write_site([other, own], tmp_path / "site", tmp_path)
+    theirs, ours = (Elements(tmp_path / "site" / "studies" / f"{name}.html") for name in ("theirs", "ours"))
+    assert "report.html" not in theirs.text + ours.text
+    assert "ours/report.md" in ours.text
 
 
 def test_a_kind_that_is_told_is_taken_and_a_network_is_recognised_without(
@@ -212,7 +231,7 @@ def test_a_kind_that_is_told_is_taken_and_a_network_is_recognised_without(
     known = json.loads((folder / "provenance.json").read_text())
     known["displays"] = {"ideal": "real", "leto-aged": "simulated"}
     (folder / "provenance.json").write_text(json.dumps(known))
-    assert {group.display.marked for group in groups([read(folder)])} == {
+    assert {group.display.marked for group in groups([read(folder, folder)])} == {
         f"ideal photographed ({load_profile('ideal').digest[:8]}), real",
         "leto-aged",
     }

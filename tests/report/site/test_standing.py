@@ -4,23 +4,33 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
-from holobench_eval.report.site.intake import read
-from holobench_eval.report.site.standing import CURRENT, OLDER, UNRECORDED, Group, groups
-from tests.support.results_folder import write_results
+from holobench_eval.report.site.board import Names, board
+from holobench_eval.report.site.intake import Source, read
+from holobench_eval.report.site.standing import ANOTHER, CURRENT, UNRECORDED, Group, groups
+from holobench_eval.study.versions import HARNESS
+from tests.support.results_folder import TARGETS, write_results
 
 from .conftest import HOSTILE, OTHER, Site, of_others
+
+
+def taken(folder: Path) -> Source:
+    """A folder whose place makes it own, unless it says whose it is."""
+    return read(folder, folder)
+
 
 Records = list[dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
 def found(site: Site) -> list[Group]:
-    return groups([read(site.own), read(site.other)])
+    return groups([taken(site.own), taken(site.other)])
 
 
 def of(found: list[Group], display: str) -> Group:
@@ -31,7 +41,7 @@ def test_means_and_intervals_are_those_of_table_csv(site: Site) -> None:
     with (site.own / "table.csv").open(newline="") as file:
         expected = {(row["label"], row["condition"]): row for row in csv.DictReader(file)}
     compared = 0
-    for group in groups([read(site.own)]):
+    for group in groups([taken(site.own)]):
         for row in group.rows:
             line = expected[row.label, group.display.name]
             for value, name in (
@@ -49,7 +59,7 @@ def test_means_and_intervals_are_those_of_table_csv(site: Site) -> None:
 def test_differences_are_those_of_tests_csv(site: Site) -> None:
     with (site.own / "tests.csv").open(newline="") as file:
         expected = {(row["label"], row["condition"]): row for row in csv.DictReader(file)}
-    gains = [(row, group) for group in groups([read(site.own)]) for row in group.rows if row.gain]
+    gains = [(row, group) for group in groups([taken(site.own)]) for row in group.rows if row.gain]
     assert len(gains) == 9  # of 12 rows, without the baselines and the row with a hole
     for row, group in gains:
         assert row.gain is not None
@@ -63,7 +73,7 @@ def test_the_same_targets_display_and_harness_are_one_group_across_folders(found
     assert len(found) == 2
     group = of(found, "ideal")
     assert {row.source.by for row in group.rows} == {"", "<i>Their</i> lab"}
-    assert group.baseline is not None
+    assert group.baselines == ("Wirtinger",)
     theirs = next(row for row in group.rows if row.label == HOSTILE)
     ours = next(row for row in group.rows if row.label == "HIL")
     assert theirs.score.mean == pytest.approx(ours.score.mean + 1)
@@ -115,7 +125,7 @@ def test_what_differs_in_anything_that_matters_is_another_group(
     if "cluster" in change:
         text = (other / "records.csv").read_text().replace(",astronaut,astronaut,", ",astronaut,coffee,")
         (other / "records.csv").write_text(text)
-    found = groups([read(site.own), read(other)])
+    found = groups([taken(site.own), taken(other)])
     assert len(found) == 4
     assert all(len({row.source.by for row in group.rows}) == 1 for group in found)
 
@@ -127,14 +137,112 @@ def test_a_floor_that_differs_by_rounding_alone_is_the_same_group(site: Site, st
         if record["scores"]
     ]
     other = write_results(tmp_path / "theirs", records, by="Lab")
-    assert len(groups([read(site.own), read(other)])) == 2
+    assert len(groups([taken(site.own), taken(other)])) == 2
 
 
 def test_the_very_same_cells_in_two_studies_are_one_row(site: Site, study: Records, tmp_path: Path) -> None:
     again = write_results(tmp_path / "again", study)
-    rows = of(groups([read(site.own), read(again)]), "ideal").rows
+    rows = of(groups([taken(site.own), taken(again)]), "ideal").rows
     assert len(rows) == 6
-    assert all([source.name for source in row.also] == ["again"] for row in rows)
+    assert all({source.name for source in row.sources} == {"again", "ours"} for row in rows)
+
+
+def test_a_copy_by_others_is_no_row_of_its_own_and_shows_whose_it_is(
+    site: Site, study: Records, tmp_path: Path
+) -> None:
+    copy = write_results(tmp_path / "copy", study, by="Lab")
+    rows = of(groups([taken(copy), taken(site.own)]), "ideal").rows
+    assert [row.whose for row in rows] == ["own, Lab"] * 6
+
+
+def test_ranks_count_methods_with_their_parameters_and_not_their_runs(
+    site: Site, study: Records, tmp_path: Path
+) -> None:
+    again = write_results(tmp_path / "another", [r | {"cell": {**r["cell"], "seed": 5}} for r in study], by="Lab")
+    frame = pd.read_csv(again / "records.csv", dtype=str, keep_default_na=False)
+    frame["parameters"] = '{"seed": 5}'
+    frame.to_csv(again / "records.csv", index=False)
+    alone, both = of(groups([taken(site.own)]), "ideal"), of(groups([taken(again), taken(site.own)]), "ideal")
+    assert both.ranked == alone.ranked
+    own = {row.label: row.rank for row in both.rows if not row.source.by}
+    assert own == {row.label: row.rank for row in alone.rows}
+    theirs = [row for row in both.rows if row.source.by and row.category != "ceiling"]
+    assert theirs
+    assert all(row.rank is None and row.is_further for row in theirs)
+
+
+def worse(records: Records, label: str, by: float) -> Records:
+    """Records of other runs, in which one method is worse."""
+    changed = []
+    for record in of_others(records):
+        loss = by if record["label"] == label else 0.0
+        scores = {key: value - loss * (key == "psnr_linear") for key, value in record["scores"].items()}
+        changed.append(record | {"scores": scores})
+    return changed
+
+
+def test_no_folder_sets_the_baseline_of_another(site: Site, study: Records, tmp_path: Path) -> None:
+    other = write_results(tmp_path / "theirs", worse(study, "Wirtinger", 6.0), by="Lab")
+    alone = {row.label: row.gain for row in of(groups([taken(site.own)]), "ideal").rows}
+    for order in ((site.own, other), (other, site.own)):
+        rows = of(groups([taken(folder) for folder in order]), "ideal").rows
+        assert {row.label: row.gain for row in rows if not row.source.by} == alone
+        theirs = {row.label: row.gain for row in rows if row.source.by}
+        ours, lab = alone["SGD"], theirs["SGD"]
+        assert ours is not None
+        assert lab is not None
+        assert lab.mean == pytest.approx(ours.mean + 6.0)
+
+
+def test_targets_are_the_same_images_only_where_every_one_has_a_constant_image(study: Records, tmp_path: Path) -> None:
+    few = [r for r in study if r["label"] != "floor_constant" or r["cell"]["target"] == TARGETS[0]]
+    folders = [write_results(tmp_path / name, few, by=name) for name in ("Lab A", "Lab B")]
+    found = groups([taken(folder) for folder in folders])
+    assert len(found) == 4
+    assert all(len({row.source.by for row in group.rows}) == 1 for group in found)
+
+
+def as_files(folder: Path) -> Path:
+    """Make a folder one of photographs that were given as files."""
+    frame = pd.read_csv(folder / "records.csv", dtype=str, keep_default_na=False)
+    frame = frame[frame["condition"].isin(["reference", "ideal"])]
+    frame["measure"], frame["display"] = "files", ""
+    frame["condition"] = frame["condition"].replace("ideal", "bench")
+    frame.to_csv(folder / "records.csv", index=False)
+    return folder
+
+
+def test_photographs_of_two_labs_in_folders_of_one_name_are_two_displays(study: Records, tmp_path: Path) -> None:
+    known = {"files": {}, "profiles": {}, "code_sha256": {"metrics": HARNESS}}
+    folders = [
+        as_files(write_results(tmp_path / name / "results", study, by=name, known=known)) for name in ("Lab A", "Lab B")
+    ]
+    found = groups([taken(folder) for folder in folders])
+    assert len({group.display.title for group in found}) == len(found) == 2
+    assert all(len({row.source.by for row in group.rows}) == 1 for group in found)
+
+
+def in_another_metric(folder: Path) -> Path:
+    """Make a folder one of a headline whose lower values are better."""
+    frame = pd.read_csv(folder / "records.csv", dtype=str, keep_default_na=False).rename(
+        columns={"psnr_linear_db": "flip_srgb"}
+    )
+    frame["flip_srgb"] = [f"{float(value) / 100:.4f}" if value else "" for value in frame["flip_srgb"]]
+    frame.to_csv(folder / "records.csv", index=False)
+    tests = pd.read_csv(folder / "tests.csv", dtype=str, keep_default_na=False)
+    tests.assign(metric="flip_srgb").to_csv(folder / "tests.csv", index=False)
+    return folder
+
+
+def test_a_metric_whose_lower_values_are_better_sorts_by_what_is_better(study: Records, tmp_path: Path) -> None:
+    found = groups([taken(in_another_metric(write_results(tmp_path / "theirs", study, by="Lab")))])
+    rows = of(found, "ideal").rows
+    assert [row.score.mean for row in rows] == sorted(row.score.mean for row in rows)
+    page = str(board([of(found, "ideal")], Names({str(tmp_path / "theirs"): "theirs"})))
+    for key in ("score", "gain", "above"):
+        numbers = [float(value) for value in re.findall(rf'data-{key}="([^"]+)"', page)]
+        assert len(numbers) > 3
+        assert numbers == sorted(numbers, reverse=True)
 
 
 def test_a_profile_of_the_package_with_another_digest_is_a_display_of_its_own(
@@ -142,7 +250,9 @@ def test_a_profile_of_the_package_with_another_digest_is_a_display_of_its_own(
 ) -> None:
     known = {"profiles": {name: {"version": 1, "sha256": OTHER} for name in ("leto-aged", "ideal")}}
     other = write_results(tmp_path / "theirs", study, by="Lab", known=known)
-    titles = {group.display.title for group in groups([read(site.own), read(other)])}
+    found = groups([taken(site.own), taken(other)])
+    assert {(group.display.is_other, group.version) for group in found} == {(False, CURRENT), (True, ANOTHER)}
+    titles = {group.display.title for group in found}
     assert titles == {"leto-aged", "ideal", "leto-aged (other 22222222)", "ideal (other 22222222)"}
 
 
@@ -150,8 +260,8 @@ def test_versions_are_told_apart(study: Records, tmp_path: Path) -> None:
     versions = {}
     for name, harness in (("new", {}), ("old", {"harness": "3: of old"}), ("unknown", {"harness": ""})):
         folder = write_results(tmp_path / name, study, known=harness)
-        versions[name] = {group.version for group in groups([read(folder)])}
-    assert versions == {"new": {CURRENT}, "old": {OLDER}, "unknown": {UNRECORDED}}
+        versions[name] = {group.version for group in groups([taken(folder)])}
+    assert versions == {"new": {CURRENT}, "old": {ANOTHER}, "unknown": {UNRECORDED}}
 
 
 def test_a_score_above_the_constant_image_is_paired(found: list[Group]) -> None:
@@ -171,7 +281,7 @@ def test_means_of_committed_reports_are_those_of_their_tables(name: str) -> None
     expected = {(line[label], line["condition"]): line[score] for line in lines if line["condition"] != "reference"}
     found = {
         (row.label, group.display.name): f"{row.score.mean:.6g}"
-        for group in groups([read(folder)])
+        for group in groups([taken(folder)])
         for row in group.rows
     }
     assert found == expected

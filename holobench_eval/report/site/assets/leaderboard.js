@@ -8,14 +8,15 @@ const home = new Map(groups.flatMap((group) => [...group.rows].slice(1).map((row
 const rows = [...home.keys()];
 const everything = table.createTBody(); // of all groups, where they are shown together
 const headings = [...table.tHead.rows[0].cells].filter((cell) => cell.dataset.key);
+const alone = headings.filter((cell) => cell.classList.contains("within")).map((cell) => cell.dataset.key); // in a group
 const better = Object.fromEntries(headings.map((cell) => [cell.dataset.key, cell.dataset.better]));
 
 const DEFAULTS = {
-  arrange: "within", // groups, or "across": all of them, by differences alone
+  arrange: "within", // groups, or "across": all of them with one measure and metric, by differences alone
   display: "",
   category: "",
   measure: "",
-  version: "new", // without older ones; empty: all
+  version: "new", // without other ones; empty: all
   captures: "", // at most
   seconds: "",
   text: "",
@@ -24,7 +25,6 @@ const DEFAULTS = {
 };
 const FILTERS = ["arrange", "display", "category", "measure", "version", "captures", "seconds", "text"];
 const NUMBERS = ["score", "gain", "above", "captures", "seconds", "targets"];
-const ALONE = ["score"]; // columns that mean nothing beyond a group
 let state = { ...DEFAULTS };
 
 /** Whether a value may stand in the address under a name. */
@@ -41,13 +41,18 @@ function isPossible(key, value) {
 function inAddress() {
   if (location.hash && !location.hash.includes("=")) return null;
   const found = [...new URLSearchParams(location.hash.slice(1))].filter(([key, value]) => isPossible(key, value));
-  return { ...DEFAULTS, ...Object.fromEntries(found) };
+  return settled({ ...DEFAULTS, ...Object.fromEntries(found) });
 }
 
 const link = () => new URLSearchParams(Object.entries(state).filter(([key, value]) => value !== DEFAULTS[key])).toString();
 
+/** The view with one measure and metric where groups are shown together: differences in others do not compare. */
+function settled(view) {
+  return view.arrange === "across" && !view.measure ? { ...view, measure: byId("measure").options[1].value } : view;
+}
+
 function update(changes) {
-  state = { ...state, ...changes };
+  state = settled({ ...state, ...changes });
   history.replaceState(null, "", link() ? `#${link()}` : `${location.pathname}${location.search}`);
   draw();
 }
@@ -59,7 +64,7 @@ function passes(row) {
   const below = (key) => state[key] === "" || (known[key] !== "" && Number(known[key]) <= Number(state[key]));
   return (
     ["display", "category", "measure"].every((key) => state[key] === "" || known[key] === state[key]) &&
-    (state.version === "" || known.version !== "older version") &&
+    (state.version === "" || known.version !== "another version") &&
     below("captures") &&
     below("seconds") &&
     words.every((word) => known.text.includes(word))
@@ -82,17 +87,17 @@ function draw() {
   for (const key of FILTERS) if (byId(key).value !== state[key]) byId(key).value = state[key];
   const shown = new Set(rows.filter(passes));
   for (const row of rows) row.hidden = !shown.has(row);
-  const key = together && (!state.sort || ALONE.includes(state.sort)) ? "gain" : state.sort;
+  const key = together && (!state.sort || alone.includes(state.sort)) ? "gain" : state.sort;
   if (together) everything.append(...sorted(rows, key));
   else for (const group of groups) group.append(...sorted(rows.filter((row) => home.get(row) === group), key));
   for (const group of groups) group.hidden = together || ![...group.rows].some((row) => shown.has(row));
   table.classList.toggle("all", together);
   for (const cell of headings) mark(cell, key);
-  const older = state.version === "" ? 0 : rows.filter((row) => row.dataset.version === "older version").length;
+  const older = state.version === "" ? 0 : rows.filter((row) => row.dataset.version === "another version").length;
   byId("status").textContent =
     `${shown.size} of ${rows.length} rows.` +
-    (older ? ` ${older} rows of older versions are left out.` : "") +
-    (together ? " Scores of different groups do not compare: differences to the baseline of each group are shown." : "");
+    (older ? ` ${older} rows of other versions are left out.` : "") +
+    (together ? " Scores of different groups do not compare: differences in one metric, each to the baseline of its study, are shown." : "");
 }
 
 /** Say on a heading whether the rows are sorted by it. */
