@@ -7,11 +7,18 @@ import pytest
 import torch
 from hypothesis import settings
 
+from holobench_eval.study.scoring import reference
 from tests.support import fake_study
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 torch.set_num_threads(1)
+
+
+@pytest.fixture(autouse=True)
+def _guards_start_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A test with fakes must not leave its digits to one without."""
+    monkeypatch.setattr(reference, "_before", {})
 
 
 @pytest.fixture(autouse=True)

@@ -20,7 +20,7 @@ SIDE = 192  # pixels of the scored part at most: all metrics work on it, and it 
 
 Digits = dict[str, float]
 
-_before: dict[tuple[str, str, int], Digits] = {}  # by display, folder and seed, from before the first such method
+_before: dict[tuple[object, ...], Digits] = {}  # by display, panel and seed, from before the first such method
 
 
 @contextmanager
@@ -33,7 +33,7 @@ def guarded(method: str, folder: Path, display: Condition, seed: int) -> Iterato
     if plugins.is_shipped("methods", method, folder):
         yield
         return
-    key = (display.digest, display.name, seed)
+    key = (display.digest, display.name, display.spec.shape, seed)
     if key not in _before:
         _before[key] = digits(display, seed)
     try:

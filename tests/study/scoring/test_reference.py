@@ -10,7 +10,6 @@ import torch
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import StopError
 from holobench_eval.metrics import protocol
-from holobench_eval.study.scoring import reference
 from holobench_eval.study.store import Store
 from tests.study.test_run import compute
 
@@ -70,7 +69,6 @@ def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     """Undo what the methods change."""
     monkeypatch.setattr(protocol, "match", protocol.match)
     monkeypatch.setattr(torch, "randn", torch.randn)
-    monkeypatch.setattr(reference, "_before", {})
 
 
 def test_an_honest_method_is_let_through(tmp_path: Path) -> None:
