@@ -62,7 +62,7 @@ def test_photographs_through_files_score_as_the_direct_run_does(exported):
         row = (method, "leto-mild")
         assert ours.loc[row, "psnr_linear_db"] == pytest.approx(direct.loc[row, "psnr_linear_db"], abs=0.1)
         assert ours.loc[row, "ssim_linear"] == pytest.approx(direct.loc[row, "ssim_linear"], abs=0.01)
-    run("site", folder / "bench" / "report", folder / "direct", "--output", folder / "site")
+    run("site", folder / "bench" / "report", folder / "direct", "--output", folder / "site", "--own", folder)
     index = (folder / "site" / "index.html").read_text()
     names = re.findall(r"<strong><a [^>]*>([^<]*)</a></strong> [(]group", index)
     assert re.fullmatch(r"leto-mild photographed [(]\w{8}[)], real", names[0])
