@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,15 +50,3 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
     description = Description((Display("leto-aged", f"Version {HOSTILE}", (HOSTILE,)),), "x.yaml", CONFIG)
     write_report(layout, records, folder, {"cpu": HOSTILE}, description)
     return Written(folder, layout, (folder / "report.html").read_text())
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """Debian's Chromium; skipped where it or playwright is missing."""
-    sync_api = pytest.importorskip("playwright.sync_api")
-    if (program := shutil.which("chromium")) is None:
-        pytest.skip("no chromium on this machine (apt-get install chromium)")
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield started
-        started.close()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,15 +69,3 @@ def passing(tmp_path_factory: pytest.TempPathFactory, study: list[dict[str, Any]
 def handed_in(tmp_path: Path, passing: Path) -> Path:
     """A folder of others that passes."""
     return Path(shutil.copytree(passing, tmp_path / "theirs"))
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """Debian's Chromium; skipped where it or playwright is missing."""
-    sync_api = pytest.importorskip("playwright.sync_api")
-    if (program := shutil.which("chromium")) is None:
-        pytest.skip("no chromium on this machine (apt-get install chromium)")
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield started
-        started.close()
