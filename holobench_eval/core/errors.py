@@ -19,7 +19,7 @@ class BudgetError(CellError):
 
 
 class StopError(UserError):
-    """The run cannot go on, whatever cell comes next; it is no fault of a method, and the same command resumes."""
+    """The run cannot go on, whatever cell comes next; once its cause is mended, the same command resumes."""
 
 
 class LostDeviceError(StopError):

@@ -17,9 +17,9 @@ def sentences(results: Results) -> Iterator[str]:
     found = budgets(results)
     if not found:
         yield "No display has the scores of all methods for all targets, so none has a budget."
-    if found:
-        largest = [f"on {budget.condition} {_most(budget)}" for budget in found]
-        yield f"What explains most of the squared error: {'; '.join(largest)}."
+        return
+    largest = [f"on {budget.condition} {_most(budget)}" for budget in found]
+    yield f"What explains most of the squared error: {'; '.join(largest)}."
     for budget in found:
         yield _reading(budget)
 

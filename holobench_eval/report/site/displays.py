@@ -15,12 +15,8 @@ from .intake import Source
 
 DIGITS = 8  # of a digest, in a name
 PLACE = {"real": "photographed", "learned": "learned"}  # what stands in the place of a profile, in a name
-ASSUMED, FITTED, STATED, UNSAID = (
-    "assumed",
-    "fitted",
-    "stated",
-    "not said",
-)  # what a profile says of where a value comes from
+# What a profile says of where a value comes from.
+ASSUMED, FITTED, STATED, UNSAID = "assumed", "fitted", "stated", "not said"
 
 _COUNTS = {"one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6}
 _NEXT = re.compile(rf"as the next(?: ({'|'.join(_COUNTS)}))?")

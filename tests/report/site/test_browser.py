@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from holobench_eval.report.site import write_site
+from tests.support.axe import serious
 from tests.support.results_folder import write_results
 
 from .conftest import HOSTILE, Site
@@ -228,20 +227,13 @@ def test_without_scripts_every_row_is_there(browser: Any, site: Site) -> None:
 def test_axe_finds_nothing_serious_and_nothing_is_wider_than_the_window(
     browser: Any, site: Site, scheme: str, width: int
 ) -> None:
-    spec = find_spec("axe_playwright_python")
-    if spec is None or spec.origin is None:
-        pytest.skip("axe-core is not installed")
-    axe = Path(spec.origin).with_name("axe.min.js").read_text()
     page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=scheme)
     others = (
         ("displays/leto-aged.html", "studies/ours.html") if scheme == "dark" else ("methods/gerchberg_saxton.html",)
     )
     for name in ("index.html", *others):
         reader = Reader(page, site.output).open(name)
-        page.evaluate(axe)
-        found = page.evaluate("async () => (await axe.run({ preload: false })).violations")
-        serious = [item for item in found if item["impact"] in ("serious", "critical")]
-        assert not serious, json.dumps([(item["id"], [n["html"][:200] for n in item["nodes"]]) for item in serious])
+        assert serious(page) == []
         assert page.evaluate("() => document.documentElement.scrollWidth") <= width
         assert not reader.wrong
     page.close()
