@@ -24,6 +24,12 @@ def variants(results: Results) -> list[str]:
     return [label for label in results.layout.methods if label != baseline and names.get(label) == names.get(baseline)]
 
 
+def _reseeded(results: Results, label: str) -> bool:
+    """Whether a row is the baseline with another seed of its training, and nothing else."""
+    params, own = (results.layout.params.get(row, {}) for row in (label, str(results.layout.baseline)))
+    return {key for key in params.keys() | own.keys() if params.get(key) != own.get(key)} == {"seed"}
+
+
 def _applies(results: Results) -> bool:
     return len(variants(results)) >= max(FEWEST, len(results.layout.methods) / 2 - 1)
 
@@ -32,8 +38,11 @@ def sentences(results: Results) -> Iterator[str]:
     """Display by display what lowers, raises and does not move the score; then the other methods."""
     for condition in results.conditions:
         tests = [test for label in variants(results) if (test := tested(results, label, condition))]
-        if tests:
-            yield from _changes(results, condition, tests)
+        reseeded = [test for test in tests if _reseeded(results, test.second)]
+        changes = [test for test in tests if test not in reseeded]
+        if changes:
+            yield from _changes(results, condition, changes)
+        yield from (_chance(results, test, changes) for test in reseeded)
     others = [label for label in results.layout.methods if label not in variants(results)]
     yield from (against_baseline(results, label) for label in others if label in subjects(results))
     yield from floor(results)
@@ -59,6 +68,18 @@ def _changes(results: Results, condition: str, tests: list[PairedTest]) -> Itera
         )
         bounds = within if np.isfinite(ends).any() else ""
         yield f"No difference is shown for the other {len(unclear)}{bounds}: {words([t.second for t in unclear])}."
+
+
+def _chance(results: Results, reseeded: PairedTest, changes: list[PairedTest]) -> str:
+    """What another seed changes, and which changes are shown but no larger."""
+    score = results.headline
+    small = [
+        test.second
+        for test in changes
+        if verdict(score, test) in ("better", "worse") and abs(test.estimate.mean) <= abs(reseeded.estimate.mean)
+    ]
+    meaning = f"so that nothing follows from {words(small)}" if small else "less than any change that is shown"
+    return f"Another seed of the same training changes it by {difference(score, reseeded.estimate)}, {meaning}."
 
 
 KIND = Kind(

@@ -144,6 +144,15 @@ def test_an_ablation_says_what_lowers_and_what_is_not_shown_to_matter() -> None:
     assert "another" not in text.split("No better")[0]
 
 
+def test_an_ablation_holds_its_changes_against_those_of_another_seed() -> None:
+    means = {"old": 19.0, "no loss": 17.0, "no skip": 18.9, "reseeded": 18.5}
+    found = results_of(means, names=dict.fromkeys(means, "hil"))
+    params = {label: {"seed": int(label == "reseeded"), "skip": label != "no skip"} for label in means}
+    text = answer(Results(found.frame, replace(found.layout, params=params)))
+    assert "Of 2 single changes of old" in text
+    assert re.search(r"Another seed .* changes it by -0.50 dB \[.*\], so that nothing follows from no skip\.", text)
+
+
 def test_a_budget_names_the_fewest_captures_that_pass_and_who_never_does() -> None:
     means = {"old": 17.0, "good, 5": 16.0, "good, 10": 18.0, "good, 20": 19.0, "bad, 5": 15.0, "bad, 10": 16.0}
     found = results_of(
