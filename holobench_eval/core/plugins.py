@@ -73,9 +73,11 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
         raise UserError(f"{kind[:-1]} '{name}' cannot be imported: {error}") from error
 
 
-def is_shipped(kind: Kind, name: str, folder: Path | None = None) -> bool:
-    """Whether a plug-in's code is that of this package. UserError as `find`."""
-    return not _is_file(name) and find(kind, name, folder).__module__.startswith(f"{__package__.partition('.')[0]}.")
+def is_shipped(kind: Kind, name: str) -> bool:
+    """Whether a plug-in's code is that of this package; nothing is imported for the answer."""
+    if _is_file(name) or name not in _entries(kind):
+        return False
+    return _entries(kind)[name].value.startswith(f"{__package__.partition('.')[0]}.")
 
 
 def _is_file(name: str) -> bool:
@@ -173,9 +175,13 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
     5
     """
     cls = find(kind, name, folder)
-    owner = f"{kind[:-1]} '{name}'"
+    return made(cls, f"{kind[:-1]} '{name}'", params, None if _is_file(name) else _kept_adapter(kind, name))
+
+
+def made(cls: type[Any], owner: str, params: dict[str, Any], adapter: TypeAdapter[Any] | None = None) -> Any:
+    """An instance of a plug-in's class, checked as by `build`. owner: what error messages call it."""
     try:
-        return checked(cls, params, owner, TypeAdapter(cls) if _is_file(name) else _kept_adapter(kind, name))
+        return checked(cls, params, owner, adapter)
     except UserError:
         raise
     except Exception as error:  # whatever a stranger's class does when it is built

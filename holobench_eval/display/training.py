@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from ..core.device import CPU, moved
+from ..core.errors import CellError
 from ..core.seeds import generator
 from .api import Camera, Display, DisplaySpec, check_phase, white_irradiance
 from .metered import Account
@@ -103,8 +104,12 @@ class TrainingBench:
         """Show ``phase`` ``(C, H, W)`` [rad] and photograph it; counted.
 
         Returns the capture in the image's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency.
-        The noise depends on the study's seed, the image and ``names``. BudgetError when no capture is left.
+        The noise depends on the study's seed, the image and ``names``. BudgetError when no capture is left, CellError
+        for an image that is neither one of the bench's nor an even gray: no scored target is photographed here.
         """
+        given = [known.target for known in (*self.images, *self.held_out) if known.item == image.item]
+        if not any(torch.equal(known, image.target) for known in given) and not _is_even(image.target):
+            raise CellError(f"{self._label} photographed '{image.item}', which is no image it may be trained with")
         check_phase(phase, self.spec, self._label)
         self._account.take()
         return self._display.rectified(self._camera(image, *names).capture(phase.detach()), image.target)
@@ -147,3 +152,7 @@ class TrainingBench:
     def log(self, **row: float | int | str) -> None:
         """A row for those who watch: numbers by name, such as round, step, losses and fidelity."""
         self._memory.log({**row, "captures": self.captures, "seconds": round(self.seconds, 1)})
+
+
+def _is_even(image: Tensor) -> bool:
+    return bool((image == image[:, :1, :1]).all())

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from types import MappingProxyType
 
-from ..core import plugins
 from ..core.errors import UserError
 from ..display.api import DisplaySpec
 from ..display.simulated.profile import Profile, load_profile
 from ..display.simulated.stages import Panel
+from ..study import isolation
 from ..study.calibration import load_calibration
 from ..study.definition import Study
 from ..study.displays import Condition
@@ -54,7 +54,7 @@ def describe(study: Study) -> Description:
         displays = tuple(_real(condition) for condition in conditions(study).values())
     elif study.display.learned is None:
         profiles = [load_profile(source, study.folder) for source in study.display.profiles]
-        methods = {entry.label: plugins.find("methods", entry.name, study.folder) for entry in study.methods}
+        methods = {entry.label: isolation.find(entry.name, study.folder) for entry in study.methods}
         forms = {label: method.form for label, method in methods.items() if hasattr(method, "form")}
         displays = tuple(_simulated(profile, study.display.panel, forms) for profile in profiles)
     else:

@@ -12,7 +12,6 @@ from typing import Any
 
 from ..core import plugins
 from ..core.errors import UserError, suggest
-from ..core.plugins import params_of
 from ..core.schema import placed, typed
 from ..core.yaml_source import Document, Keys, load
 from ..display.simulated.changes import KINDS, altered, checked
@@ -20,6 +19,7 @@ from ..display.simulated.profile import load_profile
 from ..imaging.grid import SMALLEST_REGION
 from ..metrics import Metric, catalogue
 from ..metrics.lpips import find_weights
+from . import isolation
 from .definition import DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
 from .displays import condition, displays, real_condition
 from .focal_stacks import SCORES, planes_of
@@ -86,7 +86,7 @@ def _targets(study: Study, document: Document) -> Targets:
             raise UserError(f"dataset '{study.targets.dataset}' has no images")
         if study.measure == "focus":
             planes_of(dataset, study.targets.dataset)
-    return replace(study.targets, params=params_of(dataset))
+    return replace(study.targets, params=plugins.params_of(dataset))
 
 
 def _training(study: Study, document: Document) -> Training:
@@ -96,16 +96,16 @@ def _training(study: Study, document: Document) -> Training:
         count = len(dataset.items())
         if chosen.held_out >= count:
             raise UserError(f"training.held_out {chosen.held_out} leaves nothing of {count} images to train on")
-    return replace(chosen, params=params_of(dataset))
+    return replace(chosen, params=plugins.params_of(dataset))
 
 
 def _holograms(study: Study, document: Document) -> Probe:
     chosen = study.holograms
     with placed(document, ("holograms", "name"), ("holograms", "params")):
-        method = plugins.build("methods", chosen.name, dict(chosen.params), study.folder)
+        method = isolation.build(chosen.name, chosen.params, study.folder)
         if getattr(method, "trains", False):
             raise UserError(f"method '{chosen.name}' has to be trained; holograms should be of one that learns nothing")
-    return replace(chosen, params=params_of(method))
+    return replace(chosen, params=isolation.params_of(method))
 
 
 def _display(study: Study, document: Document) -> DisplayGrid:
@@ -123,10 +123,10 @@ def _display(study: Study, document: Document) -> DisplayGrid:
         raise document.error(("measure",), "a learned display is a prediction already; measure its pictures")
     where = ("display", "learned")
     with placed(document, (*where, "method"), (*where, "params")):
-        method = plugins.build("methods", display.learned.method, dict(display.learned.params), study.folder)
+        method = isolation.build(display.learned.method, display.learned.params, study.folder)
         if not (getattr(method, "trains", False) and hasattr(method, "predict")):
             raise UserError(f"method '{display.learned.method}' learns no display; name one that predicts captures")
-    return replace(display, learned=replace(display.learned, params=params_of(method)))
+    return replace(display, learned=replace(display.learned, params=isolation.params_of(method)))
 
 
 def _bench(study: Study, document: Document) -> DisplayGrid:
@@ -175,20 +175,24 @@ def _check_profiles(study: Study, document: Document) -> None:
 def _entry(study: Study, document: Document, index: int) -> MethodEntry:
     entry, where = study.methods[index], ("methods", index)
     with placed(document, (*where, "name"), (*where, "params")):
-        method = plugins.build("methods", entry.name, dict(entry.params), study.folder)
+        method = isolation.build(entry.name, entry.params, study.folder)
         if study.predicts and not hasattr(method, "predict"):
             raise UserError(
                 f"method '{entry.name}' predicts no captures; measure: {study.measure} needs methods that do"
             )
+    place: Keys = (*where, "name") if (*where, "name") in document.keys else where
+    if getattr(method, "privileged", False) and isinstance(method, isolation.Apart) and study.isolation != "none":
+        message = f"'{entry.name}' looks into the simulated bench, which a process of its own does not hold"
+        raise document.error(place, f"{message}; a study with 'isolation: none' runs it")
     if study.display.real and getattr(method, "privileged", False):
         message = f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one"
-        raise document.error((*where, "name") if (*where, "name") in document.keys else where, message)
+        raise document.error(place, message)
     if entry.captures is not None and (not getattr(method, "camera", False) or study.predicts):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)
     profiles = subset(study, document, entry.profiles, (*where, "profiles"))
     label = entry.label or entry.name.rpartition(":")[2]
-    return replace(entry, label=label, params=params_of(method), profiles=profiles)
+    return replace(entry, label=label, params=isolation.params_of(method), profiles=profiles)
 
 
 def _check_labels(study: Study, document: Document) -> None:

@@ -52,38 +52,41 @@ class Cost:
 class Stopwatch:
     """Started by ``start()``, read by ``stop()``.
 
-    before: memory at the start, resident [KiB] or of a GPU [bytes] (None: not measured); clock: time at the start [s].
+    before: memory at the start, resident [KiB] or of a GPU [bytes] (None: not measured); clock: time at the start [s];
+    process: number of the one whose memory is measured, None for this one.
     """
 
     before: int | None
     clock: float
     device: torch.device = CPU
+    process: int | None = None
 
     def stop(self) -> Cost:
         """The cost since the start."""
-        if self.device.type == "cuda" and self.before is not None:
+        if self.device.type == "cuda" and self.process is None and self.before is not None:
             torch.cuda.synchronize(self.device)
             seconds = time.perf_counter() - self.clock
             return Cost(seconds, (torch.cuda.max_memory_allocated(self.device) - self.before) / _BYTES_PER_MIB)
         seconds = time.perf_counter() - self.clock
-        peak = None if self.before is None else _status("VmHWM")
+        peak = None if self.before is None else _status("VmHWM", self.process)
         memory = None if peak is None or self.before is None else max(0, peak - self.before) / _KIB_PER_MIB
         return Cost(seconds, memory)
 
 
-def start(device: torch.device = CPU) -> Stopwatch:
-    """Reset the peak of memory and start the clock. device: where the solution is computed.
+def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
+    """Reset the peak of memory and start the clock. device: where the solution is computed; process: the number of the
+    one that computes it, None for this one. What another process takes on a GPU is not measured.
 
     Trim the allocator first, so that reused memory shows as growth.
     """
     _collect()
     _give_back()
-    if device.type == "cuda":
+    if device.type == "cuda" and process is None:
         torch.cuda.synchronize(device)
         torch.cuda.reset_peak_memory_stats(device)
         return Stopwatch(torch.cuda.memory_allocated(device), time.perf_counter(), device)
-    before = _status("VmRSS") if _set_back() else None
-    return Stopwatch(before, time.perf_counter())
+    measured = device.type != "cuda" and _set_back(process)
+    return Stopwatch(_status("VmRSS", process) if measured else None, time.perf_counter(), device, process)
 
 
 def _collect() -> None:
@@ -100,9 +103,9 @@ def _freeze() -> None:
     gc.freeze()
 
 
-def _set_back() -> bool:
+def _set_back(process: int | None) -> bool:
     try:
-        (PROCESS / "clear_refs").write_text("5")
+        (_process(process) / "clear_refs").write_text("5")
     except OSError:
         return False
     return True
@@ -117,10 +120,14 @@ def _give_back() -> None:
     trim(0)
 
 
-def _status(name: str) -> int | None:
-    """A field of ``/proc/self/status`` [KiB]."""
+def _process(number: int | None) -> Path:
+    return PROCESS if number is None else PROCESS.with_name(str(number))
+
+
+def _status(name: str, process: int | None) -> int | None:
+    """A field of ``/proc/self/status`` [KiB], or of another process."""
     try:
-        text = (PROCESS / "status").read_text()
+        text = (_process(process) / "status").read_text()
     except OSError:
         return None
     return next((int(line.split()[1]) for line in text.splitlines() if line.startswith(f"{name}:")), None)

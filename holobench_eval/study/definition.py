@@ -18,6 +18,7 @@ LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
 Text = Annotated[str, MinLen(1)]
 Measure = Literal["picture", "prediction", "error_budget", "focus"]
+Isolation = Literal["files", "process", "none"]  # whose methods run in processes of their own
 PREDICTIONS = ("prediction", "error_budget")  # measures of captures that methods predict
 
 
@@ -139,6 +140,17 @@ class Save:
 
 
 @dataclass(frozen=True)
+class Limits:
+    """What the process of a method may take for a cell.
+
+    seconds: time, captures included; memory_gib: memory above that of the libraries [GiB], none for all there is.
+    """
+
+    seconds: Annotated[float, Interval(gt=0)] = 14400.0
+    memory_gib: Annotated[float, Interval(gt=0)] | None = None
+
+
+@dataclass(frozen=True)
 class Reported:
     """Published figures to print beside the measured ones, by method label, and where they were published.
 
@@ -165,6 +177,8 @@ class Study:
     changes of the displays at test time; baseline: label that paired tests compare against (the first method when the
     config names none); second_baseline: label of another one, such as the strongest open-loop row, that differences
     are also given to; headline: the column the report leads with.
+    isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
+    those that look into the bench, ``none`` none; limits: of these processes.
     file, text: the config file as the user named it, and what is in it.
     """
 
@@ -187,6 +201,8 @@ class Study:
     second_baseline: str = ""
     headline: Text = "psnr_linear"
     save: Save = Save()
+    isolation: Isolation = "files"
+    limits: Limits = Limits()
     reported: Reported | None = None
     file: Path = field(default=Path(), metadata={"key": False})
     text: str = field(default="", metadata={"key": False})

@@ -8,12 +8,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..core import plugins
 from ..core.hashing import digest
 from ..display import DisplaySpec, load_profile
 from ..display.simulated.changes import KINDS, Value, altered
 from ..lab.bench_file import load_bench_file
 from ..lab.session import read_manifest
+from . import isolation
 from .definition import LEARNED, Study
 
 Panel = tuple[int, int]
@@ -135,7 +135,7 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], display: C
 
     For a learned display, a method is trained on the display that the network was trained on.
     """
-    cls = plugins.find("methods", method, study.folder)
+    cls = isolation.find(method, study.folder)
     if not getattr(cls, "trains", False):
         return None
     training = study.training

@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..core import plugins
 from ..core.errors import UserError
 from ..core.hashing import digest
 from ..display.api import Exposure
 from ..metrics import catalogue
+from . import isolation
 from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
 from .focal_stacks import VERSION as IN_FOCUS
@@ -200,7 +200,7 @@ class _Ground:
     @cached_property
     def probe_sha256(self) -> str:
         """The version of the method whose captures are predicted."""
-        return method_version(plugins.find("methods", self.study.holograms.name, self.study.folder))
+        return method_version(isolation.find(self.study.holograms.name, self.study.folder))
 
     def cell(
         self,
@@ -248,7 +248,7 @@ class _Ground:
 
     def solutions(self, entry: MethodEntry, entry_displays: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
-        cls = plugins.find("methods", entry.name, self.study.folder)
+        cls = isolation.find(entry.name, self.study.folder)
         maker = (entry.name, method_version(cls), entry.params)
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
@@ -343,9 +343,7 @@ def following(tasks: Sequence[Task], folder: Path) -> Iterator[Task]:
     """
 
     def follows(task: Task) -> bool:
-        return not task.is_floor and bool(
-            getattr(plugins.find("methods", task.cells[0].method, folder), "follows", False)
-        )
+        return not task.is_floor and bool(getattr(isolation.find(task.cells[0].method, folder), "follows", False))
 
     followers = [follows(task) for task in tasks]
     if not any(followers):

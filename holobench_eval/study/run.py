@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..core import plugins
 from ..core.device import find, gpu_name
 from ..core.errors import StopError, UserError
 from ..core.errors import reason as one_line
 from ..core.hashing import canonical
 from ..metrics import catalogue
-from . import cost, provenance
+from . import cost, isolation, provenance
 from .artifacts import Artifacts
 from .definition import Study
 from .displays import Preparation
@@ -163,6 +162,8 @@ def run(
             workers=executor.workers,
             retime=retime,
             device=device,
+            isolation=study.isolation,
+            limits=study.limits,
         )
         if missing:  # else no worker need be started
             _compute(plan, missing, timed, setting, executor, watch, drawings)
@@ -187,7 +188,8 @@ def _compute(
         watch.training([(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained])
     unready = {preparation.id for preparation in untrained} | missing
     trainings = [
-        TrainingJob(preparation, setting.artifacts, setting.threads, setting.device) for preparation in untrained
+        TrainingJob(preparation, setting.artifacts, setting.threads, setting.device, setting.isolation, setting.limits)
+        for preparation in untrained
     ]
     at_work: dict[int, float] = {}
     expected = {DRAWING: DRAWING_SECONDS}
@@ -383,7 +385,7 @@ def _used(cell: Cell) -> list[tuple[str, dict[str, Any]]]:
 
 
 def _reason(name: str, params: dict[str, Any], folder: Path) -> str | None:
-    method: Any = plugins.build("methods", name, params, folder)
+    method: Any = isolation.build(name, params, folder)
     ask = getattr(method, "available", None)
     if not callable(ask):
         return None

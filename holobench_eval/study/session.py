@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..core import plugins
 from ..core.errors import Pending, UserError, suggest
 from ..core.hashing import digest
 from ..core.io import write_atomically
@@ -18,6 +17,7 @@ from ..lab.real import RealBench
 from ..lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
 from ..lab.session.geometry import look
 from ..lab.session.manifest import refuse_links_out
+from . import isolation
 from .config import load_study
 from .definition import Study
 from .displays import condition, displays, real_condition
@@ -206,7 +206,7 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
         replace(entry, profiles=(source,))
         for entry in study.methods
         if (bench is not None or source in entry.profiles)
-        and not getattr(plugins.find("methods", entry.name, study.folder), "privileged", False)
+        and not getattr(isolation.find(entry.name, study.folder), "privileged", False)
     )
     if not methods:
         raise UserError(f"{study.file}: no method of it can be shown on a real display")

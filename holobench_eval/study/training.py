@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,9 @@ from ..display.estimates import joined
 from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
 from ..lab.real import RealBench
-from . import opening
+from . import isolation, opening
 from .artifacts import LOG, RECORDS, Artifacts, provenance_of
+from .definition import Isolation, Limits
 from .displays import Preparation
 from .plan import Plan
 from .scoring.reference import guarded
@@ -33,12 +35,15 @@ WAITS = "waits for photographs"  # in place of the reason of a failure
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """A preparation and what a worker needs to train it. device: name of where it computes, see ``device.find``."""
+    """A preparation and what a worker needs to train it. device: name of where it computes, see ``device.find``;
+    isolation, limits: see ``definition.Study``."""
 
     preparation: Preparation
     folder: Path
     threads: int
     device: str = "cpu"
+    isolation: Isolation = "files"
+    limits: Limits = field(default_factory=Limits)
 
 
 def train(job: TrainingJob) -> str:
@@ -48,7 +53,7 @@ def train(job: TrainingJob) -> str:
         if artifacts.has(job.preparation):
             return ""
         try:
-            _train(job.preparation, artifacts, job.threads, device)
+            _train(job, artifacts, device)
         except StopError:
             raise
         except Pending:
@@ -59,8 +64,9 @@ def train(job: TrainingJob) -> str:
         return ""
 
 
-def _train(preparation: Preparation, artifacts: Artifacts, threads: int, device: torch.device) -> None:
-    method = plugins.build("methods", preparation.method, dict(preparation.params), preparation.folder)
+def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None:
+    preparation = job.preparation
+    method = isolation.solver(preparation.method, preparation.params, preparation.folder, job.isolation)
     images = _images(preparation, device)
     split = len(images) - preparation.held_out
     display_bench = opening.open_display(preparation.display, preparation.seed, device)
@@ -73,7 +79,11 @@ def _train(preparation: Preparation, artifacts: Artifacts, threads: int, device:
         preparation.captures,
         preparation.seed,
     )
-    with guarded(preparation.method, preparation.folder, preparation.display, preparation.seed):
+    limits = replace(job.limits, seconds=math.inf)  # those of time are for cells
+    with (
+        guarded(preparation.method, job.isolation, preparation.display, preparation.seed),
+        isolation.opened(method, device, limits),
+    ):
         state = method.prepare(bench)
     if not isinstance(state, Mapping):
         raise CellError(f"{preparation.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
@@ -81,7 +91,7 @@ def _train(preparation: Preparation, artifacts: Artifacts, threads: int, device:
     facts: dict[str, Any] = {
         "captures": bench.captures,
         "seconds": round(bench.seconds, 1),
-        "threads": threads,
+        "threads": job.threads,
         **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),
         "package": __version__,

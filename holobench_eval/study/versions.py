@@ -39,6 +39,8 @@ def method_version(cls: type[Any]) -> str:
     A shipped method declares ``version: ClassVar[int]``, 1 if it says nothing. It is raised when the method gives
     other phases, or learns something else: cells that use it are then computed, and artifacts learned, again.
     """
+    if "code_version" in vars(cls):  # of a method in a process of its own, which told it
+        return str(vars(cls)["code_version"])
     if not _ships(cls):
         return code_digest(cls)
     declared = f"{cls.__qualname__} {getattr(cls, 'version', 1)}"

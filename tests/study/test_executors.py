@@ -141,7 +141,7 @@ def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> N
 def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet() -> None:
     code = """if True:
         import time
-        from holobench_eval.study.executors.local import prepare
+        from holobench_eval.study.executors.processes import prepare
         prepare()
         print("begun", flush=True)
         try:

@@ -18,7 +18,7 @@ FAST = "{name: wirtinger, params: {iterations: 3}}"
 @pytest.mark.usefixtures("no_physics")
 def test_methods_are_shown_on_a_display_that_was_learned(tmp_path: Path) -> None:
     methods = f'[{FAST}, "trained.py:Capturing", "trained.py:Peeking", "trained.py:Gain"]'
-    config = write(tmp_path, LEARNED, ('["trained.py:Gain"]', methods))
+    config = write(tmp_path, LEARNED, ('["trained.py:Gain"]', methods), ("title: ", "isolation: none\ntitle: "))
     outcome = compute(config)
     found = {record["label"]: record for record in outcome.records}
     reasons = {label: (record["state"], record["reason"]) for label, record in found.items()}

@@ -11,6 +11,7 @@ from ...core import plugins
 from ...datasets.base import clusters_of
 from ...display.simulated.changes import draws
 from ...display.simulated.profile import load_profile
+from ...study import isolation
 from ...study.definition import PREDICTIONS, Study
 from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
@@ -171,7 +172,7 @@ def layout_of(study: Study) -> Layout:
     reported = study.reported
     conditions = displays(study)
     names = {source: condition.name for source, condition in conditions.items()}
-    methods = {entry.label: plugins.find("methods", entry.name, study.folder) for entry in study.methods}
+    methods = {entry.label: isolation.find(entry.name, study.folder) for entry in study.methods}
 
     def labels_with(attribute: str) -> frozenset[str]:
         return frozenset(label for label, method in methods.items() if getattr(method, attribute, False))
@@ -224,7 +225,7 @@ def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
     """What methods and displays are that go by their registered name alone: the first sentence of a docstring, the
     description of a profile."""
     methods = {
-        entry.label: (inspect.getdoc(plugins.find("methods", entry.name, study.folder)) or "").partition("\n\n")[0]
+        entry.label: (inspect.getdoc(isolation.find(entry.name, study.folder)) or "").partition("\n\n")[0]
         for entry in study.methods
         if entry.label == entry.name.rpartition(":")[2]
     }

@@ -9,7 +9,8 @@ from typing import Protocol, TypeVar
 
 from ...core.errors import UserError, suggest
 from .clusters import Address, Slurm
-from .local import Local, prepare
+from .local import Local
+from .processes import prepare
 
 J = TypeVar("J")
 R = TypeVar("R")

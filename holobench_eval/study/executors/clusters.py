@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ...core.errors import UserError
-from .local import ONE_THREAD
+from .processes import ONE_THREAD
 
 J = TypeVar("J")
 R = TypeVar("R")

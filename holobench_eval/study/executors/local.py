@@ -5,33 +5,21 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import (
-    connection,
-    forkserver,
-    get_all_start_methods,
-    get_context,
-    parent_process,
-    resource_tracker,
-)
+from multiprocessing import connection, parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from .processes import CONTEXT, ONE_THREAD, start
+
 J = TypeVar("J")
 R = TypeVar("R")
 
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 ATTEMPTS = 2  # of a job whose worker dies: a second loss is the job's fault
-# By the process that workers are forked from.
-PRELOADED = ["holobench_eval.study.run", "holobench_eval.study.executors.imported"]
-# Not on Windows, nor where libraries of the system do not bear a fork: every worker imports on its own there.
-FORKS = "forkserver" in get_all_start_methods() and sys.platform != "darwin"
-_CONTEXT = get_context("forkserver") if FORKS else get_context("spawn")
 
 
 class KilledWorkerError(Exception):
@@ -72,17 +60,14 @@ class _Worker(Generic[J]):
 
     def __init__(self, function: Callable[[J], Any], number: int, gpus: int) -> None:
         own = {"CUDA_VISIBLE_DEVICES": one_gpu(number, gpus)} if gpus > 1 else {}
-        self.start = (function, {**os.environ, **ONE_THREAD, **own}, Path.cwd())
+        self.arguments = (function, {**os.environ, **ONE_THREAD, **own}, Path.cwd())
         self.job: J | None = None
         self.lost = 0
         self._begin()
 
     def _begin(self) -> None:
-        self.channel, theirs = _CONTEXT.Pipe()
-        self.process = _CONTEXT.Process(target=_serve, args=(theirs, *self.start), daemon=True)
-        prepare()
-        with _one_thread():
-            self.process.start()
+        self.channel, theirs = CONTEXT.Pipe()
+        self.process = start(_serve, theirs, *self.arguments)
         theirs.close()
 
     def take(self, job: J) -> None:
@@ -150,38 +135,3 @@ def _die_with_the_parent() -> None:
     assert parent is not None
     parent.join()
     os._exit(1)
-
-
-def prepare() -> None:
-    """Start the process that workers are forked from, where it does not run; its imports take more than a second."""
-    if not FORKS:
-        return
-    _CONTEXT.set_forkserver_preload(PRELOADED)
-    resource_tracker.ensure_running()  # now, since it lets Ctrl-C through as it starts
-    with _one_thread(), _no_ctrl_c():
-        forkserver.ensure_running()
-
-
-@contextmanager
-def _no_ctrl_c() -> Iterator[None]:
-    """Processes that are started meanwhile never see Ctrl-C, not even as they import; here it waits."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Libraries that a process imports as it starts have one thread each."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

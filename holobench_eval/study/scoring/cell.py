@@ -52,7 +52,7 @@ def _measured(job: Job) -> Measured:
     first = job.task.cells[0]
     if job.task.is_floor:
         return FLOORS[first.measure](job)
-    with guarded(first.method, job.setting.folder, job.task.conditions[0], first.seed):
+    with guarded(first.method, job.setting.isolation, job.task.conditions[0], first.seed):
         return MEASURES[first.measure](job)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,9 @@ from ...core.hashing import canonical
 from ...display import CalibratedBench
 from ...display.learned import LearnedBench
 from ...lab.real import RealBench
-from .. import cost, opening
+from .. import cost, isolation, opening
 from ..artifacts import Artifact, Artifacts
-from ..definition import Save
+from ..definition import Isolation, Limits, Save
 from ..displays import Condition, Preparation
 from ..plan import Cell, Task
 from ..store import Record, Store
@@ -42,7 +42,7 @@ class Setting:
     output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
     what trained methods learned; metrics: names of those to compute (None: all); threads: torch threads of a worker;
     workers: tasks computed side by side; retime: measure wall times again, see ``cost``; device: name of where a
-    worker computes, see ``device.find``.
+    worker computes, see ``device.find``; isolation, limits: see ``definition.Study``.
     """
 
     output: Path
@@ -55,6 +55,8 @@ class Setting:
     workers: int
     retime: bool = False
     device: str = "cpu"
+    isolation: Isolation = "files"
+    limits: Limits = field(default_factory=Limits)
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ class Job:
 
     def method(self, name: str, params: Any) -> Any:
         """An instance of a method, built anew: no cell may depend on those computed before."""
-        return plugins.build("methods", name, dict(params), self.setting.folder)
+        return isolation.solver(name, params, self.setting.folder, self.setting.isolation)
 
     def learned(self, preparation: Preparation | None) -> Artifact | None:
         """A method's learned state; None if it has nothing to learn. CellError when its training failed."""

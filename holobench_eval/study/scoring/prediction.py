@@ -11,14 +11,14 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from ...core import plugins
 from ...core.device import moved
 from ...core.hashing import canonical
 from ...display import RectifiedCapture
 from ...display.api import Exposure, is_plain
 from ...metrics import match
-from .. import cost, opening
+from .. import cost, isolation, opening
 from ..artifacts import Artifact
+from ..definition import Isolation
 from ..displays import Condition
 from ..plan import Cell
 from ..store import Record
@@ -66,9 +66,10 @@ def _foresee(job: Job) -> Foreseen:
         learned=moved(learned.state, job.device) if learned else None,
     )
     own = phase[None].to(job.device, copy=True)
-    watch = cost.start(job.device)
-    predicted = method.predict(own, handle)
-    taken = watch.stop()
+    with isolation.opened(method, job.device, job.setting.limits) as process:
+        watch = cost.start(job.device, process)
+        predicted = method.predict(own, handle)
+        taken = watch.stop()
     if not is_plain(predicted) or tuple(predicted.shape) != (1, *target.shape):
         raise wrong_output(job, "predict", predicted, f"an image {(1, *target.shape)}")
     return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned)
@@ -129,15 +130,15 @@ def shown(job: Job, cell: Cell, display: Condition, again: bool = False) -> tupl
     hologram = _Hologram(
         name, cell.holograms["sha256"], params, job.source(cell), cell.repeat, cell.seed, cell.exposure
     )
-    return _photographed(hologram, display, job.setting.folder, job.device, again)
+    return _photographed(hologram, display, job.setting.folder, job.device, again, job.setting.isolation)
 
 
 @lru_cache(maxsize=64)
-def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch.device) -> Tensor:
+def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch.device, apart: Isolation) -> Tensor:
     """The phase of a hologram, computed once in a process."""
     bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
     item, own = hologram.source[3], target.to(device, copy=True)
-    method = plugins.build("methods", hologram.method, json.loads(hologram.params), folder)
+    method = isolation.solver(hologram.method, json.loads(hologram.params), folder, apart)
     handle = bench.for_method(method, hologram.method, own, item=item, repeat=hologram.repeat)
     phase: Tensor = method.solve(own[None], handle).detach().cpu()[0]
     return phase
@@ -145,10 +146,10 @@ def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch
 
 @lru_cache(maxsize=64)
 def _photographed(
-    hologram: _Hologram, display: Condition, folder: Path, device: torch.device, again: bool
+    hologram: _Hologram, display: Condition, folder: Path, device: torch.device, again: bool, apart: Isolation
 ) -> tuple[Tensor, RectifiedCapture]:
     """The phase of a hologram and a capture of it, taken once in a process."""
     bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
     item = f"{hologram.source[3]}, again" if again else hologram.source[3]  # it names the noise
-    phase = _solved(hologram, display, folder, device)
+    phase = _solved(hologram, display, folder, device, apart)
     return phase, bench.photograph(phase, target, item=item, repeat=hologram.repeat, exposure=hologram.exposure)

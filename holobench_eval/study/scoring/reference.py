@@ -1,11 +1,12 @@
-"""A fixed phase on the study's bench, scored before and after a method of somebody else's code: if a digit changes, the
-method has changed the harness for all that come after it, and the run stops."""
+"""A fixed phase on the study's bench, scored before and after a method of somebody else's code that runs inside.
+
+If a digit changes, the method has changed the harness for all that come after it, and the run stops.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 
 import torch
 
@@ -14,6 +15,7 @@ from ...core.errors import CellError, StopError
 from ...core.seeds import generator
 from ...metrics import score
 from .. import opening
+from ..definition import Isolation
 from ..displays import Condition
 
 SIDE = 192  # pixels of the scored part at most: all metrics work on it, and it takes a fifth of a second
@@ -24,13 +26,13 @@ _before: dict[tuple[object, ...], Digits] = {}  # by display, panel and seed, fr
 
 
 @contextmanager
-def guarded(method: str, folder: Path, display: Condition, seed: int) -> Iterator[None]:
-    """Around what a ``method`` does, by its name in a config in ``folder``. StopError: it has changed the harness.
+def guarded(method: str, isolation: Isolation, display: Condition, seed: int) -> Iterator[None]:
+    """Around what a ``method`` does, by its name in a config. StopError: it has changed the harness.
 
-    Methods of this package are not guarded. What a thread changes later is not seen, nor, in the process that plans
-    the study, what the import of a file has changed.
+    Methods of this package are not guarded, nor those in a process of their own. What a thread changes later is not
+    seen.
     """
-    if plugins.is_shipped("methods", method, folder):
+    if isolation != "none" or plugins.is_shipped("methods", method):
         yield
         return
     key = (display.digest, display.name, display.spec.shape, seed)

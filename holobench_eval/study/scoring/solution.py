@@ -15,7 +15,7 @@ from ...core.errors import BudgetError, CellError
 from ...core.io import write_atomically
 from ...display import MeteredDisplay
 from ...display.api import is_plain
-from .. import cost
+from .. import cost, isolation
 from ..artifacts import Artifact, read_tensors
 from ..cost import Cost
 from ..displays import Condition
@@ -58,9 +58,10 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         learned=moved(learned.state, job.device) if learned else None,
         starts=starts.of(job.store, first),
     )
-    watch = cost.start(job.device)
-    phase, stopped = _within_budget(method, solve, handle)
-    taken = watch.stop()
+    with isolation.opened(method, job.device, job.setting.limits) as process:
+        watch = cost.start(job.device, process)
+        phase, stopped = _within_budget(method, solve, handle)
+        taken = watch.stop()
     if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
         raise wrong_output(job, "solve", phase, f"a phase (1, {len(target)}, H, W)")
     taken = cost.keep(job.timing, taken, job.setting.retime)
@@ -69,7 +70,8 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
 
 def wrong_output(job: Job, function: str, output: Any, wanted: str) -> CellError:
     """The error for an ``output`` that is not what was wanted."""
-    actual = tuple(output.shape) if is_plain(output) else type(output).__name__
+    named = output.type_name if isinstance(output, isolation.Unsendable) else type(output).__name__
+    actual = tuple(output.shape) if is_plain(output) else named
     return CellError(f"{job.task.label}: {function} returned {actual}, not {wanted}")
 
 

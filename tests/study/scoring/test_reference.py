@@ -53,6 +53,7 @@ def study(folder: Path, *methods: str) -> Path:
     (folder / "methods.py").write_text(METHODS)
     listed = "\n".join(f"  - methods.py:{name}" for name in methods)
     text = f"""title: cheats
+isolation: none
 display: {{profiles: [leto-mild], panel: [128, 160]}}
 targets: {{dataset: photographs, params: {{count: 1}}}}
 protocol: {{metrics: [psnr, ssim]}}

@@ -1,0 +1,155 @@
+"""What runs in the process of a method: it imports the method's code once, and forks for every call.
+
+So no call begins with what an earlier one left in memory, and one that ends its process ends nothing else.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib.machinery import ModuleSpec
+from multiprocessing import reduction
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import torch
+
+from ... import display
+from ...core import plugins
+from ...core.device import find, moved, repeatable
+from ...core.errors import UserError
+from ...core.schema import FieldError
+from ..versions import method_version
+from .handles import SolvingHandle, TrainingHandle
+from .messages import Channel
+
+FLAGS = ("camera", "privileged", "trains", "follows", "planes", "form", "tuned", "version")
+FUNCTIONS = ("solve", "solve_planes", "predict", "prepare", "estimates", "available")
+HIDDEN = ("display.simulated", "study", "lab", "report", "commands", "testing")  # the bench and the harness
+HANDLES = {"solving": SolvingHandle, "training": TrainingHandle}
+
+
+def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
+    """Import a method, tell what it is, and fork for every connection that ``control`` brings, until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.chdir(home)
+    torch.set_num_threads(1)  # a process with threads cannot be forked
+    channel = Channel(control)
+    began = time.perf_counter()
+    try:
+        _hide()
+        cls = plugins.find("methods", name, folder)
+        channel.send({"facts": _facts(cls), "seconds": time.perf_counter() - began})
+    except UserError as error:
+        channel.send({"error": str(error)})
+        return
+    with suppress(EOFError, OSError):
+        while True:
+            number = reduction.recv_handle(control)
+            child = os.fork()
+            if child == 0:
+                control.close()
+                os.setsid()  # what it starts ends with it
+                _call(Channel(Connection(number)), cls, f"method '{name}'")
+                os._exit(0)
+            os.close(number)
+            channel.send(child)
+            with suppress(EOFError, OSError):
+                channel.receive()  # the call is over, or the harness is
+            channel.send(_ended(child))
+
+
+def _ended(child: int) -> int:
+    """End a process and all that it has started; its status as ``os.waitpid`` gives it."""
+    for kill in (os.killpg, os.kill):  # it may not have a group yet
+        with suppress(ProcessLookupError, PermissionError):
+            kill(child, signal.SIGKILL)
+    return os.waitpid(child, 0)[1]
+
+
+def _hide() -> None:
+    """The modules that hold the bench and the harness cannot be imported from here on."""
+    package = __package__.partition(".")[0]
+    hidden = tuple(f"{package}.{part}" for part in HIDDEN)
+    for name in list(sys.modules):
+        if name.startswith(hidden) and name != __package__:
+            del sys.modules[name]
+    for name, value in list(vars(display).items()):
+        if getattr(value, "__module__", "").startswith(hidden):
+            delattr(display, name)
+    sys.meta_path.insert(0, _Refusal(hidden))
+
+
+class _Refusal:
+    def __init__(self, hidden: tuple[str, ...]) -> None:
+        self.hidden = hidden
+
+    def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
+        if name.startswith(self.hidden):
+            raise ImportError(f"{name} is not for methods: the bench and the harness are in another process")
+        return None
+
+
+def _facts(cls: type[Any]) -> dict[str, Any]:
+    return {
+        "name": cls.__qualname__,
+        "doc": inspect.getdoc(cls) or "",
+        "flags": {flag: getattr(cls, flag) for flag in FLAGS if hasattr(cls, flag)},
+        "functions": [function for function in FUNCTIONS if callable(getattr(cls, function, None))],
+        "version": method_version(cls),
+    }
+
+
+def _call(channel: Channel, cls: type[Any], owner: str) -> None:
+    """Get ready, and answer one call."""
+    setting = channel.receive()
+    device = find(setting["device"])
+    if setting["memory_gib"] is not None:
+        _limit_memory(setting["memory_gib"])
+    with repeatable(setting["threads"], device):
+        torch.zeros(1, device=device)  # a GPU is opened before the clock runs
+        channel.send("ready")
+        call = channel.receive()
+        try:
+            channel.send({"result": _result(channel, cls, owner, device, **call)})
+        except BaseException as error:
+            channel.send(_told(error))
+    with suppress(EOFError, OSError):
+        channel.receive()  # until the harness has read what memory this took
+
+
+def _result(
+    channel: Channel, cls: type[Any], owner: str, device: torch.device, function: str, params: dict[str, Any], args: Any
+) -> Any:
+    method = plugins.made(cls, owner, params)
+    if function == "params":
+        return plugins.params_of(method)
+    own = [
+        HANDLES[argument["handle"]](channel, argument, device)
+        if isinstance(argument, dict) and "handle" in argument
+        else moved(argument, device)
+        for argument in args
+    ]
+    return getattr(method, function)(*own)
+
+
+def _told(error: BaseException) -> dict[str, Any]:
+    fault = [list(error.where), error.at_key] if isinstance(error, FieldError) else None
+    text = "".join(traceback.format_exception(error))
+    return {"error": type(error).__name__, "message": str(error), "fault": fault, "traceback": text}
+
+
+def _limit_memory(gib: float) -> None:
+    import resource  # not on Windows
+
+    fields = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+    limit = int(gib * 2**30) + int(fields["VmData"].split()[0]) * 1024  # above what libraries take
+    resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))

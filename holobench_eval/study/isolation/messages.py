@@ -1,0 +1,122 @@
+"""What goes over the pipe between the harness and a method's process: JSON, and the raw numbers of tensors behind it.
+
+Neither side runs code by what it reads, as it would with a pickle.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Mapping
+from dataclasses import fields
+from math import prod
+from multiprocessing.connection import Connection
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ...core.errors import CellError
+from ...display.api import Capture, DisplaySpec, Region, is_plain
+from ...display.estimates import Estimate
+from ...display.training import TrainingImage
+
+LONGEST_HEADER, LARGEST_TENSOR = 64 * 2**20, 8 * 2**30  # bytes that are read
+TYPES = {
+    str(dtype).removeprefix("torch."): dtype
+    for dtype in (
+        *(torch.float16, torch.bfloat16, torch.float32, torch.float64, torch.complex64, torch.complex128),
+        *(torch.bool, torch.uint8, torch.int8, torch.int16, torch.int32, torch.int64),
+    )
+}
+CLASSES: dict[str, type[Any]] = {cls.__name__: cls for cls in (Capture, DisplaySpec, Estimate, Region, TrainingImage)}
+LISTS: dict[str, type[Any]] = {cls.__name__: cls for cls in (list, tuple, set, frozenset)}
+
+
+class GarbledError(CellError):
+    """The other side sent what is no message."""
+
+
+class Unsendable:
+    """Stands for a value of a type that cannot be sent."""
+
+    def __init__(self, type_name: str) -> None:
+        self.type_name = type_name
+
+
+class Channel:
+    """An end of a pipe for numbers, text, tensors, lists and mappings of them, and the classes of ``CLASSES``.
+
+    A tensor arrives on the CPU, without its gradient; of any other value arrives the name of its type, ``Unsendable``.
+    Every function raises EOFError or OSError where the other end is gone.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self.connection = connection
+        self.lock = threading.RLock()  # to be held from a request to its answer
+
+    def send(self, value: Any) -> None:
+        """Send a value."""
+        tensors: list[Tensor] = []
+        header = json.dumps(_plain(value, tensors)).encode()
+        with self.lock:
+            self.connection.send_bytes(header)
+            for tensor in tensors:
+                if tensor.numel():
+                    self.connection.send_bytes(tensor.view(torch.uint8).numpy().data)
+
+    def receive(self) -> Any:
+        """The next value. GarbledError for what is no message."""
+        with self.lock:
+            try:
+                return self._value(json.loads(self.connection.recv_bytes(LONGEST_HEADER)))
+            except (ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
+                raise GarbledError(f"no message: {error}") from None
+
+    def close(self) -> None:
+        """Close this end."""
+        self.connection.close()
+
+    def _value(self, content: Any) -> Any:
+        if not isinstance(content, list):
+            return content
+        kind, *items = content
+        if kind == "tensor":
+            return self._tensor(TYPES[items[0]], items[1])
+        if kind == "unsendable":
+            return Unsendable(str(items[0]))
+        if kind == "class":
+            return CLASSES[items[0]](**self._value(items[1]))
+        if kind == "dict":
+            return {self._value(key): self._value(item) for key, item in items}
+        return LISTS[kind](self._value(item) for item in items)
+
+    def _tensor(self, dtype: torch.dtype, shape: list[int]) -> Tensor:
+        size = prod(shape) * dtype.itemsize
+        if min(shape, default=0) < 0 or not 0 <= size <= LARGEST_TENSOR:
+            raise ValueError(f"a tensor of shape {shape}")
+        if not size:
+            return torch.empty(shape, dtype=dtype)
+        content = bytearray(self.connection.recv_bytes(size))
+        return torch.frombuffer(content, dtype=dtype).clone().reshape(shape)  # a wrong size fails to reshape
+
+
+def _plain(value: Any, tensors: list[Tensor]) -> Any:
+    """A value as JSON has it, all but numbers and text as a list that begins with what it is; its tensors apart."""
+    if value is None or type(value) in (bool, int, float, str):
+        return value
+    if is_plain(value) and str(value.dtype).removeprefix("torch.") in TYPES:
+        tensor = value.detach().cpu().resolve_conj().resolve_neg().contiguous()
+        tensors.append(tensor.reshape(-1))
+        return ["tensor", str(tensor.dtype).removeprefix("torch."), list(tensor.shape)]
+    name = type(value).__name__
+    if type(value) is LISTS.get(name):
+        return [
+            name,
+            *(_plain(item, tensors) for item in (sorted(value) if isinstance(value, set | frozenset) else value)),
+        ]
+    if isinstance(value, Mapping):
+        return ["dict", *([_plain(key, tensors), _plain(item, tensors)] for key, item in value.items())]
+    if type(value) is CLASSES.get(name):
+        return ["class", name, _plain({field.name: getattr(value, field.name) for field in fields(value)}, tensors)]
+    return ["unsendable", name]

@@ -1,0 +1,650 @@
+"""Methods that try to look better than they are, each in a few lines. Every one shows the phase zero, honestly or not.
+
+``kind`` is the class of the attempt, ``outcome`` what has to come of it when the method runs in a process of its own:
+``impossible`` (the cell is that of the honest phase), ``refused`` (the cell fails, for ``reason``).
+"""
+
+from __future__ import annotations
+
+import builtins
+import copy
+import ctypes
+import gc
+import os
+import pickle
+import random
+import resource
+import signal
+import sys
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import torch
+
+SEEN = {}
+
+
+class Attempt:
+    kind: ClassVar[str]
+    outcome: ClassVar[str] = "impossible"
+    reason: ClassVar[str] = ""
+
+    def phase(self, target, bench):
+        return torch.zeros((*target.shape[:2], *bench.spec.shape))
+
+    def solve(self, target, bench):
+        self.cheat(target, bench)
+        return self.phase(target, bench)
+
+    def cheat(self, target, bench): ...
+
+
+@dataclass(frozen=True)
+class Honest(Attempt):
+    kind = "none"
+
+
+@dataclass(frozen=True)
+class Beside(Attempt):
+    kind = "none"
+
+
+# --- reads the bench
+
+
+@dataclass(frozen=True)
+class AsksForTheSimulation(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "isolation: none"
+
+    def cheat(self, target, bench):
+        bench.simulation.expected(self.phase(target, bench)[0], target[0])
+
+
+@dataclass(frozen=True)
+class AsksForOtherHolograms(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "isolation: none"
+
+    def cheat(self, target, bench):
+        return bench.starts
+
+
+@dataclass(frozen=True)
+class ReadsPrivateNames(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "_display"
+
+    def cheat(self, target, bench):
+        return bench._display.bench.profile
+
+
+@dataclass(frozen=True)
+class ImportsTheBench(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "not for methods"
+
+    def cheat(self, target, bench):
+        from holobench_eval.display.simulated.profile import load_profile
+
+        load_profile(bench.spec.name)
+
+
+@dataclass(frozen=True)
+class ImportsTheBenchByItsShortName(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "ImportError"
+
+    def cheat(self, target, bench):
+        from holobench_eval.display import load_profile
+
+        load_profile(bench.spec.name)
+
+
+@dataclass(frozen=True)
+class ImportsTheHarness(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "not for methods"
+
+    def cheat(self, target, bench):
+        from holobench_eval.study.opening import open_bench
+
+        open_bench(bench.spec.name, bench.spec.shape, seed=0)
+
+
+@dataclass(frozen=True)
+class SearchesTheMemory(Attempt):
+    kind = "reads the bench"
+
+    def cheat(self, target, bench):
+        found = [thing for thing in gc.get_objects() if type(thing).__name__ in ("CalibratedBench", "SimulatedBench")]
+        assert not found
+
+
+@dataclass(frozen=True)
+class WalksTheStack(Attempt):
+    kind = "reads the bench"
+
+    def cheat(self, target, bench):
+        frame = sys._getframe()
+        while frame is not None:
+            assert not {"display_bench", "job"} & set(frame.f_locals)
+            frame = frame.f_back
+
+
+@dataclass(frozen=True)
+class FollowsTheGradientOfACapture(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "does not require grad"
+    camera: ClassVar[bool] = True
+
+    def cheat(self, target, bench):
+        phase = self.phase(target, bench)[0].requires_grad_()
+        bench.capture(phase).linear().sum().backward()
+
+
+@dataclass(frozen=True)
+class RequestsTheSimulation(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "there is no 'simulation' here"
+
+    def cheat(self, target, bench):
+        bench._ask("simulation")
+
+
+@dataclass(frozen=True)
+class RequestsTheDisplay(Attempt):
+    kind, outcome, reason = "reads the bench", "refused", "there is no '_display' here"
+
+    def cheat(self, target, bench):
+        bench._ask("_display")
+
+
+# --- patches the harness
+
+
+@dataclass(frozen=True)
+class PatchesTheMatch(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        from holobench_eval.metrics import protocol
+
+        protocol.match = lambda image, target, *more: (target, torch.ones(3))
+
+
+@dataclass(frozen=True)
+class MutesTheNoise(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        torch.randn = torch.normal = lambda *shape, **named: torch.zeros(shape)
+
+
+@dataclass(frozen=True)
+class SetsADefaultDevice(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        torch.set_default_device("meta")
+
+    def phase(self, target, bench):
+        return torch.zeros((*target.shape[:2], *bench.spec.shape), device="cpu")
+
+
+@dataclass(frozen=True)
+class SetsDoublePrecision(Attempt):
+    kind = "patches the harness"
+
+    def solve(self, target, bench):
+        phase = self.phase(target, bench)
+        torch.set_default_dtype(torch.float64)
+        return phase
+
+
+@dataclass(frozen=True)
+class PatchesTheTransform(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        torch.fft.fft2 = torch.fft.ifft2 = lambda field, *more, **named: field
+
+
+@dataclass(frozen=True)
+class PatchesFiles(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        os.replace = os.fsync = builtins.open = Path.write_bytes = lambda *all, **named: None
+
+
+@dataclass(frozen=True)
+class PatchesTheAccount(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        from holobench_eval.display.metered import Account
+
+        Account.take = lambda self: None
+
+
+@dataclass(frozen=True)
+class SwitchesGradientsOff(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        torch.set_grad_enabled(False)
+        torch.set_num_threads(1)
+        torch.use_deterministic_algorithms(False)
+
+
+@dataclass(frozen=True)
+class ChangesTheEnvironment(Attempt):
+    kind = "patches the harness"
+
+    def cheat(self, target, bench):
+        os.environ.update(XDG_CACHE_HOME="/nowhere", OMP_NUM_THREADS="64", HOME="/nowhere")
+        os.chdir("/")
+
+
+# --- exceeds the budget
+
+
+class Photographer(Attempt):
+    kind = "exceeds the budget"
+    camera: ClassVar[bool] = True
+
+    def photographed(self, phase, handles):
+        """Captures taken before every handle refuses."""
+        taken = 0
+        for handle in handles:
+            with suppress(Exception):
+                handle.capture(phase)
+                taken += 1
+        assert taken <= 2, taken
+
+
+@dataclass(frozen=True)
+class CopiesTheHandle(Photographer):
+    def cheat(self, target, bench):
+        self.photographed(self.phase(target, bench)[0], [copy.copy(bench) for _ in range(20)])
+
+
+@dataclass(frozen=True)
+class MakesAnotherHandle(Photographer):
+    def cheat(self, target, bench):
+        known = {"spec": bench.spec, "budget": None, "label": "", "target": target, "learned": None}
+        handles = [type(bench)(bench._channel, known, bench.device) for _ in range(20)]
+        self.photographed(self.phase(target, bench)[0], handles)
+
+
+@dataclass(frozen=True)
+class PhotographsInThreads(Photographer):
+    def cheat(self, target, bench):
+        phase, taken = self.phase(target, bench)[0], []
+
+        def capture():
+            try:
+                taken.append(bench.capture(phase))
+            except Exception:
+                return
+
+        threads = [threading.Thread(target=capture) for _ in range(12)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(taken) <= 2
+
+
+@dataclass(frozen=True)
+class IgnoresTheEnd(Photographer):
+    def cheat(self, target, bench):
+        self.photographed(self.phase(target, bench)[0], [bench] * 30)
+
+
+@dataclass(frozen=True)
+class RaisesItsBudget(Photographer):
+    def cheat(self, target, bench):
+        bench.budget = 10**6
+        self.photographed(self.phase(target, bench)[0], [bench] * 10)
+
+
+@dataclass(frozen=True)
+class PhotographsWithoutACamera(Attempt):
+    kind, outcome, reason = "exceeds the budget", "refused", "declares no camera"
+
+    def cheat(self, target, bench):
+        bench.capture(self.phase(target, bench)[0])
+
+
+# --- lies about time
+
+
+@dataclass(frozen=True)
+class WorksBeforeItIsAsked(Attempt):
+    kind = "lies about time"
+    slow: ClassVar[bool] = True
+
+    def __post_init__(self):
+        time.sleep(0.4)
+
+
+@dataclass(frozen=True)
+class StopsTheClock(Attempt):
+    kind = "lies about time"
+    slow: ClassVar[bool] = True
+
+    def cheat(self, target, bench):
+        time.perf_counter = time.monotonic = time.time = lambda: 0.0
+        time.sleep(0.4)
+
+
+@dataclass(frozen=True)
+class ReturnsAPromise(Attempt):
+    kind, outcome, reason = "lies about time", "refused", "not a phase"
+
+    def phase(self, target, bench):
+        return lambda: torch.zeros((*target.shape[:2], *bench.spec.shape))
+
+
+@dataclass(frozen=True)
+class FinishesInAThread(Attempt):
+    kind = "lies about time"
+
+    def phase(self, target, bench):
+        phase = super().phase(target, bench)
+        threading.Thread(target=lambda: (time.sleep(0.3), phase.fill_(1.0)), daemon=True).start()
+        return phase
+
+
+# --- keeps state
+
+
+@dataclass(frozen=True)
+class CountsItsCalls(Attempt):
+    kind = "keeps state"
+    calls: ClassVar[list] = []
+
+    def phase(self, target, bench):
+        self.calls.append(1)
+        return super().phase(target, bench) + len(self.calls) - 1
+
+
+@dataclass(frozen=True)
+class RemembersInAnotherModule(Attempt):
+    kind = "keeps state"
+
+    def phase(self, target, bench):
+        torch.calls_of_a_method = getattr(torch, "calls_of_a_method", -1) + 1
+        return super().phase(target, bench) + torch.calls_of_a_method
+
+
+@dataclass(frozen=True)
+class RemembersTargets(Attempt):
+    kind = "keeps state"
+
+    def phase(self, target, bench):
+        SEEN[float(target.sum())] = target
+        return super().phase(target, bench) + len(SEEN) - 1
+
+
+@dataclass(frozen=True)
+class DrawsUnseeded(Attempt):
+    kind = "keeps state"
+
+    def phase(self, target, bench):
+        draws = SEEN.setdefault("draws", [])
+        draws.append((random.random(), float(np.random.rand()), float(torch.rand(()))))  # noqa: NPY002
+        return super().phase(target, bench)
+
+
+# --- poisons caches or records
+
+
+class Dressed(torch.Tensor):
+    """Answers every operation with what suits it."""
+
+    @classmethod
+    def __torch_function__(cls, function, types, args=(), kwargs=None):
+        return torch.ones(3, 128, 128)
+
+
+@dataclass(frozen=True)
+class ReturnsADressedTensor(Attempt):
+    kind, outcome, reason = "poisons records", "refused", "returned Dressed, not a phase"
+
+    def phase(self, target, bench):
+        return torch.zeros((*target.shape[:2], *bench.spec.shape)).as_subclass(Dressed)
+
+
+@dataclass(frozen=True)
+class ReturnsNotANumber(Attempt):
+    kind, outcome, reason = "poisons records", "refused", "NaN or infinite"
+
+    def phase(self, target, bench):
+        return super().phase(target, bench) * float("nan")
+
+
+@dataclass(frozen=True)
+class ReturnsTooMuch(Attempt):
+    kind, outcome, reason = "poisons records", "refused", "not a phase"
+
+    def phase(self, target, bench):
+        return torch.zeros((64, *target.shape[1:]))
+
+
+@dataclass(frozen=True)
+class WritesToItsTarget(Attempt):
+    kind = "poisons records"
+
+    def cheat(self, target, bench):
+        target.zero_()
+
+
+@dataclass(frozen=True)
+class SendsItsOwnResult(Attempt):
+    kind, outcome, reason = "poisons records", "refused", "returned dict, not a phase"
+
+    def cheat(self, target, bench):
+        bench._channel.send({"result": {"psnr_linear": 100.0}})
+
+
+@dataclass(frozen=True)
+class SendsAPickle(Attempt):
+    kind, outcome, reason = "poisons records", "refused", "no answer"
+
+    def cheat(self, target, bench):
+        bench._channel.connection.send_bytes(pickle.dumps(os.getcwd))
+
+
+@dataclass(frozen=True)
+class SendsBrackets(Attempt):
+    kind, outcome, reason = "poisons records", "refused", "no answer"
+
+    def cheat(self, target, bench):
+        bench._channel.connection.send_bytes(b"[" * 200_000)
+
+
+@dataclass(frozen=True)
+class ClaimsAHugeTensor(Attempt):
+    kind, outcome, reason = "poisons records", "refused", "no answer"
+
+    def cheat(self, target, bench):
+        bench._channel.connection.send_bytes(b'["tensor", "float32", [1000000, 1000000]]')
+
+
+# --- ends the process
+
+
+class Ender(Attempt):
+    kind, outcome = "ends the process", "refused"
+
+
+@dataclass(frozen=True)
+class Exits(Ender):
+    reason = "exit code 0"
+
+    def cheat(self, target, bench):
+        os._exit(0)
+
+
+@dataclass(frozen=True)
+class Aborts(Ender):
+    reason = "SIGABRT"
+
+    def cheat(self, target, bench):
+        os.abort()
+
+
+@dataclass(frozen=True)
+class ReadsNowhere(Ender):
+    reason = "SIGSEGV"
+
+    def cheat(self, target, bench):
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        ctypes.string_at(0)
+
+
+@dataclass(frozen=True)
+class Interrupts(Ender):
+    reason = "KeyboardInterrupt"
+
+    def cheat(self, target, bench):
+        raise KeyboardInterrupt
+
+
+@dataclass(frozen=True)
+class LeavesPython(Ender):
+    reason = "SystemExit"
+
+    def cheat(self, target, bench):
+        sys.exit(0)
+
+
+@dataclass(frozen=True)
+class ClaimsToWait(Ender):
+    reason = "Pending"
+
+    def cheat(self, target, bench):
+        from holobench_eval.core.errors import Pending
+
+        raise Pending
+
+
+@dataclass(frozen=True)
+class ClaimsThatTheDiskIsFull(Ender):
+    reason = "StorageError"
+
+    def cheat(self, target, bench):
+        from holobench_eval.core.errors import StorageError
+
+        raise StorageError("the disk is full")
+
+
+@dataclass(frozen=True)
+class KillsItsParent(Attempt):
+    kind = "ends the process"
+
+    def cheat(self, target, bench):
+        os.kill(os.getppid(), signal.SIGKILL)
+
+
+@dataclass(frozen=True)
+class ClosesEverything(Ender):
+    reason = "process of the method"
+
+    def cheat(self, target, bench):
+        os.closerange(3, 256)
+
+
+@dataclass(frozen=True)
+class RunsForEver(Ender):
+    reason = "took more than"
+
+    def cheat(self, target, bench):
+        while True:
+            time.sleep(1)
+
+
+@dataclass(frozen=True)
+class StopsItself(Ender):
+    reason = "took more than"
+
+    def cheat(self, target, bench):
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+@dataclass(frozen=True)
+class TakesAllMemory(Ender):
+    reason = "memory"
+
+    def cheat(self, target, bench):
+        return [torch.ones(2**26) for _ in range(64)]
+
+
+# --- exploits the noise's seed
+
+
+@dataclass(frozen=True)
+class ForeseesTheNoise(Attempt):
+    kind, outcome, reason = "exploits the noise's seed", "refused", "_names"
+
+    def cheat(self, target, bench):
+        from holobench_eval.core.seeds import generator
+
+        return torch.randn(4, generator=generator("bench noise", *bench._names))
+
+
+@dataclass(frozen=True)
+class AsksForTheSeed(Attempt):
+    kind, outcome, reason = "exploits the noise's seed", "refused", "seed"
+
+    def cheat(self, target, bench):
+        return bench._ask("seed")
+
+
+# --- trains on the target
+
+
+class Trained(Attempt):
+    kind, outcome, reason = "trains on the target", "refused", "no image it may be trained with"
+    trains: ClassVar[bool] = True
+
+    def prepare(self, bench):
+        phase = torch.zeros((len(bench.spec.wavelengths), *bench.spec.shape))
+        return {"seen": bench.photograph(phase, self.image(bench), "capture")}
+
+
+@dataclass(frozen=True)
+class PhotographsATarget(Trained):
+    def image(self, bench):
+        from holobench_eval.datasets.photographs import Photographs
+        from holobench_eval.display.training import TrainingImage
+
+        return TrainingImage("astronaut", Photographs(count=1).load("astronaut", bench.spec.region.shape))
+
+
+@dataclass(frozen=True)
+class RenamesATarget(Trained):
+    def image(self, bench):
+        from dataclasses import replace
+
+        return replace(bench.images[0], target=bench.images[0].target.flip(-1))
+
+
+@dataclass(frozen=True)
+class WritesToATrainingImage(Trained):
+    def image(self, bench):
+        bench.images[0].target.mul_(torch.linspace(0, 1, bench.images[0].target.shape[-1]))
+        return bench.images[0]
+
+
+@dataclass(frozen=True)
+class TrainsBeyondItsBudget(Trained):
+    reason = "capture"
+
+    def prepare(self, bench):
+        for number in range(100):
+            super().prepare(bench) if number else copy.copy(bench)
+        return {}
+
+    def image(self, bench):
+        return bench.images[0]

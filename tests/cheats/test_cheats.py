@@ -1,0 +1,104 @@
+"""What comes of methods that cheat: nothing that another method's digits, or their own, would show."""
+
+from __future__ import annotations
+
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cheats import attempts
+from tests.study.test_run import compute
+
+ENDLESS = ("RunsForEver", "StopsItself")
+NAMES = [
+    name
+    for name, value in vars(attempts).items()
+    if isinstance(value, type) and is_dataclass(value) and name != "Beside"
+]
+DIGITS = ("scores", "efficiency", "brightness", "saturated", "captures", "registration_residual_px")
+
+
+def scored(folder: Path, names: list[str], seconds: float = 60.0, isolation: str = "files") -> dict[str, list[Any]]:
+    """Records by label of a study of these attempts, with methods of the package after them, in one process."""
+    listed = ""
+    for name in names:
+        listed += f"  - {{name: 'attempts.py:{name}'"
+        listed += ", captures: 2}\n" if getattr(getattr(attempts, name), "camera", False) else "}\n"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "attempts.py").write_bytes(Path(attempts.__file__).read_bytes())
+    (folder / "study.yaml").write_text(
+        f"""title: cheats
+display: {{profiles: [leto-mild], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{count: 1}}}}
+training: {{dataset: dead_leaves, params: {{count: 2}}, held_out: 1, captures: 3}}
+protocol: {{metrics: [psnr]}}
+repeats: 2
+isolation: {isolation}
+limits: {{seconds: {seconds}, memory_gib: 3}}
+methods:
+{listed}  - {{name: 'attempts.py:Beside', label: beside}}
+  - double_phase
+"""
+    )
+    found: dict[str, list[Any]] = {}
+    for record in compute(folder / "study.yaml", folder / "out").records:
+        found.setdefault(record["label"], []).append(record)
+    return found
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
+    """Of all attempts but the endless ones."""
+    return scored(tmp_path_factory.mktemp("cheats"), [name for name in NAMES if name not in ENDLESS])
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
+    """The same study without a cheat, its honest methods inside."""
+    return scored(tmp_path_factory.mktemp("alone"), [], isolation="none")
+
+
+def digits(found: list[Any]) -> list[Any]:
+    return [[record.get(name) for name in DIGITS if name != "captures"] for record in found]
+
+
+def check(name: str, found: list[Any], honest: list[Any]) -> None:
+    """The declared outcome of an attempt."""
+    attempt = getattr(attempts, name)
+    for record in found:
+        if attempt.outcome == "refused":
+            assert record["state"] == "failed", record["scores"]
+            assert attempt.reason in record["reason"]
+        else:
+            assert record["state"] == "done", record["reason"]
+            assert record["captures"] in (0, 2) if getattr(attempt, "camera", False) else record["captures"] == 0
+            assert record["seconds"] > (0.4 if getattr(attempt, "slow", False) else 0.0)
+    if attempt.outcome == "impossible":
+        assert digits(found) == digits(honest)
+
+
+def test_there_are_at_least_forty_attempts_in_nine_classes() -> None:
+    cheats = [getattr(attempts, name) for name in NAMES if name != "Honest"]
+    assert len(cheats) >= 40
+    assert len({cheat.kind for cheat in cheats}) >= 8
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ENDLESS])
+def test_an_attempt_has_its_outcome(name: str, records: dict[str, list[Any]], alone: dict[str, list[Any]]) -> None:
+    check(name, records[name], alone["beside"])
+
+
+def test_no_attempt_changes_a_digit_of_the_methods_beside_it(
+    records: dict[str, list[Any]], alone: dict[str, list[Any]]
+) -> None:
+    for label in ("beside", "double_phase"):
+        assert digits(records[label]) == digits(alone[label])
+
+
+def test_a_method_that_does_not_end_is_ended(tmp_path: Path, alone: dict[str, list[Any]]) -> None:
+    found = scored(tmp_path, list(ENDLESS), seconds=2.0)
+    for name in ENDLESS:
+        check(name, found[name], alone["beside"])
+    assert digits(found["beside"]) == digits(alone["beside"])

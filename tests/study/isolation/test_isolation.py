@@ -1,0 +1,233 @@
+"""A method in a process of its own gives what it gives inside, and its process ends with its call."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from holobench_eval.core.device import CPU
+from holobench_eval.core.errors import UserError
+from holobench_eval.study import isolation
+from holobench_eval.study.definition import Limits
+from holobench_eval.study.isolation.process import process_of
+from tests.study.test_run import compute
+
+METHODS = '''
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+
+SLOW = time.sleep(0.2)
+
+
+@dataclass(frozen=True)
+class Mine:
+    """Flat phases.
+
+    And more.
+    """
+
+    level: float = 1.0
+    camera: ClassVar[bool] = True
+    tuned: ClassVar[str] = "on nothing"
+
+    def available(self):
+        return "no level" if self.level == 0 else None
+
+    def solve(self, target, bench):
+        shape = (*target.shape[:2], *bench.spec.shape)
+        phase = torch.rand(shape, generator=bench.generator("start", 1)) * self.level
+        for _ in range(2):
+            phase = phase + bench.rectify(bench.capture(phase[0])).mean()
+        bench.keep(phase)
+        return phase
+
+
+@dataclass(frozen=True)
+class Greedy(Mine):
+    camera: ClassVar[bool] = False
+
+    def solve(self, target, bench):
+        held = torch.ones(2**26)
+        time.sleep(0.3)
+        return torch.zeros((*target.shape[:2], *bench.spec.shape)) * held[0]
+
+
+@dataclass(frozen=True)
+class Odd(Mine):
+    camera: ClassVar[str] = "yes"
+'''
+
+SHIPPED = """title: shipped
+display: {{profiles: [leto-mild], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{count: 2}}}}
+training: {{dataset: dead_leaves, params: {{count: 4}}, held_out: 1, captures: 60}}
+protocol: {{metrics: [psnr, ssim]}}
+isolation: {isolation}
+methods:
+  - double_phase
+  - {{name: wirtinger, params: {{iterations: 5}}}}
+  - {{name: sgd, params: {{iterations: 5}}}}
+  - {{name: online_camera, captures: 4}}
+  - {{name: parametric_model, params: {{training: {{rounds: 1, images: 2, steps: 4}}}}}}
+  - oracle
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> str:
+    (tmp_path / "mine.py").write_text(METHODS)
+    return str(tmp_path / "mine.py")
+
+
+def digits(records: list[dict[str, Any]]) -> list[Any]:
+    return [[record["label"], record["state"], record["scores"], record["captures"]] for record in records]
+
+
+def test_what_a_method_declares_is_known_without_its_code(file: str) -> None:
+    cls = isolation.find(f"{file}:Mine", Path())
+    assert (cls.__name__, cls.__doc__) == ("Mine", "Flat phases.\n\nAnd more.")
+    assert (cls.camera, cls.tuned, hasattr(cls, "predict"), hasattr(cls, "trains")) == (
+        True,
+        "on nothing",
+        False,
+        False,
+    )
+    method = isolation.build(f"{file}:Mine", {}, Path())
+    assert isolation.params_of(method) == {"level": 1.0}
+    assert method.available() is None
+    assert isolation.build(f"{file}:Mine", {"level": 0.0}, Path()).available() == "no level"
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "message"),
+    [
+        ("Mine", {"levl": 1.0}, "has no parameter 'levl'; did you mean 'level'"),
+        ("Mine", {"level": "much"}, "parameter 'level': input should be a valid number"),
+        ("Odd", {}, "camera should be True or False"),
+        ("None", {}, "has no class 'None'"),
+    ],
+)
+def test_what_is_wrong_with_a_method_is_told_in_one_line(
+    file: str, name: str, params: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(UserError, match=message.replace("(", r"\(")) as caught:
+        isolation.build(f"{file}:{name}", params, Path())
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("end", ["import os; os._exit(0)", "raise KeyboardInterrupt", "raise SystemExit(0)"])
+def test_a_file_that_ends_its_process_is_refused_in_one_line(tmp_path: Path, end: str) -> None:
+    (tmp_path / "ends.py").write_text(end)
+    with pytest.raises(UserError, match=r"ends.py:Any'.*import"):
+        isolation.find("ends.py:Any", tmp_path)
+
+
+def test_a_method_is_imported_once_until_a_file_beside_it_changes(file: str) -> None:
+    first = process_of(f"{file}:Mine", Path())
+    assert process_of(f"{file}:Mine", Path()) is first
+    assert first.seconds > 0.2
+    Path(file).with_name("beside.py").write_text("LEVEL = 2")
+    assert process_of(f"{file}:Mine", Path()) is not first
+
+
+def test_time_and_memory_are_those_of_the_call(file: str, tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text(
+        """title: greedy
+display: {profiles: [ideal], panel: [128, 160]}
+targets: {dataset: photographs, params: {count: 1}}
+protocol: {metrics: [psnr]}
+methods: ["mine.py:Greedy"]
+"""
+    )
+    (record,) = (r for r in compute(tmp_path / "study.yaml", tmp_path / "out").records if r["label"] == "Greedy")
+    assert 0.3 < record["seconds"] < 20
+    if record["memory_mib"] is not None:
+        assert 250 < record["memory_mib"] < 400  # 256 MiB are held
+
+
+def test_a_call_that_is_left_ends_its_process(file: str) -> None:
+    method = isolation.build(f"{file}:Mine", {}, Path())
+    with isolation.opened(method, CPU, Limits()) as number:
+        assert Path(f"/proc/{number}").exists() or not Path("/proc").exists()
+    deadline = time.monotonic() + 10
+    while Path(f"/proc/{number}").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not Path(f"/proc/{number}").exists()
+
+
+def test_a_method_of_a_file_has_the_digits_that_it_has_inside(file: str, tmp_path: Path) -> None:
+    found = []
+    for where in ("files", "none"):
+        config = tmp_path / f"{where}.yaml"
+        config.write_text(
+            f"""title: mine
+display: {{profiles: [leto-mild], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{count: 2}}}}
+protocol: {{metrics: [psnr]}}
+isolation: {where}
+methods: [{{name: "mine.py:Mine", captures: 3}}, {{name: "mine.py:Mine", label: short, captures: 1}}]
+"""
+        )
+        found.append(digits(compute(config, tmp_path / where).records))
+    assert found[0] == found[1]
+    assert {(label, state, captures) for label, state, _, captures in found[0] if label != "floor"} >= {
+        ("Mine", "done", 2),
+    }
+
+
+@pytest.mark.slow
+def test_what_ships_has_the_digits_that_it_has_inside(tmp_path: Path) -> None:
+    found = []
+    for where in ("process", "files"):
+        config = tmp_path / where / "study.yaml"
+        config.parent.mkdir()
+        config.write_text(SHIPPED.format(isolation=where))
+        found.append(digits(compute(config, config.parent / "out").records))
+        assert list((config.parent / "artifacts").iterdir())  # each has trained for itself
+    assert found[0] == found[1]
+    assert {state for _, state, *_ in found[0]} == {"done"}
+
+
+def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path: Path) -> None:
+    text = METHODS.replace("camera: ClassVar[bool] = True", "privileged: ClassVar[bool] = True")
+    (tmp_path / "mine.py").write_text(text)
+    config = tmp_path / "study.yaml"
+    config.write_text(
+        """title: privileged
+display: {profiles: [ideal], panel: [128, 160]}
+targets: {dataset: photographs, params: {count: 1}}
+methods: ["mine.py:Mine"]
+"""
+    )
+    with pytest.raises(UserError, match=r"study.yaml:4:.*looks into the simulated bench.*isolation: none"):
+        compute(config, tmp_path / "out")
+
+
+def test_threads_of_the_harness_are_those_of_a_call(tmp_path: Path) -> None:
+    (tmp_path / "threads.py").write_text(
+        """
+import torch
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Threads:
+    def solve(self, target, bench): ...
+
+    def available(self):
+        return str(torch.get_num_threads())
+"""
+    )
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        assert isolation.build("threads.py:Threads", {}, tmp_path).available() == "3"
+    finally:
+        torch.set_num_threads(before)
