@@ -1,7 +1,8 @@
 """Methods that try to look better than they are, each in a few lines. Every one shows the phase zero, honestly or not.
 
 ``kind`` is the class of the attempt, ``outcome`` what has to come of it when the method runs in a process of its own:
-``impossible`` (the cell is that of the honest phase), ``refused`` (the cell fails, for ``reason``).
+``impossible`` (the cell is that of the honest phase), ``refused`` (it fails, for ``reason``), ``trusted`` (nothing
+keeps a method from it, and docs/start/trust.md says so).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import pickle
 import random
 import resource
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -648,3 +650,33 @@ class TrainsBeyondItsBudget(Trained):
 
     def image(self, bench):
         return bench.images[0]
+
+
+# --- what a process of its own does not prevent
+
+
+class Trusted(Attempt):
+    kind, outcome = "leaves its process", "trusted"
+
+
+@dataclass(frozen=True)
+class KeepsAFile(Trusted):
+    def cheat(self, target, bench):
+        file = Path(__file__).with_name("kept.bin")
+        seen = file.read_bytes() if file.exists() else b""
+        file.write_bytes(seen + bytes([len(seen)]))
+
+
+@dataclass(frozen=True)
+class StartsAnotherPython(Trusted):
+    def cheat(self, target, bench):
+        found = "import importlib.util as u; print(u.find_spec('holobench_eval').origin)"
+        assert subprocess.run([sys.executable, "-c", found], capture_output=True, check=True).stdout
+
+
+@dataclass(frozen=True)
+class KnowsThePhotographs(Trusted):
+    def cheat(self, target, bench):
+        from skimage import data
+
+        assert data.astronaut().shape == (512, 512, 3)

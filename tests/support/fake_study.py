@@ -110,7 +110,6 @@ class Following(Toy):
 CONFIG = """\
 title: "Fake"
 seed: 3
-isolation: {isolation}
 display: {{profiles: [{profiles}], panel: [128, 160]}}
 targets: {{dataset: "plugins.py:Gray", params: {{count: {count}}}}}
 methods:
@@ -132,8 +131,9 @@ def write_config(
     (folder / "plugins.py").write_text(PLUGINS)
     path = folder / "study.yaml"
     entries = "\n".join(f"  - {method}" for method in methods)
-    isolation = "none" if any("Following" in method for method in methods) else "files"  # it is privileged
-    path.write_text(CONFIG.format(methods=entries, count=count, profiles=profiles, isolation=isolation))
+    text = CONFIG.format(methods=entries, count=count, profiles=profiles)
+    privileged = any("Following" in method for method in methods)
+    path.write_text(f"{text}isolation: none\n" if privileged else text)
     return path
 
 

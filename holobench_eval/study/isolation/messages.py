@@ -72,6 +72,10 @@ class Channel:
                 return self._value(json.loads(self.connection.recv_bytes(LONGEST_HEADER)))
             except (ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
                 raise GarbledError(f"no message: {error}") from None
+            except OSError as error:
+                if error.errno is None:  # more bytes than were announced
+                    raise GarbledError(f"no message: {error}") from None
+                raise
 
     def close(self) -> None:
         """Close this end."""
@@ -98,7 +102,9 @@ class Channel:
         if not size:
             return torch.empty(shape, dtype=dtype)
         content = bytearray(self.connection.recv_bytes(size))
-        return torch.frombuffer(content, dtype=dtype).clone().reshape(shape)  # a wrong size fails to reshape
+        if len(content) != size:
+            raise ValueError(f"{len(content)} bytes of a tensor of {size}")
+        return torch.frombuffer(content, dtype=dtype).clone().reshape(shape)
 
 
 def _plain(value: Any, tensors: list[Tensor]) -> Any:

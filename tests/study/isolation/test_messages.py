@@ -92,8 +92,9 @@ def test_what_is_no_message_is_refused(header: bytes) -> None:
     refused(header)
 
 
-def test_a_tensor_with_too_few_bytes_is_refused() -> None:
-    refused(b'["tensor", "float32", [4]]', b"12")
+@pytest.mark.parametrize("content", [b"12", bytes(12), bytes(17)])
+def test_a_tensor_with_too_few_or_too_many_bytes_is_refused(content: bytes) -> None:
+    refused(b'["tensor", "float32", [4]]', content)
 
 
 @given(st.binary(max_size=200))

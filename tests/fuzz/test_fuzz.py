@@ -1,0 +1,54 @@
+"""Every target reads damaged input or refuses it; ``python -m tests.fuzz`` does the same for long."""
+
+from __future__ import annotations
+
+import random
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.targets import REFUSALS, TARGETS
+
+SECONDS = 1.5
+TOKENS = (b"[" * 3000, b"-1", b"1e999", b"null", b"\0", b"\xff", b"{", b"9" * 400, b"!!x ", b"&a ", b"*a")
+
+
+def damaged(content: bytes, draw: random.Random) -> bytes:
+    """A valid input with a few bytes changed, cut, doubled or moved."""
+    whole = bytearray(content)
+    for _ in range(draw.randint(1, 4)):
+        at, length = draw.randrange(len(whole) + 1), draw.randint(1, 40)
+        kind = draw.randrange(4)
+        if kind == 0:
+            whole[at : at + 1] = bytes([draw.randrange(256)])
+        elif kind == 1:
+            del whole[at : at + length]
+        elif kind == 2:
+            whole[at:at] = whole[at : at + length] * draw.randint(1, 50)
+        else:
+            whole[at:at] = draw.choice(
+                [b"[" * 3000, b"-1", b"1e999", b"null", b"\0", b"\xff", b"{", b"9" * 400, b"!!x "]
+            )
+    return bytes(whole)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_what_is_to_begin_with_is_read(name: str, tmp_path: Path) -> None:
+    read = 0
+    for content in TARGETS[name].begin():
+        with suppress(*REFUSALS):
+            TARGETS[name].run(content, tmp_path)
+            read += 1
+    assert read
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # Pillow's, of tags
+@pytest.mark.parametrize("name", TARGETS)
+def test_damaged_input_is_read_or_refused(name: str, tmp_path: Path) -> None:
+    draw, inputs = random.Random(name), TARGETS[name].begin()
+    until = time.monotonic() + SECONDS
+    while time.monotonic() < until:
+        with suppress(*REFUSALS):
+            TARGETS[name].run(damaged(draw.choice(inputs), draw), tmp_path)
