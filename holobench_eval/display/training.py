@@ -108,7 +108,8 @@ class TrainingBench:
         for an image that is neither one of the bench's nor an even gray: no scored target is photographed here.
         """
         given = [known.target for known in (*self.images, *self.held_out) if known.item == image.item]
-        if not any(torch.equal(known, image.target) for known in given) and not _is_even(image.target):
+        own = any(known is image.target or torch.equal(known, image.target) for known in given)
+        if not own and not _is_even(image.target):
             raise CellError(f"{self._label} photographed '{image.item}', which is no image it may be trained with")
         check_phase(phase, self.spec, self._label)
         self._account.take()

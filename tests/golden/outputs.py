@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import torch
@@ -266,13 +268,8 @@ def _one_thread() -> Iterator[None]:
 @contextmanager
 def _no_weights() -> Iterator[None]:
     """Torch's hub cache empty: the numbers must not depend on which published weights lie there."""
-    hub = torch.hub.get_dir()
-    with tempfile.TemporaryDirectory() as empty:
-        torch.hub.set_dir(empty)
-        try:
-            yield
-        finally:
-            torch.hub.set_dir(hub)
+    with tempfile.TemporaryDirectory() as empty, patch.dict(os.environ, TORCH_HOME=empty):
+        yield
 
 
 def main() -> int:

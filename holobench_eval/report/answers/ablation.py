@@ -78,8 +78,8 @@ def _chance(results: Results, reseeded: PairedTest, changes: list[PairedTest]) -
         for test in changes
         if verdict(score, test) in ("better", "worse") and abs(test.estimate.mean) <= abs(reseeded.estimate.mean)
     ]
-    meaning = f"so that nothing follows from {words(small)}" if small else "less than any change that is shown"
-    return f"Another seed of the same training changes it by {difference(score, reseeded.estimate)}, {meaning}."
+    meaning = f"so that changes of that size, {words(small)}, may be chance" if small else "less than any change shown"
+    return f"A second seed of the same training differs by {difference(score, reseeded.estimate)}, {meaning}."
 
 
 KIND = Kind(

@@ -60,11 +60,14 @@ def sentences(results: Results) -> Iterator[str]:
     if _captures(results, baseline) > 0:
         against = f"{baseline}, {value(results, baseline, condition)} on {condition}"
     if cheap:
-        yield f"Fewest captures in total with which a method is shown to be better than {against}: {'; '.join(cheap)}."
+        yield (
+            "Smallest of the tried budgets, captures in total, with which a method is shown to be better than "
+            f"{against} (fewer may do): {'; '.join(cheap)}."
+        )
     if failed:
         yield f"Not shown to be better than {baseline} with any of their budgets: {words(failed)}."
     rises = [_rise(results, name, labels) for name, labels in families(results).items()]
-    yield f"What more captures change, {score.axis}: {'; '.join(rises)}."
+    yield f"What more captures change ({score.axis}): {'; '.join(rises)}."
     ranking = results.ranking(condition, categories=("open loop", "calibrated", "online"))
     if ranking:
         closed = results.gap_closed(ranking[0], condition)

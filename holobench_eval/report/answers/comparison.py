@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ...study.plan import REFERENCE
 from ..data.categories import OFFLINE, ONLINE
@@ -19,6 +19,8 @@ from .kind import Kind, subjects
 def sentences(results: Results) -> Iterator[str]:
     """The named methods against the baseline, the best on each display, the online track, the oracle, the floor."""
     yield from (sentence for label in subjects(results)[:2] if (sentence := against_baseline(results, label)))
+    if not subjects(results):
+        yield from everybody(results)
     yield best(results)
     yield from online(results)
     yield from floor(results)
@@ -37,6 +39,22 @@ def against_baseline(results: Results, label: str) -> str:
     return f"{label}: {'; '.join(parts)}." if parts else ""
 
 
+def everybody(results: Results) -> Iterator[str]:
+    """Display by display who is better than the baseline, who is worse, and of whom no difference is shown."""
+    score, baseline, parts = results.headline, results.layout.baseline, []
+    for condition in results.conditions:
+        tests = [test for test in results.against_baseline if test.condition == condition]
+        tests = [test for test in tests if tested(results, test.second, condition)]
+        for found in ("better", "worse", "not shown to differ"):
+            said = [test for test in tests if verdict(score, test) == found]
+            said.sort(key=lambda test: -test.estimate.mean)
+            listed = [f"{test.second} ({difference(score, test.estimate)})" for test in said]
+            if listed:
+                parts.append(f"{found} on {condition}: {words(listed)}")
+    if parts:
+        yield f"Against {baseline}, {'; '.join(parts)}."
+
+
 def _published(results: Results, label: str, condition: str) -> str:
     """The published difference, where the config has the figures of both."""
     score, layout = results.headline, results.layout
@@ -49,7 +67,7 @@ def _published(results: Results, label: str, condition: str) -> str:
 def best(results: Results) -> str:
     """The best mean of every display, and by how much it is above the baseline."""
     parts = [_first(results, condition) for condition in results.conditions]
-    track = " without a camera for the scored image" if ONLINE in results.categories else ""
+    track = " without a capture of the scored image" if ONLINE in results.categories else ""
     if not any(parts):
         ranked = any(results.ranking(name, categories=(ONLINE,)) for name in results.conditions)
         return "" if ranked else "No method that competes has a score for every target, so none is ranked."
@@ -68,7 +86,24 @@ def _first(results: Results, condition: str) -> str:
         test = tested(results, ranking[1], condition) if len(ranking) > 1 else None
         return f"{own}{f', followed by {ranking[1]}, {relation(score, test)}' if test else ''}"
     test = tested(results, first, condition)
-    return f"{own}{f', {relation(score, test)}' if test and first not in subjects(results) else ''}"
+    against = f", {relation(score, test)}" if test and first not in subjects(results) else ""
+    return f"{own}{_spent(results, first, condition)}{against}{_ahead(results, ranking, condition)}"
+
+
+def _spent(results: Results, label: str, condition: str) -> str:
+    """The captures of a method in total, where there are any."""
+    if not results.layout.spends_captures or "total_captures" not in results.table:
+        return ""
+    captures = float(results.row(label, condition)["total_captures"])
+    return f" for {number(captures)} captures in total" if captures else ""
+
+
+def _ahead(results: Results, ranking: Sequence[str], condition: str) -> str:
+    """By how much the first is ahead of the second, unless that is the baseline."""
+    if len(ranking) < 2 or ranking[1] == results.layout.baseline:
+        return ""
+    ahead = results.estimate(results.values(ranking[0], condition) - results.values(ranking[1], condition))
+    return f", and {difference(results.headline, ahead)} from the next, {ranking[1]} (untested)"
 
 
 def online(results: Results) -> Iterator[str]:
@@ -78,9 +113,10 @@ def online(results: Results) -> Iterator[str]:
         for label in results.ranking(condition, categories=(ONLINE,))[:1]:
             test = tested(results, label, condition)
             against = f", {relation(results.headline, test)}" if test and label not in subjects(results) else ""
-            parts.append(f"on {condition} {label}, {value(results, label, condition)}{against}")
+            own = f"{value(results, label, condition)}{_spent(results, label, condition)}"
+            parts.append(f"on {condition} {label}, {own}{against}")
     if parts:
-        yield f"With a camera for the scored image the best is {'; '.join(parts)}."
+        yield f"With captures of the scored image the best is {'; '.join(parts)}."
 
 
 def floor(results: Results) -> Iterator[str]:
@@ -92,7 +128,7 @@ def floor(results: Results) -> Iterator[str]:
         known, whole = known or bool(scored), whole and len(scored) == len(above)
         below = [label for label, gap in scored.items() if not results.headline.better(gap.mean, 0.0)]
         if below:
-            parts.append(f"{words(below)} on {condition}")
+            parts.append(f"on {condition} {words(below)}")
     constant = f"a constant image in the place of a {results.layout.text.scored}"
     if parts:
         yield f"No better on average than {constant}{_score_of_floor(results)}: {'; '.join(parts)}."
@@ -115,13 +151,15 @@ def oracle(results: Results) -> Iterator[str]:
         if top and ranking:
             gap = results.estimate(results.values(top, condition) - results.values(ranking[0], condition))
             closed = results.gap_closed(ranking[0], condition) if ranking[0] != results.layout.baseline else None
-            share = f", so {ranking[0]} closes {percent(closed)} % of the gap from the baseline" if closed else ""
+            share = (
+                f", so {ranking[0]} closes {percent(closed)} % of the gap between baseline and oracle" if closed else ""
+            )
             parts.append(
                 f"{value(results, top, condition)} on {condition}, {difference(results.headline, gap)} from "
                 f"{ranking[0]}{share}"
             )
     if parts:
-        yield f"The oracle, which knows the simulated bench, reaches {'; '.join(parts)}."
+        yield f"The oracle, the best phase that was found with the bench known, has {'; '.join(parts)}."
 
 
 def rows(results: Results) -> Markdown | None:

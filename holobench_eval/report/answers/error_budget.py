@@ -34,9 +34,8 @@ def _reading(budget: Budget) -> str:
     gains = [f"{_gain(part)} with {part.label}" for part in budget.explained]
     return (
         f"On {budget.condition} the captures have a PSNR of {_decibel(budget.psnr)}, and their squared error splits "
-        f"into {words(shares)}; removing the parts in this order, each with all before it, would raise the PSNR, "
-        f"with the models that were tried, by {words(gains)} (means over images, which do not follow from the mean "
-        "shares)."
+        f"into {words(shares)}; taking off what is predicted, part after part in this order, would raise the PSNR by "
+        f"{words(gains)}, which no hologram reaches (means over images, which do not follow from the mean shares)."
     )
 
 
@@ -80,8 +79,8 @@ KIND = Kind(
     sentences=sentences,
     table=rows,
     limits=(
-        "Bounds: a part is what one prediction explains and none before it did, for whom it is known which prediction "
-        "to believe; a hologram gains less from it than its dB, and a larger model or more captures may explain more.",
+        "Bounds: a part is what one prediction explains and none before it did, if it is known which prediction to "
+        "believe; a hologram gains less from it than its dB, and a larger model or more captures may explain more.",
         "Parts: image-domain terms are a tone curve, shading, blur and haze, fitted on training captures.",
     ),
 )

@@ -19,7 +19,7 @@ def sentences(results: Results) -> Iterator[str]:
     chosen = dict.fromkeys([*(label for label in layout.methods if label in layout.stacked), *subjects(results)])
     for label in list(chosen)[:2]:
         parts = [
-            f"on {condition} {relation(score, test)}, in {_times(results, label, condition)}"
+            f"on {condition} {relation(score, test)}, taking {_times(results, label, condition)}"
             for condition in results.conditions
             if (test := tested(results, label, condition))
         ]
@@ -42,7 +42,7 @@ def _seconds(results: Results, label: str, condition: str) -> float:
 
 def _times(results: Results, label: str, condition: str) -> str:
     own, other = (_seconds(results, name, condition) for name in (label, str(results.layout.baseline)))
-    return f"{number(own / other)} times the computing time of a scene"
+    return f"{own / other:.2g} times its computing time per scene"
 
 
 def _against(results: Results, label: str, condition: str) -> str:

@@ -111,9 +111,9 @@ def _other_displays(each: Ranks) -> Iterator[str]:
     same = [name for name, order in others.items() if order == orders[before]]
     if others:
         differ = [name for name in others if name not in same]
-        parts = [f"the same on {words(same)}"] if same else []
-        parts += [f"another on {words(differ)}"] if differ else []
-        yield f"The order of the means is {' and '.join(parts)}."
+        parts = [f"on {words(same)} as on {before}"] if same else []
+        parts += [f"on {words(differ)} another than on {before}"] if differ else []
+        yield f"The methods' order by their mean score is {' and '.join(parts)}."
 
 
 def table(each: Ranks) -> Markdown:
@@ -134,7 +134,7 @@ KIND = Kind(
     sentences=sentences,
     table=lambda results: next((table(each) for each in ranks(results) if each.exists), None),
     limits=(
-        "Draws: the bench varies within assumed ranges, target images and holograms stay, and intervals of shares and "
-        "of tau are over draws; they do not say what other images or other ranges would give.",
+        "Draws: the bench varies within assumed ranges, target images and holograms stay, and brackets of shares and "
+        "of tau are over draws and not over images; they do not say what other images or other ranges would give.",
     ),
 )

@@ -82,8 +82,8 @@ def _others(results: Results, losses: list[tuple[Estimate, Sweep, float | str]])
         return text
     shown = [sweep.kind.words for loss, sweep, _ in losses if loss.low > SMALL]
     open_ = [sweep.kind.words for loss, sweep, _ in losses if loss.low <= SMALL < loss.high]
-    text += f"; shown to cost more than {SMALL:g} dB: {words(shown) if shown else 'none'}"
-    return f"{text}; not excluded: {words(open_)}" if open_ else text
+    text += f"; {words(shown) if shown else 'no change'} is shown to cost it more than {SMALL:g} dB"
+    return f"{text}; more is not excluded for {words(open_)}" if open_ else text
 
 
 def _leads(results: Results, found: list[Sweep]) -> Iterator[str]:
@@ -164,7 +164,7 @@ def _recovered(results: Results, same: list[Sweep], remedies: list[Sweep]) -> It
                     each = [f"{percent(share)} % at {value}" for value, share in (shares[0], shares[-1])]
                     parts.append(f"on {sweep.swept.before} {' up to '.join(dict.fromkeys(each))}")
                 else:
-                    parts.append(f"none is told on {sweep.swept.before}, where no loss is clear and above {SMALL:g} dB")
+                    parts.append(f"none on {sweep.swept.before}, where no loss is clear and above {SMALL:g} dB")
     if any(not part.startswith("none") for part in parts):
         yield f"Of the loss of {baseline}, this share is recovered ({remedies[0].kind.words}): {'; '.join(parts)}."
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .results import Results
 from .scores import Score
-from .statistics import FEWEST, Estimate, PairedTest
+from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
 from .text import p_value, sample
 
 
@@ -43,13 +43,14 @@ def verdict(score: Score, test: PairedTest) -> str:
 
 def relation(score: Score, test: PairedTest) -> str:
     """``better than wirtinger by +1.30 dB [+0.43, +2.17], p = 0.037``."""
-    words = {
-        "better": f"better than {test.first} by",
-        "worse": f"worse than {test.first} by",
-        "not shown to differ": f"not shown to differ from {test.first},",
-        "not tested": f"not tested against {test.first},",
-    }
-    return f"{words[verdict(score, test)]} {short(score, test)}"
+    found, told = verdict(score, test), short(score, test)
+    if found in ("better", "worse"):
+        return f"{found} than {test.first} by {told}"
+    if found == "not tested":
+        return f"not tested against {test.first}, {told}"
+    clusters = test.estimate.clusters
+    few = 2.0 ** (1 - clusters) >= SIGNIFICANCE
+    return f"{told} from {test.first}, which {f'{clusters} clusters cannot show' if few else 'is not shown'}"
 
 
 def tested(results: Results, label: str, condition: str) -> PairedTest | None:

@@ -32,12 +32,21 @@ def start(function: Callable[..., None], *arguments: Any) -> BaseProcess:
 
 def prepare() -> None:
     """Start the process that workers are forked from, where it does not run; its imports take more than a second."""
-    if not FORKS:
+    if not FORKS or _has_server():
         return
     CONTEXT.set_forkserver_preload(PRELOADED)
     resource_tracker.ensure_running()  # now, since it lets Ctrl-C through as it starts
     with _one_thread(), _no_ctrl_c():
         forkserver.ensure_running()
+
+
+def _has_server() -> bool:
+    """Whether this process was forked by a server, which then serves it, too: one of its own would import all again."""
+    server: Any = forkserver._forkserver  # type: ignore[attr-defined]
+    if server._forkserver_pid is not None or server._forkserver_address is None:
+        return False
+    server.ensure_running = lambda: None  # would start one
+    return True
 
 
 @contextmanager

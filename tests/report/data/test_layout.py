@@ -42,6 +42,7 @@ methods:
   - {name: "plugins.py:Knowing", label: knowing, profiles: [leto-aged]}
   - {name: "plugins.py:Seeing", label: seeing, profiles: [ideal], captures: 12, params: {strength: 0.25}}
 headline: ssim_linear
+isolation: none
 reported: {source: "a paper, table 3", rows: {honest: {psnr: 17.6}}}
 """
 
