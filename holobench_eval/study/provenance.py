@@ -16,6 +16,7 @@ from .. import __version__
 from ..core.errors import UserError
 from ..core.installed import installed
 from ..core.io import now, write_atomically
+from . import isolation
 from .cost import cpu_model
 from .definition import Study
 from .displays import Condition
@@ -36,8 +37,9 @@ def describe(
 ) -> dict[str, Any]:
     """Everything about the present run that is not in its config: versions, revision, machine, displays, command.
 
-    device: as requested; gpu: its name, empty for a CPU or an unknown GPU.
+    device: as requested; gpu: its name, empty for a CPU or an unknown GPU. ``imports_s``: see ``isolation.imports``.
     """
+    imports = isolation.imports((entry.name for entry in study.methods), study.folder)
     return {
         "package": __version__,
         **revision(),
@@ -53,6 +55,7 @@ def describe(
         **({"gpu": gpu} if gpu else {}),
         "threads": threads,
         "workers": workers,
+        **({"imports_s": imports} if imports else {}),
         "started": now(),
         "ended": None,
     }

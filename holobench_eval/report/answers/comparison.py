@@ -19,8 +19,8 @@ from .kind import Kind, subjects
 def sentences(results: Results) -> Iterator[str]:
     """The named methods against the baseline, the best on each display, the online track, the oracle, the floor."""
     yield from (sentence for label in subjects(results)[:2] if (sentence := against_baseline(results, label)))
-    if not subjects(results):
-        yield from everybody(results)
+    if not subjects(results) and len(results.conditions) == 1:
+        yield from everybody(results, results.conditions[0])
     yield best(results)
     yield from online(results)
     yield from floor(results)
@@ -39,20 +39,16 @@ def against_baseline(results: Results, label: str) -> str:
     return f"{label}: {'; '.join(parts)}." if parts else ""
 
 
-def everybody(results: Results) -> Iterator[str]:
-    """Display by display who is better than the baseline, who is worse, and of whom no difference is shown."""
-    score, baseline, parts = results.headline, results.layout.baseline, []
-    for condition in results.conditions:
-        tests = [test for test in results.against_baseline if test.condition == condition]
-        tests = [test for test in tests if tested(results, test.second, condition)]
-        for found in ("better", "worse", "not shown to differ"):
-            said = [test for test in tests if verdict(score, test) == found]
-            said.sort(key=lambda test: -test.estimate.mean)
-            listed = [f"{test.second} ({difference(score, test.estimate)})" for test in said]
-            if listed:
-                parts.append(f"{found} on {condition}: {words(listed)}")
+def everybody(results: Results, condition: str) -> Iterator[str]:
+    """Who is better than the baseline, who is worse, and of whom no difference is shown."""
+    score, parts = results.headline, []
+    tests = [test for label in results.layout.methods if (test := tested(results, label, condition))]
+    for found in ("better", "worse", "not shown to differ"):
+        said = sorted((test for test in tests if verdict(score, test) == found), key=lambda test: -test.estimate.mean)
+        if said:
+            parts.append(f"{found}: {words([f'{test.second} ({difference(score, test.estimate)})' for test in said])}")
     if parts:
-        yield f"Against {baseline}, {'; '.join(parts)}."
+        yield f"Against {results.layout.baseline} on {condition}, {'; '.join(parts)}."
 
 
 def _published(results: Results, label: str, condition: str) -> str:
@@ -103,7 +99,7 @@ def _ahead(results: Results, ranking: Sequence[str], condition: str) -> str:
     if len(ranking) < 2 or ranking[1] == results.layout.baseline:
         return ""
     ahead = results.estimate(results.values(ranking[0], condition) - results.values(ranking[1], condition))
-    return f", and {difference(results.headline, ahead)} from the next, {ranking[1]} (untested)"
+    return f", and {difference(results.headline, ahead)} ahead of the next, {ranking[1]} (untested)"
 
 
 def online(results: Results) -> Iterator[str]:

@@ -49,8 +49,8 @@ def relation(score: Score, test: PairedTest) -> str:
     if found == "not tested":
         return f"not tested against {test.first}, {told}"
     clusters = test.estimate.clusters
-    few = 2.0 ** (1 - clusters) >= SIGNIFICANCE
-    return f"{told} from {test.first}, which {f'{clusters} clusters cannot show' if few else 'is not shown'}"
+    few = f" ({clusters} clusters can show nothing)" if 2.0 ** (1 - clusters) >= SIGNIFICANCE else ""
+    return f"{difference(score, test.estimate)} against {test.first}, {p_value(test.p)}, not shown{few}"
 
 
 def tested(results: Results, label: str, condition: str) -> PairedTest | None:

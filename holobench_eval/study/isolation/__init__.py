@@ -5,7 +5,7 @@ The harness gets what such a method declares, asks it to solve, and answers what
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -21,7 +21,7 @@ from . import process
 from .inside import FUNCTIONS
 from .messages import Unsendable
 
-__all__ = ["Apart", "Unsendable", "build", "find", "opened", "params_of", "runs_inside", "solver"]
+__all__ = ["Apart", "Unsendable", "build", "find", "imports", "opened", "params_of", "runs_inside", "solver"]
 
 BOOLEANS = ("camera", "privileged", "trains", "follows", "planes")
 
@@ -107,6 +107,15 @@ def solver(name: str, params: Mapping[str, Any], folder: Path, isolation: Isolat
     if runs_inside(name, folder, isolation):
         return plugins.build("methods", name, dict(params), folder)
     return _apart(name, folder)(params)
+
+
+def imports(names: Iterable[str], folder: Path) -> dict[str, float]:
+    """Seconds that the import of methods that do not ship with the package took, outside the clock of their cells."""
+    return {
+        name: round(process.process_of(name, folder).seconds, 2)
+        for name in dict.fromkeys(names)
+        if not plugins.is_shipped("methods", name)
+    }
 
 
 def runs_inside(name: str, folder: Path, isolation: Isolation) -> bool:

@@ -154,11 +154,11 @@ class TrainingHandle(_Remote):
 
     def photograph(self, phase: Tensor, image: TrainingImage, *names: object) -> Tensor:
         """See ``TrainingBench``."""
-        return self._ask("photograph", phase, image, *names)
+        return self._ask("photograph", phase, image, *map(str, names))
 
     def announce(self, photographs: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
         """See ``TrainingBench``."""
-        self._ask("announce", list(photographs))
+        self._ask("announce", [(phase, image, tuple(map(str, names))) for phase, image, names in photographs])
 
     def kept(self, name: str, make: Callable[[], Value]) -> Value:
         """See ``TrainingBench``."""

@@ -13,6 +13,7 @@ from math import prod
 from multiprocessing.connection import Connection
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -42,6 +43,17 @@ class Unsendable:
 
     def __init__(self, type_name: str) -> None:
         self.type_name = type_name
+
+
+def refuse_unsendable(value: Any, what: str) -> None:
+    """CellError if a value that was received holds something that could not be sent."""
+    if isinstance(value, Unsendable):
+        raise CellError(f"{what} holds a {value.type_name}; expected tensors, numbers, text, lists or mappings of them")
+    if isinstance(value, Mapping):
+        value = [*value, *value.values()]
+    if isinstance(value, list | tuple):
+        for item in value:
+            refuse_unsendable(item, what)
 
 
 class Channel:
@@ -111,6 +123,8 @@ def _plain(value: Any, tensors: list[Tensor]) -> Any:
     """A value as JSON has it, all but numbers and text as a list that begins with what it is; its tensors apart."""
     if value is None or type(value) in (bool, int, float, str):
         return value
+    if isinstance(value, np.generic):  # a number of NumPy's
+        return _plain(value.item(), tensors)
     if is_plain(value) and str(value.dtype).removeprefix("torch.") in TYPES:
         tensor = value.detach().cpu().resolve_conj().resolve_neg().contiguous()
         tensors.append(tensor.reshape(-1))

@@ -25,7 +25,7 @@ from ..definition import Limits
 from ..executors.processes import CONTEXT, start
 from .handles import answer, known
 from .inside import serve
-from .messages import Channel, GarbledError
+from .messages import Channel, GarbledError, refuse_unsendable
 
 KEPT = 32  # processes of methods that stay when they have nothing to do
 IMPORT_LIMIT = 600.0  # seconds that the import of a method's file may take
@@ -134,6 +134,8 @@ def call(opened: Call, function: str, params: dict[str, Any], args: Sequence[Any
         if not isinstance(got, dict):
             raise GarbledError("no mapping")
         if "result" in got:
+            if function == "prepare":
+                refuse_unsendable(got["result"], "what prepare returned")
             return got["result"]
         if "error" in got:
             raise _raised(got)

@@ -75,7 +75,7 @@ def test_the_method_that_the_question_names_is_answered_for_display_by_display()
     assert first.startswith(
         "new: on a better than old by +1.90 dB [+1.49, +2.31], p = 0.008 (18.95 dB against 17.05 dB)"
     )
-    assert re.search(r"; on b -0\.10 dB \[.*\], p = \d\.\d+ from old, which is not shown \(", first)
+    assert re.search(r"; on b -0\.10 dB \[.*\] against old, p = \d\.\d+, not shown \(", first)
 
 
 def test_without_a_named_method_the_best_one_is_compared_with_the_baseline() -> None:

@@ -195,6 +195,70 @@ def test_what_ships_has_the_digits_that_it_has_inside(tmp_path: Path) -> None:
     assert {state for _, state, *_ in found[0]} == {"done"}
 
 
+LEARNS = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+
+
+@dataclass(frozen=True)
+class Learns:
+    trains: ClassVar[bool] = True
+    odd: bool = False
+
+    def prepare(self, bench):
+        phase = torch.rand((3, *bench.spec.shape), generator=bench.generator("phase", 1, ("a", 2.5)))
+        seen = bench.photograph(phase, bench.images[0], "capture", 1, ("a", 2.5))
+        held = bench.kept("means", lambda: {"mean": seen.mean()})
+        bench.log(round=1, step=0, mean=float(held["mean"]))
+        odd = {"odd": object()} if self.odd else {}
+        return {"seen": seen, "held": held, 3: [1.5, None, "text", (1, True)], **odd}
+
+    def solve(self, target, bench):
+        assert list(bench.learned[3][:3]) == [1.5, None, "text"]
+        light = bench.light.mean() + bench.learned["seen"].mean() + bench.learned["held"]["mean"]
+        return torch.zeros((*target.shape[:2], *bench.spec.shape)) + light
+"""
+
+
+def test_what_a_method_learns_apart_is_what_it_learns_inside(tmp_path: Path) -> None:
+    found = []
+    for where in ("files", "none"):
+        folder = tmp_path / where
+        folder.mkdir()
+        (folder / "learns.py").write_text(LEARNS)
+        (folder / "study.yaml").write_text(
+            f"""title: learns
+display: {{profiles: [leto-mild], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{count: 1}}}}
+training: {{dataset: dead_leaves, params: {{count: 2}}, held_out: 1}}
+protocol: {{metrics: [psnr]}}
+isolation: {where}
+methods: ["learns.py:Learns"]
+"""
+        )
+        found.append(digits(compute(folder / "study.yaml", folder / "out").records))
+    assert found[0] == found[1]
+    assert {state for _, state, *_ in found[0]} == {"done"}
+
+
+def test_what_cannot_be_kept_is_refused_where_it_was_learned(tmp_path: Path) -> None:
+    (tmp_path / "learns.py").write_text(LEARNS)
+    (tmp_path / "study.yaml").write_text(
+        """title: learns
+display: {profiles: [leto-mild], panel: [128, 160]}
+targets: {dataset: photographs, params: {count: 1}}
+training: {dataset: dead_leaves, params: {count: 2}, held_out: 1}
+protocol: {metrics: [psnr]}
+methods: [{name: "learns.py:Learns", params: {odd: true}}]
+"""
+    )
+    records = compute(tmp_path / "study.yaml", tmp_path / "out").records
+    (reason,) = {record["reason"] for record in records if record["label"] == "Learns"}
+    assert "what prepare returned holds a object; expected tensors" in reason
+
+
 def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path: Path) -> None:
     text = METHODS.replace("camera: ClassVar[bool] = True", "privileged: ClassVar[bool] = True")
     (tmp_path / "mine.py").write_text(text)
