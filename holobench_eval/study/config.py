@@ -181,8 +181,10 @@ def _entry(study: Study, document: Document, index: int) -> MethodEntry:
                 f"method '{entry.name}' predicts no captures; measure: {study.measure} needs methods that do"
             )
     place: Keys = (*where, "name") if (*where, "name") in document.keys else where
-    if getattr(method, "privileged", False) and isinstance(method, isolation.Apart) and study.isolation != "none":
-        message = f"'{entry.name}' looks into the simulated bench, which a process of its own does not hold"
+    apart = isinstance(method, isolation.Apart) and study.isolation != "none"
+    if apart and (getattr(method, "privileged", False) or method.refused):
+        what = f"imports {method.refused}" if method.refused else "looks into the simulated bench"
+        message = f"'{entry.name}' {what}, which a process of its own does not hold"
         raise document.error(place, f"{message}; a study with 'isolation: none' runs it")
     if study.display.real and getattr(method, "privileged", False):
         message = f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one"

@@ -173,8 +173,9 @@ def timed(study: Study, plan: Plan) -> frozenset[str]:
     return frozenset(cell.id for task in last.values() for cell in task.cells)
 
 
-def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
-    """Name of a task's timing: the hash of everything its wall time should depend on. gpu: its name, empty for none."""
+def key(task: Task, threads: int, workers: int, gpu: str = "", apart: bool = False) -> str:
+    """Name of a task's timing: the hash of everything its wall time should depend on. gpu: its name, empty for none;
+    apart: in a process of its own."""
     cell, display = task.cells[0], task.conditions[0]
     return digest(
         {
@@ -190,7 +191,7 @@ def key(task: Task, threads: int, workers: int, gpu: str = "") -> str:
             "learned": [cell.measure, *cell.prepared],
             **({"starts": list(cell.starts)} if cell.starts else {}),
             "measure": cell.measure,
-            "machine": [cpu_model(), platform.machine(), threads, workers, *([gpu] if gpu else [])],
+            "machine": [cpu_model(), platform.machine(), threads, workers, *filter(None, (gpu, "apart" * apart))],
             "versions": [_torch(), __version__, HARNESS],
         }
     )

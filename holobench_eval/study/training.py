@@ -66,7 +66,8 @@ def train(job: TrainingJob) -> str:
 
 def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None:
     preparation = job.preparation
-    method = isolation.solver(preparation.method, preparation.params, preparation.folder, job.isolation)
+    limits = replace(job.limits, seconds=math.inf)  # that of time is for cells
+    method = isolation.solver(preparation.method, preparation.params, preparation.folder, job.isolation, limits)
     images = _images(preparation, device)
     split = len(images) - preparation.held_out
     display_bench = opening.open_display(preparation.display, preparation.seed, device)
@@ -79,10 +80,9 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         preparation.captures,
         preparation.seed,
     )
-    limits = replace(job.limits, seconds=math.inf)  # those of time are for cells
     with (
         guarded(preparation.method, job.isolation, preparation.display, preparation.seed),
-        isolation.opened(method, device, limits),
+        isolation.opened(method, device),
     ):
         state = method.prepare(bench)
     if not isinstance(state, Mapping):

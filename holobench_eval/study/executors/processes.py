@@ -42,7 +42,7 @@ def prepare() -> None:
 
 def _has_server() -> bool:
     """Whether this process was forked by a server, which then serves it, too: one of its own would import all again."""
-    server: Any = forkserver._forkserver  # type: ignore[attr-defined]
+    server: Any = forkserver._forkserver
     if server._forkserver_pid is not None or server._forkserver_address is None:
         return False
     server.ensure_running = lambda: None  # would start one

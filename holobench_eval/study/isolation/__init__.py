@@ -29,33 +29,37 @@ BOOLEANS = ("camera", "privileged", "trains", "follows", "planes")
 class Apart:
     """A method that runs elsewhere: what its class declares, and its functions as calls to its process.
 
-    For each method there is a class of it, as ``find`` makes them.
+    For each method there is a class of it, as ``find`` makes them. refused: what its file imports that is hidden from
+    methods, so that it can only run inside.
     """
 
     file: ClassVar[str]
     folder: ClassVar[Path]
     code_version: ClassVar[str]
 
-    def __init__(self, params: Mapping[str, Any]) -> None:
+    refused: ClassVar[str]
+
+    def __init__(self, params: Mapping[str, Any], limits: Limits | None = None) -> None:
         self.params = dict(params)
+        self.limits = limits or Limits(seconds=process.IMPORT_LIMIT)
         self._opened: process.Call | None = None
 
     def _call(self, function: str, *args: Any) -> Any:
         if self._opened is not None:
             return process.call(self._opened, function, self.params, args)
         handle = next((argument for argument in args if isinstance(argument, process.Handle)), None)
-        with opened(self, CPU if handle is None else handle.device, Limits()):
+        with opened(self, CPU if handle is None else handle.device):
             return self._call(function, *args)
 
 
 @contextmanager
-def opened(method: object, device: torch.device, limits: Limits) -> Iterator[int | None]:
+def opened(method: object, device: torch.device) -> Iterator[int | None]:
     """A process for the next call of a method, ready before the clock runs; its number, None for a method that runs
     inside."""
     if not isinstance(method, Apart) or method._opened is not None:
         yield None
         return
-    with process.process_of(method.file, method.folder).opened(device, limits) as call:
+    with process.process_of(method.file, method.folder).opened(device, method.limits) as call:
         method._opened = call
         try:
             yield call.pid
@@ -77,6 +81,7 @@ def _apart(name: str, folder: Path) -> type[Apart]:
             raise UserError(f"method '{name}': {flag} should be True or False")
     functions = {function: _calling(function) for function in FUNCTIONS if function in facts["functions"]}
     identity = {"file": name, "folder": folder, "code_version": facts["version"], "__doc__": facts["doc"]}
+    identity["refused"] = str(facts["refused"])
     return type(facts["name"], (Apart,), {**flags, **functions, **identity})
 
 
@@ -102,11 +107,11 @@ def params_of(method: Any) -> dict[str, Any]:
     return dict(method.params) if isinstance(method, Apart) else plugins.params_of(method)
 
 
-def solver(name: str, params: Mapping[str, Any], folder: Path, isolation: Isolation) -> Any:
-    """A method to be called, in a process of its own or not."""
+def solver(name: str, params: Mapping[str, Any], folder: Path, isolation: Isolation, limits: Limits) -> Any:
+    """A method to be called, in a process of its own within limits, or not."""
     if runs_inside(name, folder, isolation):
         return plugins.build("methods", name, dict(params), folder)
-    return _apart(name, folder)(params)
+    return _apart(name, folder)(params, limits)
 
 
 def imports(names: Iterable[str], folder: Path) -> dict[str, float]:

@@ -13,7 +13,7 @@ from ...core.errors import BudgetError, CellError
 from ...display.api import Capture, DisplaySpec, Simulation, white_irradiance
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench, TrainingImage, Value
-from .messages import Channel
+from .messages import Channel, refuse_unsendable
 
 ERRORS: dict[str, type[CellError]] = {"BudgetError": BudgetError}  # others arrive as a CellError
 Known = dict[str, Any]
@@ -46,6 +46,8 @@ def answer(
     """What a handle says to a request. CellError for a request that no method may make."""
     if handle is None or name not in REQUESTS[type(handle)]:
         raise CellError(f"there is no '{name}' here")
+    if name == "save":
+        refuse_unsendable(args, "what a method saves")
     value = getattr(handle, name)
     if not callable(value):
         return value

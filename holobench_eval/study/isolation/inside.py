@@ -15,7 +15,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib.machinery import ModuleSpec
 from multiprocessing import reduction
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import current_process
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -41,16 +42,18 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     """Import a method, tell what it is, and fork for every connection that ``control`` brings, until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.chdir(home)
-    torch.set_num_threads(1)  # a process with threads cannot be forked
+    torch.set_num_threads(1)
+    current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # else a method could start no process
     channel = Channel(control)
     began = time.perf_counter()
     try:
-        _hide()
-        cls = plugins.find("methods", name, folder)
-        channel.send({"facts": _facts(cls), "seconds": time.perf_counter() - began})
+        cls, refused = _imported(name, folder)
     except UserError as error:
         channel.send({"error": str(error)})
-        return
+        os._exit(1)
+    _flush()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # the file may have set another one
+    channel.send({"facts": {**_facts(cls), "refused": refused}, "seconds": time.perf_counter() - began})
     with suppress(EOFError, OSError):
         while True:
             number = reduction.recv_handle(control)
@@ -62,9 +65,44 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
                 os._exit(0)
             os.close(number)
             channel.send(child)
+            # The call is over, or the harness is, or the process has ended by itself; then what it started must end,
+            # too, since that may hold the pipe on which the harness waits.
+            watched = os.pidfd_open(child)
+            wait([control, watched])
+            os.close(watched)
+            status = _ended(child)
             with suppress(EOFError, OSError):
-                channel.receive()  # the call is over, or the harness is
-            channel.send(_ended(child))
+                channel.receive()
+            channel.send(status)
+    os._exit(0)  # whatever threads the file has left
+
+
+def _imported(name: str, folder: Path) -> tuple[type[Any], str]:
+    """A method's class, and what it imports that is hidden from methods, empty for nothing. UserError as
+    ``plugins.find``, and for a file that starts threads, since a process with threads cannot be forked."""
+    threads, refusal, refused = _threads(), _hide(), ""
+    try:
+        cls = plugins.find("methods", name, folder)
+    except UserError:
+        if not refusal.refused:
+            raise
+        refused = refusal.refused
+        sys.meta_path.remove(refusal)  # to see what it declares; it cannot run here
+        cls = plugins.find("methods", name, folder)
+    if _threads() > threads:
+        raise UserError(f"method '{name}' starts threads while its file is imported; start them in solve or prepare")
+    return cls, refused
+
+
+def _threads() -> int:
+    tasks = Path("/proc/self/task")
+    return len(list(tasks.iterdir())) if tasks.is_dir() else 1
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(Exception):
+            stream.flush()
 
 
 def _ended(child: int) -> int:
@@ -75,25 +113,31 @@ def _ended(child: int) -> int:
     return os.waitpid(child, 0)[1]
 
 
-def _hide() -> None:
-    """The modules that hold the bench and the harness cannot be imported from here on."""
+def _hide() -> _Refusal:
+    """Hide the modules that hold the bench and the harness from all imports that follow."""
     package = __package__.partition(".")[0]
     hidden = tuple(f"{package}.{part}" for part in HIDDEN)
     for name in list(sys.modules):
-        if name.startswith(hidden) and name != __package__:
+        if name.startswith(hidden):
+            parent, _, child = name.rpartition(".")
+            vars(sys.modules.get(parent, display)).pop(child, None)
             del sys.modules[name]
     for name, value in list(vars(display).items()):
         if getattr(value, "__module__", "").startswith(hidden):
             delattr(display, name)
-    sys.meta_path.insert(0, _Refusal(hidden))
+    refusal = _Refusal(hidden)
+    sys.meta_path.insert(0, refusal)
+    return refusal
 
 
 class _Refusal:
     def __init__(self, hidden: tuple[str, ...]) -> None:
         self.hidden = hidden
+        self.refused = ""  # the first name that was
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
         if name.startswith(self.hidden):
+            self.refused = self.refused or name
             raise ImportError(f"{name} is not for methods: the bench and the harness are in another process")
         return None
 
@@ -119,7 +163,9 @@ def _call(channel: Channel, cls: type[Any], owner: str) -> None:
         channel.send("ready")
         call = channel.receive()
         try:
-            channel.send({"result": _result(channel, cls, owner, device, **call)})
+            result = _result(channel, cls, owner, device, **call)
+            _flush()
+            channel.send({"result": result})
         except BaseException as error:
             channel.send(_told(error))
     with suppress(EOFError, OSError):
@@ -138,7 +184,8 @@ def _result(
         else moved(argument, device)
         for argument in args
     ]
-    return getattr(method, function)(*own)
+    result = getattr(method, function)(*own)
+    return list(result) if function == "estimates" else result
 
 
 def _told(error: BaseException) -> dict[str, Any]:

@@ -129,6 +129,8 @@ def _plain(value: Any, tensors: list[Tensor]) -> Any:
         tensor = value.detach().cpu().resolve_conj().resolve_neg().contiguous()
         tensors.append(tensor.reshape(-1))
         return ["tensor", str(tensor.dtype).removeprefix("torch."), list(tensor.shape)]
+    if isinstance(value, tuple):  # a shape, or one with names
+        value = tuple(value)
     name = type(value).__name__
     if type(value) is LISTS.get(name):
         return [

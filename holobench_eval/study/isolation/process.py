@@ -10,7 +10,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import reduction
+from multiprocessing import reduction, util
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
@@ -53,13 +54,15 @@ class MethodProcess:
         self.control, self.name = Channel(ours), name
         self.process = start(serve, theirs, name, folder, Path.cwd())
         theirs.close()
-        with _ending_after(IMPORT_LIMIT, self.process.kill) as late:
-            try:
-                told = self.control.receive()
-            except (EOFError, OSError, GarbledError):
-                self.process.join()
-                why = f"takes more than {IMPORT_LIMIT:g} s" if late else f"ends its process ({self.process.exitcode})"
-                raise UserError(f"method '{name}': the import of its file {why}") from None
+        ready = wait([ours, self.process.sentinel], IMPORT_LIMIT)  # others of its processes may hold the pipe
+        try:
+            if ours not in ready and not ours.poll():
+                raise EOFError
+            told = self.control.receive()
+        except (EOFError, OSError, GarbledError):
+            self.end()
+            why = f"ends its process ({self.process.exitcode})" if ready else f"takes more than {IMPORT_LIMIT:g} s"
+            raise UserError(f"method '{name}': the import of its file {why}") from None
         if not isinstance(told, dict) or "facts" not in told:
             raise UserError(told["error"] if isinstance(told, dict) else f"method '{name}' does not say what it is")
         self.facts: dict[str, Any] = told["facts"]
@@ -81,6 +84,9 @@ class MethodProcess:
         channel = Channel(ours)
         reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
         theirs.close()
+        if not self.control.connection.poll(ANSWER_LIMIT):
+            self.end()
+            raise CellError("the process that has imported the method does not answer")
         pid = int(self.control.receive())
 
         def stop() -> None:
@@ -217,5 +223,18 @@ def _state(name: str, folder: Path) -> tuple[tuple[str, int, int], ...]:
     if not file.endswith(".py"):
         return ()
     beside = next((path.parent for path in (folder / file, Path(file)) if path.is_file()), folder)
-    states = ((path.name, path.stat()) for path in sorted(beside.glob("*.py")))
-    return tuple((name, state.st_mtime_ns, state.st_size) for name, state in states)
+    found = []
+    for path in sorted(beside.glob("*.py")):
+        with suppress(OSError):  # an editor's lock, which points to nothing
+            state = path.stat()
+            found.append((path.name, state.st_mtime_ns, state.st_size))
+    return tuple(found)
+
+
+def _end_all() -> None:
+    for process in _processes.values():
+        process.end()
+
+
+# Before they are asked to end, which a method's file may have forbidden.
+util.Finalize(None, _end_all, exitpriority=100)

@@ -85,7 +85,8 @@ class Job:
     def timing(self) -> str:
         """The name of its timing; a job that ran alone is named as in a run with one worker."""
         workers = 1 if self.alone else max(2, self.setting.workers)  # one on a cluster may be joined by others
-        return cost.key(self.task, self.setting.threads, workers, gpu_name(self.device))
+        apart = not isolation.runs_inside(self.task.cells[0].method, self.setting.folder, self.setting.isolation)
+        return cost.key(self.task, self.setting.threads, workers, gpu_name(self.device), apart)
 
     @property
     def cells(self) -> list[tuple[Cell, Condition]]:
@@ -100,7 +101,7 @@ class Job:
 
     def method(self, name: str, params: Any) -> Any:
         """An instance of a method, built anew: no cell may depend on those computed before."""
-        return isolation.solver(name, params, self.setting.folder, self.setting.isolation)
+        return isolation.solver(name, params, self.setting.folder, self.setting.isolation, self.setting.limits)
 
     def learned(self, preparation: Preparation | None) -> Artifact | None:
         """A method's learned state; None if it has nothing to learn. CellError when its training failed."""

@@ -18,13 +18,15 @@ from ...display.api import Exposure, is_plain
 from ...metrics import match
 from .. import cost, isolation, opening
 from ..artifacts import Artifact
-from ..definition import Isolation
+from ..definition import Isolation, Limits
 from ..displays import Condition
 from ..plan import Cell
 from ..store import Record
 from .job import Job, Measured, TargetSource, load_target
 from .picture import account, keep_pictures, protocol_scores, references, refuse_saturated
 from .solution import wrong_output
+
+Apart = tuple[Isolation, Limits]  # whose methods run in processes of their own, and within which limits
 
 
 def prediction(job: Job) -> Measured:
@@ -66,7 +68,7 @@ def _foresee(job: Job) -> Foreseen:
         learned=moved(learned.state, job.device) if learned else None,
     )
     own = phase[None].to(job.device, copy=True)
-    with isolation.opened(method, job.device, job.setting.limits) as process:
+    with isolation.opened(method, job.device) as process:
         watch = cost.start(job.device, process)
         predicted = method.predict(own, handle)
         taken = watch.stop()
@@ -130,15 +132,16 @@ def shown(job: Job, cell: Cell, display: Condition, again: bool = False) -> tupl
     hologram = _Hologram(
         name, cell.holograms["sha256"], params, job.source(cell), cell.repeat, cell.seed, cell.exposure
     )
-    return _photographed(hologram, display, job.setting.folder, job.device, again, job.setting.isolation)
+    setting = job.setting
+    return _photographed(hologram, display, setting.folder, job.device, again, (setting.isolation, setting.limits))
 
 
 @lru_cache(maxsize=64)
-def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch.device, apart: Isolation) -> Tensor:
+def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch.device, apart: Apart) -> Tensor:
     """The phase of a hologram, computed once in a process."""
     bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
     item, own = hologram.source[3], target.to(device, copy=True)
-    method = isolation.solver(hologram.method, json.loads(hologram.params), folder, apart)
+    method = isolation.solver(hologram.method, json.loads(hologram.params), folder, *apart)
     handle = bench.for_method(method, hologram.method, own, item=item, repeat=hologram.repeat)
     phase: Tensor = method.solve(own[None], handle).detach().cpu()[0]
     return phase
@@ -146,7 +149,7 @@ def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch
 
 @lru_cache(maxsize=64)
 def _photographed(
-    hologram: _Hologram, display: Condition, folder: Path, device: torch.device, again: bool, apart: Isolation
+    hologram: _Hologram, display: Condition, folder: Path, device: torch.device, again: bool, apart: Apart
 ) -> tuple[Tensor, RectifiedCapture]:
     """The phase of a hologram and a capture of it, taken once in a process."""
     bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)

@@ -48,6 +48,8 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
     task, first = job.task, job.task.cells[0]
     learned = job.learned(task.preparation)
     method = job.method(first.method, first.params)
+    if isinstance(method, isolation.Apart) and method.code_version != first.method_sha256:
+        raise CellError(f"the code of {first.method} has changed since the study was planned; start the run again")
     handle = job.display(first, display).for_method(
         method,
         task.label,
@@ -58,7 +60,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         learned=moved(learned.state, job.device) if learned else None,
         starts=starts.of(job.store, first),
     )
-    with isolation.opened(method, job.device, job.setting.limits) as process:
+    with isolation.opened(method, job.device) as process:
         watch = cost.start(job.device, process)
         phase, stopped = _within_budget(method, solve, handle)
         taken = watch.stop()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,12 @@ import torch
 from holobench_eval.core.device import CPU
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import isolation
-from holobench_eval.study.definition import Limits
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Serial
 from holobench_eval.study.isolation.process import process_of
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
 from tests.study.test_run import compute
 
 METHODS = '''
@@ -154,7 +160,7 @@ methods: ["mine.py:Greedy"]
 
 def test_a_call_that_is_left_ends_its_process(file: str) -> None:
     method = isolation.build(f"{file}:Mine", {}, Path())
-    with isolation.opened(method, CPU, Limits()) as number:
+    with isolation.opened(method, CPU) as number:
         assert Path(f"/proc/{number}").exists() or not Path("/proc").exists()
     deadline = time.monotonic() + 10
     while Path(f"/proc/{number}").exists() and time.monotonic() < deadline:
@@ -295,3 +301,91 @@ class Threads:
         assert isolation.build("threads.py:Threads", {}, tmp_path).available() == "3"
     finally:
         torch.set_num_threads(before)
+
+
+def solved(tmp_path: Path, body: str, top: str = "", more: str = "") -> dict[str, Any]:
+    """The record of a method of a file, from what is at its top and in its ``solve``."""
+    (tmp_path / "one.py").write_text(
+        f"""import os, time
+from dataclasses import dataclass
+
+import torch
+{top}
+
+
+@dataclass(frozen=True)
+class One:
+    def solve(self, target, bench):
+        {body}
+        return torch.zeros((*target.shape[:2], *bench.spec.shape))
+"""
+    )
+    (tmp_path / "study.yaml").write_text(
+        f"""title: one
+display: {{profiles: [ideal], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{count: 1}}}}
+protocol: {{metrics: [psnr]}}
+limits: {{seconds: 60}}
+{more}
+methods: ["one.py:One"]
+"""
+    )
+    (record,) = (r for r in compute(tmp_path / "study.yaml", tmp_path / "out").records if r["label"] == "One")
+    return record
+
+
+def test_what_a_method_leaves_running_does_not_keep_its_end_from_the_harness(tmp_path: Path) -> None:
+    began = time.monotonic()
+    record = solved(tmp_path, "(os.fork() or time.sleep(100)) and os._exit(3)")
+    assert "ended with exit code 3" in record["reason"]
+    assert time.monotonic() - began < 50
+
+
+def test_a_method_may_have_processes_of_its_own(tmp_path: Path) -> None:
+    body = "import multiprocessing; assert multiprocessing.get_context('fork').Pool(1).map(abs, [-1]) == [1]"
+    assert solved(tmp_path, body)["state"] == "done"
+
+
+def test_a_file_that_starts_threads_is_refused_since_it_cannot_be_forked(tmp_path: Path) -> None:
+    top = "import threading; threading.Thread(target=time.sleep, args=(60,), daemon=True).start()"
+    with pytest.raises(UserError, match="starts threads while its file is imported"):
+        solved(tmp_path, "pass", top)
+
+
+def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path: Path) -> None:
+    top = "from holobench_eval.display.simulated.profile import load_profile"
+    with pytest.raises(UserError, match=r"one.py:One' imports holobench_eval.display.simulated.*'isolation: none'"):
+        solved(tmp_path, "load_profile(bench.spec.name)", top)
+    assert solved(tmp_path, "load_profile(bench.spec.name)", top, "isolation: none")["state"] == "done"
+
+
+def test_a_method_that_was_changed_after_planning_is_not_taken_for_the_planned_one(tmp_path: Path) -> None:
+    body = "os.path.exists('later') or open('later', 'w').close()"
+    first = solved(tmp_path, body)
+    assert first["state"] == "done"
+    study = load_study(tmp_path / "study.yaml")
+    planned = plan(study)
+    (tmp_path / "one.py").write_text((tmp_path / "one.py").read_text().replace("'later'", "'sooner'"))
+    watch = Lines(lambda line: None)
+    outcome = run(study, planned, tmp_path / "new", Serial(), watch, threads=1, artifacts=tmp_path / "artifacts")
+    (reason,) = {record["reason"] for record in outcome.records if record["label"] == "One"}
+    assert "has changed since the study was planned" in reason
+
+
+def test_an_end_signal_that_a_file_ignores_does_not_keep_the_harness_from_ending(tmp_path: Path) -> None:
+    (tmp_path / "deaf.py").write_text(
+        """import signal
+from dataclasses import dataclass
+
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+
+
+@dataclass(frozen=True)
+class Deaf:
+    def solve(self, target, bench): ...
+"""
+    )
+    script = "from pathlib import Path\nfrom holobench_eval.study import isolation\n"
+    script += "if __name__ == '__main__':\n    isolation.find('deaf.py:Deaf', Path('.'))\n"
+    (tmp_path / "script.py").write_text(script)
+    assert subprocess.run([sys.executable, "script.py"], cwd=tmp_path, timeout=60, check=False).returncode == 0

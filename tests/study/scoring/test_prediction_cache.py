@@ -14,7 +14,7 @@ def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch: pyte
     monkeypatch.setattr(prediction, "_photographed", lambda hologram, *_: asked.append(hologram))
     source = ("charts", "{}", Path(), "tv_lines", "digest")
     job: Any = SimpleNamespace(
-        source=lambda cell: source, setting=SimpleNamespace(folder=Path(), isolation="files"), device="cpu"
+        source=lambda cell: source, setting=SimpleNamespace(folder=Path(), isolation="files", limits=None), device="cpu"
     )
     for version in ("before", "before", "after"):
         probe = {"name": "mine.py:Mine", "params": {}, "sha256": version}
