@@ -87,7 +87,7 @@ class TrainingRow:
 
 def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, gpu: str = "") -> list[Row]:
     """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``cost.key``."""
-    from ..study import cost
+    from ..study import cost, isolation
 
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     states, timed = store.states(plan.cells, cost.timed(study, plan)), cost.names()
@@ -97,7 +97,10 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
         cells = [cell for task in tasks for cell in task.cells]
         count = Counter(states[cell.id] for cell in cells)
         unsolved = [task for task in tasks if any(states[cell.id] == "missing" for cell in task.cells)]
-        keys = [cost.key(task, threads, workers, gpu) for task in tasks if not task.is_floor]
+        apart = not tasks[0].is_floor and not isolation.runs_inside(
+            tasks[0].cells[0].method, study.folder, study.isolation
+        )
+        keys = [cost.key(task, threads, workers, gpu, apart) for task in tasks if not task.is_floor]
         seconds = [earlier.seconds for key in keys if key in timed and (earlier := cost.recorded(key)) is not None]
         limit = limits.get(label)
         rows.append(
