@@ -36,7 +36,6 @@ class Apart:
     file: ClassVar[str]
     folder: ClassVar[Path]
     code_version: ClassVar[str]
-
     refused: ClassVar[str]
 
     def __init__(self, params: Mapping[str, Any], limits: Limits | None = None) -> None:
