@@ -1,17 +1,19 @@
-"""Find methods and datasets by name: entry points for installed packages, ``path/to/file.py:Class`` for the rest."""
+"""Find methods and datasets by name: entry points for installed packages, ``path/to/file.py:Name`` for the rest."""
 
 from __future__ import annotations
 
 import hashlib
 import importlib.util
+import inspect
 import sys
-from dataclasses import is_dataclass
-from functools import cache, lru_cache
+from collections.abc import Callable
+from dataclasses import is_dataclass, make_dataclass
+from functools import cache, lru_cache, wraps
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any, Literal
+from typing import Any, Literal, get_type_hints
 
 from pydantic import TypeAdapter
 
@@ -41,14 +43,14 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
     kind : {"methods", "datasets"}
         What it is.
     name : str
-        The name of an entry point, or ``path/to/file.py:Class``.
+        The name of an entry point, or ``path/to/file.py:Name`` of a class, or of a method's function.
     folder : Path, optional
         Where a relative path starts (the folder of the config that names it); the working directory is tried after it.
 
     Returns
     -------
     type
-        A dataclass.
+        A dataclass; for a function ``solve(target, bench, ...)`` one that has its further parameters.
 
     Raises
     ------
@@ -66,7 +68,7 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
     if name.endswith(".py"):
         raise UserError(f"{kind[:-1]} '{name}': a file without its class; expected {name}:Class")
     if name not in entries:
-        raise UserError(f"unknown {kind[:-1]} '{name}'; {suggest(name, entries)}, or path/to/file.py:Class")
+        raise UserError(f"unknown {kind[:-1]} '{name}'; {suggest(name, entries)}, or path/to/file.py:Name")
     try:
         return _plugin_class(kind, name, entries[name].load())
     except (ImportError, AttributeError) as error:
@@ -130,15 +132,43 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
         raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {type(error).__name__}: {error}") from error
     cls = getattr(module, attribute, None)
     if cls is None:
-        classes = [key for key, value in vars(module).items() if isinstance(value, type) and is_dataclass(value)]
-        raise UserError(f"{kind[:-1]} '{name}': {path} has no class '{attribute}'; {suggest(attribute, classes)}")
+        own = {key: value for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__}
+        near = [key for key, value in own.items() if is_dataclass(value) or _is_function(kind, value)]
+        raise UserError(f"{kind[:-1]} '{name}': {path} has no '{attribute}'; {suggest(attribute, near)}")
     return _plugin_class(kind, name, cls)
 
 
-def _plugin_class(kind: Kind, name: str, cls: Any) -> type[Any]:
+def _plugin_class(kind: Kind, name: str, found: Any) -> type[Any]:
+    if _is_function(kind, found):
+        return _class_of(found, f"{kind[:-1]} '{name}'")
     function = "solve" if kind == "methods" else "items"
-    if not (isinstance(cls, type) and is_dataclass(cls) and hasattr(cls, function)):
-        raise UserError(f"{kind[:-1]} '{name}' is not a dataclass with a method '{function}'; see CONTRIBUTING.md")
+    if not (isinstance(found, type) and is_dataclass(found) and hasattr(found, function)):
+        other = "neither a function of target and bench, nor" if kind == "methods" else "not"
+        raise UserError(f"{kind[:-1]} '{name}' is {other} a dataclass with a method '{function}'; see CONTRIBUTING.md")
+    return found
+
+
+def _is_function(kind: Kind, found: Any) -> bool:
+    return kind == "methods" and inspect.isfunction(found) and len(inspect.signature(found).parameters) >= 2
+
+
+def _class_of(function: Callable[..., Any], owner: str) -> type[Any]:
+    """The dataclass of a method that is a function of target and bench. Its further parameters are the fields; what is
+    set on the function, such as ``camera = True``, is declared by the class."""
+    try:
+        hints = get_type_hints(function, include_extras=True)
+        _, _, *further = inspect.signature(function).parameters.values()
+        fields = [(given.name, hints.get(given.name, type(given.default)), given.default) for given in further]
+
+        @wraps(function)
+        def solve(self: Any, target: Any, bench: Any) -> Any:
+            return function(target, bench, **{name: getattr(self, name) for name, *_ in fields})
+
+        declared = {**vars(function), "solve": solve, "__doc__": function.__doc__}
+        cls = make_dataclass(function.__name__, fields, frozen=True, namespace=declared)
+    except (TypeError, ValueError, NameError) as error:
+        raise UserError(f"{owner}: its parameters cannot be taken from a config: {error}") from error
+    cls.__module__, cls.__qualname__ = function.__module__, function.__qualname__
     return cls
 
 
