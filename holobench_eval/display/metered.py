@@ -68,6 +68,8 @@ class MeteredDisplay:
         What the method's ``prepare`` returned, None for a method that was not trained.
     starts
         Phases ``(C, H, W)`` [rad] of other methods for this target, for a privileged method to start from.
+    target_name, target_sha256
+        The target's name in its dataset and the digest of its source, empty where it has none.
     """
 
     def __init__(
@@ -80,7 +82,10 @@ class MeteredDisplay:
         budget: int | None = None,
         learned: Mapping[str, Any] | None = None,
         starts: Sequence[Tensor] = (),
+        target_name: str = "",
+        target_sha256: str = "",
     ) -> None:
+        self.target_name, self.target_sha256 = target_name, target_sha256
         self._display = display
         self._label = label
         self._target = target.clone()  # a method that writes to its target must not reach the scored one
@@ -234,6 +239,7 @@ class MethodHandles:
         budget: int | None = None,
         learned: Mapping[str, Any] | None = None,
         starts: Sequence[Tensor] = (),
+        sha256: str = "",
     ) -> MeteredDisplay:
         """The handle that a method gets to solve a target.
 
@@ -247,6 +253,8 @@ class MethodHandles:
             ``(C, h, w)`` linear light in [0, 1].
         item, repeat
             Name of the target and number of the repetition: random numbers depend on them and on the display's seed.
+        sha256
+            Digest of the target's source.
         budget
             Captures that may be taken, None for no limit.
         learned
@@ -254,4 +262,5 @@ class MethodHandles:
         starts
             See ``MeteredDisplay``.
         """
-        return MeteredDisplay(self, label, target, (self.seed, item, repeat), method, budget, learned, starts)
+        names = (self.seed, item, repeat)
+        return MeteredDisplay(self, label, target, names, method, budget, learned, starts, item, sha256)

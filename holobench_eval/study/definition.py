@@ -133,7 +133,7 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Save:
-    """What else is written beside the scores: rectified captures (16 bit) and phases (8 bit)."""
+    """What else is written beside the scores: rectified captures (16 bit), and phases (as PNG of 8 bits and exact)."""
 
     captures: bool = False
     phases: bool = False

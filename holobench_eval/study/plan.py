@@ -17,6 +17,7 @@ from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
 from .focal_stacks import VERSION as IN_FOCUS
 from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
+from .isolation import read_files
 from .versions import HARNESS, method_version
 
 REFERENCE = "reference"  # the condition of the floor cells
@@ -41,11 +42,12 @@ class Cell:
     repeat, seed: names of the noise; harness_sha256: version of optics, bench, registration and metrics
     (``versions.HARNESS``); metrics: name and version of every metric that can be computed here; measure: what
     is scored, see ``Study``; holograms: whose captures are predicted (empty for pictures);
-    prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures: the
-    most that the display allows while the target is solved (None: no limit); change: kind and value of what has changed
-    on the display since methods were prepared for it (empty: nothing); session: name of the series of photographs that
-    stands for the display (empty: none does); starts: ids of the cells of other methods whose phases the method starts
-    from (empty: it follows nobody).
+    prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures:
+    the most that the display allows while the target is solved (None: no limit); change: kind and value of what has
+    changed on the display since methods were prepared for it (empty: nothing); files: digests of the files that the
+    method reads for the target, by their paths (empty: it reads none); session: name of the series of photographs
+    that stands for the display (empty: none does); starts: ids of the cells of other methods whose phases the
+    method starts from (empty: it follows nobody).
     """
 
     method: str
@@ -71,18 +73,19 @@ class Cell:
     prepared: tuple[str, ...] = ()
     captures: int | None = None
     change: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
     session: str = ""
     starts: tuple[str, ...] = ()
 
     def description(self) -> dict[str, Any]:
         """The cell as plain JSON values, without ``captures`` if there is no limit, and without an empty ``change``,
-        ``session`` or ``starts``."""
+        ``files``, ``session`` or ``starts``."""
         plain: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
         plain |= {name: list(plain[name]) for name in ("panel", "metrics", "prepared", "starts")}
-        plain |= {name: dict(plain[name]) for name in ("params", "dataset_params", "holograms", "change")}
+        plain |= {name: dict(plain[name]) for name in ("params", "dataset_params", "holograms", "change", "files")}
         if self.captures is None:
             del plain["captures"]
-        for name in ("change", "session", "starts"):
+        for name in ("change", "files", "session", "starts"):
             if not plain[name]:
                 del plain[name]
         return plain
@@ -212,9 +215,10 @@ class _Ground:
         prepared: tuple[str, ...] = (),
         captures: int | None = None,
         exposure: Exposure | None = None,
+        files: Mapping[str, str] | None = None,
     ) -> Cell:
         """A cell; ``target``: name and digest; ``maker``: the method that makes the picture; exposure: None for the
-        study's."""
+        study's; files: digests of those that the method reads."""
         study = self.study
         method, version, params = maker
         holograms = study.holograms
@@ -242,6 +246,7 @@ class _Ground:
             holograms=probe if study.predicts else {},
             prepared=prepared,
             captures=captures,
+            files=files or {},
             change=dict([display.change]) if display.change and condition != REFERENCE else {},
             session=display.real.session if display.real and condition != REFERENCE else "",
         )
@@ -250,6 +255,7 @@ class _Ground:
         """A task for every solution of a method: target by target, repeat by repeat."""
         cls = isolation.find(entry.name, self.study.folder)
         maker = (entry.name, method_version(cls), entry.params)
+        read = read_files.of(entry, self.study.folder, cls, (name for name, _ in targets))
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
             own = preparation(self.study, entry.name, entry.params, conditions[0].nominal)
@@ -264,6 +270,7 @@ class _Ground:
                         _ids(own, display.learned),
                         entry.captures,
                         entry.exposure,
+                        read[target[0]],
                     )
                     for target, display in showing
                 )

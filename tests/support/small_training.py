@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import atexit
 import copy
 import io
 import math
+import shutil
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
@@ -61,7 +67,19 @@ QUICK: dict[str, dict[str, Any]] = {
 
 def quick(name: str) -> Any:
     """A shipped method with short settings."""
-    return plugins.build("methods", name, QUICK.get(name, {}))
+    settings = {"file": str(_fields() / "{target}.npy")} if name == "phases" else QUICK.get(name, {})
+    return plugins.build("methods", name, settings)
+
+
+@cache
+def _fields() -> Path:
+    """A folder with complex fields at the panels of the tests' displays."""
+    folder = Path(tempfile.mkdtemp(prefix="fields-"))
+    atexit.register(shutil.rmtree, folder)
+    for shape in ((3, 48, 56), (2, 64, 64)):
+        draw = np.random.default_rng(5).standard_normal((2, *shape))
+        np.save(folder / f"{'x'.join(map(str, shape))}.npy", draw[0] + 1j * draw[1])
+    return folder
 
 
 class Killed(BaseException):

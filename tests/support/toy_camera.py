@@ -81,7 +81,8 @@ class ToyDisplay:
         return capture.linear() / white_irradiance(target, self.spec)[:, None, None]
 
     def handle(self, method: object, target: Tensor, budget: int | None = None) -> MeteredDisplay:
-        return MeteredDisplay(self, "toy", target, ("item", 0), method, budget)
+        name = "x".join(map(str, (len(target), *self.spec.shape)))  # by which `small_training.quick` names its files
+        return MeteredDisplay(self, "toy", target, ("item", 0), method, budget, target_name=name)
 
     def error(self, phase: Tensor, target: Tensor) -> Tensor:
         """Mean squared error ``(C,)`` of the noise-free picture, as it is scored."""

@@ -31,6 +31,8 @@ def known(handle: MeteredDisplay | TrainingBench) -> Known:
         "target": handle._target,
         "budget": handle.budget,
         "learned": handle._learned,
+        "target_name": handle.target_name,
+        "target_sha256": handle.target_sha256,
     }
 
 
@@ -87,6 +89,7 @@ class SolvingHandle(_Remote):
     def __init__(self, channel: Channel, known: Known, device: torch.device) -> None:
         super().__init__(channel, known, device)
         self.budget: int | None = known["budget"]
+        self.target_name, self.target_sha256 = str(known["target_name"]), str(known["target_sha256"])
         self._label, self._target, self._learned = known["label"], known["target"], known["learned"]
 
     @property

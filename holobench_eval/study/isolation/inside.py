@@ -33,7 +33,7 @@ from .handles import SolvingHandle, TrainingHandle
 from .messages import Channel
 
 FLAGS = ("camera", "privileged", "trains", "follows", "planes", "form", "tuned", "version")
-FUNCTIONS = ("solve", "solve_planes", "predict", "prepare", "estimates", "available")
+FUNCTIONS = ("solve", "solve_planes", "predict", "prepare", "estimates", "available", "files")
 HIDDEN = ("display.simulated", "study", "lab", "report", "commands", "testing")  # the bench and the harness
 HANDLES = {"solving": SolvingHandle, "training": TrainingHandle}
 
@@ -185,7 +185,7 @@ def _result(
         for argument in args
     ]
     result = getattr(method, function)(*own)
-    return list(result) if function == "estimates" else result
+    return list(result) if function in ("estimates", "files") else result
 
 
 def _told(error: BaseException) -> dict[str, Any]:

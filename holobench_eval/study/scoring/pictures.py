@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -37,5 +39,9 @@ def write_capture(path: Path, linear: Tensor) -> None:
 
 
 def write_phase(path: Path, phase: Tensor) -> None:
-    """Write a phase ``(C, H, W)`` [rad] as 8-bit gray levels, 256 levels to 2 pi, a colour channel per wavelength."""
+    """Write a phase ``(C, H, W)`` [rad] as 8-bit gray levels, 256 levels to 2 pi, a colour channel per wavelength; and
+    beside it as .npy, in radians as the method gave it, which the method ``phases`` reads."""
     write_png(path, (phase.double() / math.tau * 256).round().remainder(256), bits=8)
+    exact = io.BytesIO()
+    np.save(exact, phase.contiguous().numpy(), allow_pickle=False)
+    write_atomically(path.with_suffix(".npy"), exact.getvalue())

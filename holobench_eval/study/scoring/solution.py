@@ -19,6 +19,7 @@ from .. import cost, isolation
 from ..artifacts import Artifact, read_tensors
 from ..cost import Cost
 from ..displays import Condition
+from ..isolation.read_files import digests
 from . import starts
 from .job import Job
 
@@ -50,6 +51,8 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
     method = job.method(first.method, first.params)
     if isinstance(method, isolation.Apart) and method.code_version != first.method_sha256:
         raise CellError(f"the code of {first.method} has changed since the study was planned; start the run again")
+    if digests(method, first.target) != first.files:
+        raise CellError(f"a file that {task.label} reads has changed since the study was planned; start the run again")
     handle = job.display(first, display).for_method(
         method,
         task.label,
@@ -59,6 +62,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         budget=first.captures,
         learned=moved(learned.state, job.device) if learned else None,
         starts=starts.of(job.store, first),
+        sha256=first.target_sha256,
     )
     with isolation.opened(method, job.device) as process:
         watch = cost.start(job.device, process)

@@ -1,0 +1,1 @@
+"""Holograms that other software has made."""

@@ -1,0 +1,95 @@
+"""Read an array of phases or of a complex field from a picture, .npy, .npz or .mat; no code is run by it."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat, whosmat
+
+from ...core.errors import CellError
+from ...core.io import decode_levels
+
+PICTURES = (".png", ".tif", ".tiff", ".bmp")
+SUFFIXES = (*PICTURES, ".npy", ".npz", ".mat")
+LARGEST_BYTES = 1_000_000_000  # a complex field of three colours on a panel of 4K in double precision takes 400 MB
+
+
+def read_array(path: Path, variable: str = "") -> NDArray[Any]:
+    """The array of a file, as it is stored; a picture's levels as ``(H, W)`` or ``(H, W, C)`` with red first.
+
+    variable: the name of the array in a .npz or .mat file; empty where there is only one. CellError, one line, for a
+    file that is missing, damaged, of another kind or too large, and for an array that does not hold plain numbers.
+    """
+    if not path.is_file():
+        raise CellError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}")
+    if path.stat().st_size > LARGEST_BYTES:
+        raise CellError(f"{path}: larger than {LARGEST_BYTES // 10**6} MB")
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise CellError(f"{path}: phases are read from {', '.join(SUFFIXES)}")
+    try:
+        content = path.read_bytes()
+        array = _picture(content) if suffix in PICTURES else _numbers(content, suffix, variable)
+    except CellError as error:
+        raise CellError(f"{path}: {error}") from None
+    except NotImplementedError:  # what SciPy says to HDF5
+        raise CellError(f"{path}: a .mat file of version 7.3; in MATLAB: save(..., '-v7')") from None
+    except Exception as error:  # whatever a reader trips over in a damaged file
+        first = next(iter(str(error).splitlines()), type(error).__name__)
+        raise CellError(f"{path}: damaged, or no {suffix} file: {first[:200]}") from None
+    if array.dtype.kind not in "uifc" or not array.size:
+        raise CellError(f"{path}: holds {array.size} values of type {array.dtype}; expected numbers")
+    return array
+
+
+def _picture(content: bytes) -> NDArray[Any]:
+    levels = decode_levels(content)
+    if levels is None:
+        raise CellError("no picture of 8 or 16 bits that can be read, or a damaged one")
+    if levels.ndim == 3 and levels.shape[2] == 4:
+        raise CellError("a picture with alpha; expected gray or RGB")
+    return levels
+
+
+def _numbers(content: bytes, suffix: str, variable: str) -> NDArray[Any]:
+    if suffix == ".npy":
+        _refuse_large(_npy_shape(io.BytesIO(content)))
+        return np.asarray(np.load(io.BytesIO(content), allow_pickle=False))
+    if suffix == ".npz":
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            sizes = {info.filename.removesuffix(".npy"): (info.file_size,) for info in archive.infolist()}
+        name = _chosen(sizes, variable)
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            return np.asarray(arrays[name])
+    name = _chosen({name: (*shape, 16) for name, shape, _ in whosmat(io.BytesIO(content))}, variable)
+    return np.asarray(loadmat(io.BytesIO(content), variable_names=[name])[name])
+
+
+def _npy_shape(file: io.BytesIO) -> tuple[int, ...]:
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(file)
+    return (*shape, kind.itemsize)
+
+
+def _chosen(sizes: dict[str, tuple[int, ...]], variable: str) -> str:
+    """The name of the array to read. sizes: by name, numbers whose product is the bytes that it takes at most."""
+    if not variable and len(sizes) == 1:
+        variable = next(iter(sizes))
+    if variable not in sizes:
+        found = ", ".join(sorted(sizes)[:10]) or "nothing"
+        wanted = f"no variable '{variable}'" if variable else "several variables; name one as 'variable'"
+        raise CellError(f"{wanted}; it holds {found}")
+    _refuse_large(sizes[variable])
+    return variable
+
+
+def _refuse_large(size: tuple[int, ...]) -> None:
+    if prod(size) > LARGEST_BYTES:
+        raise CellError(f"holds an array of more than {LARGEST_BYTES // 10**6} MB")

@@ -1,0 +1,194 @@
+"""Holograms that other software has made, shown as they are: the door for MATLAB, C++ or another harness."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Protocol
+
+import numpy as np
+import torch
+from annotated_types import Interval, MinLen
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ...core.errors import CellError, UserError
+from ...core.io import file_name
+from ...display.api import DisplaySpec
+from ..common import Bench
+from ..double_phase import encode
+from .arrays import SUFFIXES, read_array
+
+COLOURS = ("red", "green", "blue")
+
+
+class NamedBench(Bench, Protocol):
+    """A bench that tells which target is solved."""
+
+    @property
+    def target_name(self) -> str:
+        """The name of the target in its dataset."""
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Phases from files, one file a target, made by any software.
+
+    The convention of phases is that of all methods here: ``exp(+i phase)`` with light travelling as ``exp(+i k z)``;
+    row 0 is the top of the picture and column 0 its left, seen from where the camera stands. A blaze is added by the
+    display itself. What a file holds becomes ``sign * value + origin`` in radians. Nothing is resampled.
+
+    An array is ``(H, W)``, ``(H, W, 3)`` or ``(3, H, W)``. Integers, and pictures, are levels; other real numbers are
+    radians; complex numbers are the field at the panel, which ``encoder`` turns into a phase.
+
+    Parameters
+    ----------
+    file : str
+        Path from the working directory: .png, .tif, .bmp, .npy, .npz or .mat. ``{target}`` in it stands for the name of
+        the target (anything but letters, digits, ``.``, ``-`` and ``_`` in a name becomes ``_``, with a part of its
+        hash behind), ``{stem}`` for that name without its ending (``cat`` for ``cat.jpg``), ``{channel}`` for the
+        colour, where each has a file of its own.
+    amplitude : str
+        Path of the amplitudes in the same manner, where amplitude and phase of a field lie in two files; empty for
+        none.
+    channels : tuple of str
+        What ``{channel}`` stands for, one for each wavelength of the display, red first.
+    variable : str
+        Name of the array in a .npz or .mat file; empty where there is only one.
+    levels : {"integers", "all"}
+        Which real numbers are levels: integers, or all (MATLAB keeps levels as double).
+    two_pi_level : float, optional
+        The level that lags a full turn behind level 0; by default 256 or 65536, by the bits of the file.
+    sign : {1, -1}
+        -1 for phases of the opposite convention.
+    origin : float
+        Phase of level 0 [rad].
+    flip_horizontal, flip_vertical : bool
+        The file is mirrored.
+    order : {"rgb", "bgr"}
+        Order of the colours in an array.
+    encoder : {"double_phase", "phase_only"}
+        Of a complex field: double-phase encoding (`double_phase.encode`), or its phase alone.
+    """
+
+    file: Annotated[str, MinLen(1)] = "phases/{target}.npy"
+    amplitude: str = ""
+    channels: tuple[str, ...] = COLOURS
+    variable: str = ""
+    levels: Literal["integers", "all"] = "integers"
+    two_pi_level: Annotated[float, Interval(gt=1, le=65536)] | None = None
+    sign: Literal[1, -1] = 1
+    origin: float = 0.0
+    flip_horizontal: bool = False
+    flip_vertical: bool = False
+    order: Literal["rgb", "bgr"] = "rgb"
+    encoder: Literal["double_phase", "phase_only"] = "double_phase"
+
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        for name, pattern in (("file", self.file), ("amplitude", self.amplitude)):
+            unknown = set(re.findall(r"\{[^}]*\}?", pattern)) - {"{target}", "{stem}", "{channel}"}
+            if unknown:
+                raise UserError(f"{name}: '{min(unknown)}' stands for nothing; {{target}}, {{stem}} and {{channel}} do")
+            if pattern and Path(pattern).suffix.lower() not in SUFFIXES:
+                raise UserError(f"{name}: '{pattern}' should end in {', '.join(SUFFIXES)}")
+        if self.amplitude and ("{channel}" in self.amplitude) != ("{channel}" in self.file):
+            raise UserError("amplitude: {channel} should be in both patterns or in none")
+
+    def files(self, target_name: str) -> list[str]:
+        """The files that hold the phase of a target; those of all colours where each has its own."""
+        patterns = [pattern for pattern in (self.file, self.amplitude) if pattern]
+        return [path for pattern in patterns for path in self._paths(pattern, target_name)]
+
+    def solve(self, target: Tensor, bench: NamedBench) -> Tensor:
+        """The phase that the target's file holds.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1]; only its number of images and colours is used.
+        bench : NamedBench
+            Nominal optics in SI units, and the name of the target.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad], the same for every image of a batch.
+        """
+        spec, colours = bench.spec, target.shape[1]
+        phase = self._read(self.file, bench.target_name, spec, colours)
+        if self.amplitude:
+            if phase.is_complex():
+                raise CellError(f"{self.file}: a complex field needs no file of amplitudes")
+            modulus = self._read(self.amplitude, bench.target_name, spec, colours, phases=False)
+            phase = torch.polar(modulus, phase)
+        if phase.is_complex():
+            phase = encode(phase) if self.encoder == "double_phase" else phase.angle()
+        return phase.float().to(target.device).expand(len(target), -1, -1, -1).clone()
+
+    def _paths(self, pattern: str, target_name: str) -> list[str]:
+        name = file_name(target_name)
+        path = pattern.replace("{target}", name).replace("{stem}", Path(name).stem)
+        return [path.replace("{channel}", name) for name in self.channels] if "{channel}" in path else [path]
+
+    def _read(self, pattern: str, target_name: str, spec: DisplaySpec, colours: int, phases: bool = True) -> Tensor:
+        """What the files of a pattern hold, ``(C, H, W)``: phases [rad], complex fields, or amplitudes."""
+        paths = self._paths(pattern, target_name)
+        if len(paths) > 1:
+            if len(paths) != colours:
+                raise CellError(f"channels: {len(paths)} names for the {colours} colours of '{spec.name}'")
+            planes = [self._planes(path, spec, 1, phases) for path in paths]
+            return torch.cat(planes)
+        return self._planes(paths[0], spec, colours, phases)
+
+    def _planes(self, path: str, spec: DisplaySpec, colours: int, phases: bool) -> Tensor:
+        array = read_array(Path(path), self.variable)
+        if array.ndim == 3 and array.shape[-1] == colours and array.shape[:2] == spec.shape:
+            array = np.moveaxis(array, -1, 0)
+        if array.ndim == 2:
+            array = array[None]
+        if array.shape != (colours, *spec.shape):
+            raise CellError(f"{path}: {_described(array)}; {_wanted(spec, colours)}")
+        if self.order == "bgr":
+            array = array[::-1]
+        if self.flip_horizontal:
+            array = array[..., ::-1]
+        if self.flip_vertical:
+            array = array[..., ::-1, :]
+        values = self._radians(array, path) if phases else _real(array, path)
+        if not np.isfinite(values).all():
+            raise CellError(f"{path}: holds values that are NaN or infinite")
+        return torch.from_numpy(np.ascontiguousarray(values))
+
+    def _radians(self, array: NDArray[Any], path: str) -> NDArray[Any]:
+        if array.dtype.kind == "c":
+            field = array if self.sign == 1 else array.conj()
+            return field * np.exp(1j * self.origin)
+        if array.dtype.kind != "f" or self.levels == "all":
+            bits = 8 * array.dtype.itemsize
+            if self.two_pi_level is None and (array.dtype.kind != "u" or bits > 16):
+                raise CellError(f"{path}: levels of type {array.dtype}; say which level is a full turn: two_pi_level")
+            array = array.astype(np.float64) * (math.tau / (self.two_pi_level or 2**bits))
+        if self.sign == 1 and not self.origin:
+            return array  # to the last bit
+        return self.sign * array.astype(np.float64) + self.origin
+
+
+def _real(array: NDArray[Any], path: str) -> NDArray[Any]:
+    if array.dtype.kind == "c" or bool((array < 0).any()):
+        raise CellError(f"{path}: amplitudes are real and not negative")
+    return array.astype(np.float64)
+
+
+def _described(array: NDArray[Any]) -> str:
+    return " x ".join(map(str, array.shape)) + f" values of type {array.dtype}"
+
+
+def _wanted(spec: DisplaySpec, colours: int) -> str:
+    rows, columns = spec.shape
+    of = f"{rows} x {columns}" + (f" in {colours} colours" if colours > 1 else ", one colour")
+    return f"'{spec.name}' shows {of} here, and phases are not resampled (the panel is set by display.panel)"

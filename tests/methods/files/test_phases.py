@@ -1,0 +1,194 @@
+"""A hologram from a file is the one that was written, whatever its form and convention, or is refused in one line."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+from torch import Tensor
+
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.methods.double_phase import encode
+from holobench_eval.methods.files.arrays import read_array
+from tests.support.small_training import small_spec
+
+SPEC = small_spec(12, 8, 3)
+SHAPE = (3, *SPEC.shape)
+LEVELS = np.random.default_rng(1).integers(0, 256, SHAPE).astype(np.uint8)
+PHASE = LEVELS.astype(np.float64) * (math.tau / 256)
+
+
+@dataclass
+class Bench:
+    target_name: str = "cat.jpg"
+    spec = SPEC
+
+
+def solved(file: Path, bench: Any = None, colours: int = 3, **params: Any) -> Tensor:
+    method = plugins.build("methods", "phases", {"file": str(file), **params})
+    phase: Tensor = method.solve(torch.zeros(1, colours, 8, 8), bench or Bench())
+    return phase[0]
+
+
+def turns_apart(phase: Tensor, wanted: Any) -> float:
+    off = (phase.double() - torch.as_tensor(np.ascontiguousarray(wanted))) / math.tau
+    return float((off - off.round()).abs().max())
+
+
+def write_rgb(path: Path, levels: Any) -> None:
+    assert cv2.imwrite(str(path), np.ascontiguousarray(np.moveaxis(levels, 0, -1)[..., ::-1]))
+
+
+@pytest.mark.parametrize("form", ["rgb.png", "rgb16.png", "rgb.tif", "npy", "last", "float", "npz", "mat", "channels"])
+def test_every_form_of_file_gives_the_phase_that_was_written(tmp_path: Path, form: str) -> None:
+    file, params = tmp_path / form, {}
+    if form == "rgb16.png":
+        write_rgb(file, LEVELS.astype(np.uint16) * 256)
+    elif form.startswith("rgb"):
+        write_rgb(file, LEVELS)
+    elif form == "channels":
+        for name, plane in zip(("r", "g", "b"), LEVELS, strict=True):
+            cv2.imwrite(str(tmp_path / f"cat-{name}.png"), plane)
+        file, params = tmp_path / "{stem}-{channel}.png", {"channels": ["r", "g", "b"]}
+    elif form in ("npy", "last", "float"):
+        file = tmp_path / f"{form}.npy"
+        np.save(file, {"npy": LEVELS, "last": np.moveaxis(LEVELS, 0, -1), "float": PHASE}[form])
+    else:
+        file, params = tmp_path / f"many.{form}", {"variable": "phase"}
+        write: Any = savemat if form == "mat" else lambda path, arrays: np.savez_compressed(path, **arrays)
+        write(file, {"phase": PHASE, "other": np.zeros(3)})
+    assert turns_apart(solved(file, **params), PHASE) < 1e-6
+
+
+def test_radians_of_single_precision_arrive_to_the_last_bit(tmp_path: Path) -> None:
+    phase = torch.from_numpy(PHASE.astype(np.float32)) * 3 - 9
+    np.save(tmp_path / "cat.jpg.npy", phase.numpy())
+    assert torch.equal(solved(tmp_path / "{target}.npy"), phase)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    sign=st.sampled_from([1, -1]),
+    origin=st.floats(-7, 7),
+    two_pi=st.floats(2, 300),
+    across=st.booleans(),
+    down=st.booleans(),
+    order=st.sampled_from(["rgb", "bgr"]),
+)
+def test_the_convention_of_a_file_is_undone(
+    tmp_path_factory: pytest.TempPathFactory,
+    sign: int,
+    origin: float,
+    two_pi: float,
+    across: bool,
+    down: bool,
+    order: str,
+) -> None:
+    levels = sign * (PHASE - origin) / math.tau * two_pi
+    written = levels[:: 1 if order == "rgb" else -1, :: -1 if down else 1, :: -1 if across else 1]
+    file = tmp_path_factory.mktemp("convention") / "levels.mat"
+    savemat(file, {"levels": written})
+    convention = {"sign": sign, "origin": origin, "two_pi_level": two_pi, "levels": "all", "order": order}
+    found = solved(file, **convention, flip_horizontal=across, flip_vertical=down)
+    assert turns_apart(found, PHASE) < 1e-5
+
+
+def test_a_field_is_encoded_by_the_encoder_that_is_named_whether_in_one_file_or_two(tmp_path: Path) -> None:
+    modulus = 0.1 + LEVELS[::-1] / 255
+    field = modulus * np.exp(1j * PHASE)
+    np.save(tmp_path / "field.npy", field)
+    np.save(tmp_path / "phase.npy", PHASE)
+    np.save(tmp_path / "modulus.npy", modulus)
+    pair = {"amplitude": str(tmp_path / "modulus.npy")}
+    assert turns_apart(solved(tmp_path / "field.npy", encoder="phase_only"), PHASE) < 1e-6
+    encoded = encode(torch.from_numpy(field))
+    assert turns_apart(solved(tmp_path / "field.npy"), encoded) < 1e-5
+    assert turns_apart(solved(tmp_path / "phase.npy", **pair), encoded) < 1e-5
+    conjugate = solved(tmp_path / "field.npy", encoder="phase_only", sign=-1, origin=0.5)
+    assert turns_apart(conjugate, 0.5 - PHASE) < 1e-6
+
+
+def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "gray.png"), LEVELS[0])
+    assert turns_apart(solved(tmp_path / "gray.png", colours=1), PHASE[:1]) < 1e-6
+
+
+def wrong_files(folder: Path) -> None:
+    np.save(folder / "small.npy", PHASE[:, 1:])
+    np.save(folder / "int.npy", LEVELS.astype(np.int64))
+    np.save(folder / "nan.npy", np.where(PHASE > 3, np.nan, PHASE))
+    np.save(folder / "objects.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    np.save(folder / "text.npy", np.array(["phase"]))
+    np.savez(folder / "two.npz", a=PHASE, b=PHASE)
+    (folder / "cut.npy").write_bytes((folder / "small.npy").read_bytes()[:200])
+    (folder / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400))
+    (folder / "noise.mat").write_bytes(bytes(range(200)))
+    (folder / "noise.png").write_bytes(bytes(range(200)))
+    cv2.imwrite(str(folder / "alpha.png"), np.zeros((12, 12, 4), np.uint8))
+    huge = np.lib.format.magic(1, 0) + np.uint16(118).tobytes()
+    header = "{'descr': '<f8', 'fortran_order': False, 'shape': (900000, 900000), }"
+    (folder / "huge.npy").write_bytes(huge + header.ljust(117).encode() + b"\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "message"),
+    [
+        ("gone.npy", {}, "gone.npy: no such file"),
+        ("small.npy", {}, r"3 x 11 x 12 values of type float64; 'small' shows 12 x 12 in 3 colours"),
+        ("int.npy", {}, "say which level is a full turn: two_pi_level"),
+        ("nan.npy", {}, "NaN or infinite"),
+        ("objects.npy", {}, "damaged, or no .npy file: Object arrays cannot be loaded"),
+        ("text.npy", {}, "holds 1 values of type <U5; expected numbers"),
+        ("two.npz", {}, "several variables; name one as 'variable'; it holds a, b"),
+        ("two.npz", {"variable": "c"}, "no variable 'c'; it holds a, b"),
+        ("cut.npy", {}, "damaged, or no .npy file"),
+        ("new.mat", {}, "version 7.3; in MATLAB"),
+        ("noise.mat", {}, "damaged, or no .mat file"),
+        ("noise.png", {}, "no picture of 8 or 16 bits that can be read"),
+        ("alpha.png", {}, "a picture with alpha"),
+        ("huge.npy", {}, "an array of more than 1000 MB"),
+        ("small.npy", {"amplitude": "gone.npy"}, "3 x 11 x 12"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, name: str, params: dict[str, Any], message: str) -> None:
+    wrong_files(tmp_path)
+    with pytest.raises(CellError, match=message) as found:
+        solved(tmp_path / name, **params)
+    assert "\n" not in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"file": "{name}.npy"}, r"'\{name\}' stands for nothing; \{target\}, \{stem\} and \{channel\} do"),
+        ({"file": "phases/{target}.jpg"}, "should end in .png"),
+        ({"file": "{target}.npy", "amplitude": "{channel}.npy"}, "in both patterns or in none"),
+        ({"two_pi_level": 0}, "greater than 1"),
+    ],
+)
+def test_wrong_parameters_are_refused_in_one_line(params: dict[str, Any], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        plugins.build("methods", "phases", params)
+
+
+def test_the_files_of_a_target_are_those_that_are_read() -> None:
+    params = {"file": "p/{target}-{channel}.png", "amplitude": "a/{stem}-{channel}.png", "channels": ["r", "g"]}
+    found = plugins.build("methods", "phases", params).files("my cat.jpg")
+    assert [Path(path).parent.name for path in found] == ["p", "p", "a", "a"]
+    assert all("/my_cat" in path and " " not in path for path in found)
+
+
+def test_numbers_are_read_as_they_are_stored(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", LEVELS)
+    assert read_array(tmp_path / "a.npy").dtype == np.uint8
+    assert np.array_equal(read_array(tmp_path / "a.npy"), LEVELS)

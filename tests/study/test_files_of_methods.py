@@ -1,0 +1,119 @@
+"""Files that a method reads are part of a cell's identity, and phases that were saved score what they scored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import Plan, plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
+
+STUDY = """
+title: "Files"
+display: {profiles: [leto-aged], panel: [128, 128]}
+targets: {dataset: photographs, params: {count: 2}}
+protocol: {metrics: [psnr]}
+methods: [%s]
+save: {phases: true}
+"""
+
+
+def config(folder: Path, name: str, methods: str) -> Path:
+    path = folder / f"{name}.yaml"
+    path.write_text(STUDY % methods)
+    return path
+
+
+def compute(path: Path, output: Path, grid: Plan | None = None) -> list[dict[str, Any]]:
+    study, artifacts = load_study(path), output.parent / "artifacts"
+    return run(
+        study, grid or plan(study), output, Serial(), Lines(lambda line: None), threads=1, artifacts=artifacts
+    ).records
+
+
+def scores(records: list[dict[str, Any]], label: str) -> list[tuple[str, dict[str, float]]]:
+    return sorted((record["cell"]["target"], record["scores"]) for record in records if record["label"] == label)
+
+
+@pytest.mark.slow
+def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_path: Path) -> None:
+    made = compute(config(tmp_path, "made", "double_phase"), tmp_path / "made")
+    saved = tmp_path / "made" / "phases" / "double_phase" / "leto-aged"
+    read = f'{{name: phases, label: read, params: {{file: "{saved}/{{target}}.npy"}}}}'
+    levels = f'{{name: phases, label: levels, params: {{file: "{saved}/{{target}}.png"}}}}'
+    again = compute(config(tmp_path, "read", f"{read}, {levels}"), tmp_path / "read")
+    assert scores(again, "read") == scores(made, "double_phase")
+    assert scores(again, "levels") == scores(made, "double_phase")  # 8 bits are what this panel shows
+    for file in saved.iterdir():
+        assert (tmp_path / "read" / "phases" / "read" / "leto-aged" / file.name).read_bytes() == file.read_bytes()
+
+
+def planned(path: Path) -> Plan:
+    return plan(load_study(path))
+
+
+def ids(grid: Plan) -> dict[str, str]:
+    return {cell.target: cell.id for label, cell in grid.labelled() if label == "phases"}
+
+
+def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = config(tmp_path, "files", '{name: phases, params: {file: "{target}.npy"}}')
+    cells = [cell for label, cell in planned(path).labelled() if label == "phases"]
+    assert {cell.files[f"{cell.target}.npy"] for cell in cells} == {"missing"}
+    names = [cell.target for cell in cells]
+    for name in names:
+        np.save(tmp_path / f"{name}.npy", np.zeros((3, 128, 128)))
+    before = ids(planned(path))
+    assert ids(planned(path)) == before
+    np.save(tmp_path / f"{names[1]}.npy", np.ones((3, 128, 128)))
+    after = ids(planned(path))
+    assert [after[name] == before[name] for name in names] == [True, False]
+
+
+def test_a_file_that_changed_after_planning_is_not_taken_for_the_planned_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = config(tmp_path, "files", '{name: phases, params: {file: "all.npy"}}')
+    np.save(tmp_path / "all.npy", np.zeros((3, 128, 128)))
+    grid = planned(path)
+    np.save(tmp_path / "all.npy", np.ones((3, 128, 128)))
+    found = compute(path, tmp_path / "out", grid=grid)
+    reasons = {record["reason"] for record in found if record["label"] == "phases"}
+    assert len(reasons) == 1
+    assert "has changed since the study was planned" in reasons.pop()
+
+
+METHOD = '''
+import numpy as np
+import torch
+
+
+def mine(target, bench, file: str = "mine.npy"):
+    """A phase from a file of its own."""
+    return torch.from_numpy(np.load(file)).float().expand(len(target), -1, -1, -1)
+
+
+mine.files = lambda method, target: [method.file]
+'''
+
+
+def test_a_method_of_a_file_says_which_files_it_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "method.py").write_text(METHOD)
+    path = config(tmp_path, "files", '"method.py:mine"')
+    for value in (0, 1):
+        np.save(tmp_path / "mine.npy", np.full((3, 128, 128), value))
+        grid = planned(path)
+        found = {cell.files["mine.npy"] for label, cell in grid.labelled() if label == "mine"}
+        assert len(found) == 1
+        assert "missing" not in found
+    records = compute(path, tmp_path / "out", grid=grid)
+    assert {record["state"] for record in records} == {"done"}
