@@ -1,3 +1,22 @@
-"""holobench_eval: which phase-retrieval method gives the better picture on a real, imperfect display?"""
+"""holobench_eval: which phase-retrieval method gives the better picture on a real, imperfect display?
 
-__version__ = "0.1.0"
+From Python: ``open_display``, ``open_bench``, ``score``, ``compare`` and ``load_records``, see ``interactive``.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from .core.version import __version__
+
+if TYPE_CHECKING:
+    from .interactive import OpenDisplay, compare, load_records, open_bench, open_display, score
+
+__all__ = ["OpenDisplay", "__version__", "compare", "load_records", "open_bench", "open_display", "score"]
+
+
+def __getattr__(name: str) -> Any:
+    """The names above, whose libraries take a second to import, when they are first used."""
+    if name in __all__:
+        from . import interactive
+
+        return getattr(interactive, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

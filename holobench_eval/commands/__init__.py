@@ -18,6 +18,7 @@ COMMANDS = (
     "doctor",
     "bench",
     "run",
+    "solve",
     "plan",
     "report",
     "list_",

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..core.panels import is_small
+
 if TYPE_CHECKING:
     from ..study.definition import Study
 
@@ -17,25 +19,14 @@ Device = Annotated[str, typer.Option(help="Where torch computes: cpu, cuda, cuda
 Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
 Profile = Annotated[str, typer.Argument(help="A display profile: its name or its file.")]
 
-LARGE_PANEL = 512 * 1024  # pixels
-
 
 def output_folder(study: Study, output: Path | None) -> Path:
     """The folder that a study's records and report are written to."""
     return output or Path("reports") / study.name
 
 
-def is_small(panel: tuple[int, int] | None) -> bool:
-    """Whether one thread computes a panel of (rows, columns) as well as several; not for one of unknown size."""
-    return panel is not None and panel[0] * panel[1] < LARGE_PANEL
-
-
 def thread_count(threads: int | None, workers: int, study: Study) -> int:
-    """Torch threads of a worker: as asked for, else one, or all for a single worker on large panels.
-
-    Transforms of small panels gain less than twofold from a second thread, and lose tenfold and more (measured) when
-    another program wants the core, since the threads wait for each other after every operation.
-    """
+    """Torch threads of a worker: as asked for, else one, or all for a single worker on large panels."""
     import torch
 
     return threads or (1 if workers > 1 or is_small(study.display.panel) else torch.get_num_threads())

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 from rich.table import Table
 
-from .options import Config, Device, Learned, Output, Threads, is_small, output_folder, thread_count
+from ..core.panels import is_small
+from .options import Config, Device, Learned, Output, Threads, output_folder, thread_count
 from .output import console as open_console
 
 if TYPE_CHECKING:

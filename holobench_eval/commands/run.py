@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import yaml
 
-from .options import Config, Device, Learned, Output, Threads, is_small, output_folder, thread_count
+from ..core.panels import is_small
+from .options import Config, Device, Learned, Output, Threads, output_folder, thread_count
 from .output import console as open_console
 from .output import write_report
 

@@ -10,7 +10,8 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from .options import Profile, is_small
+from ..core.panels import is_small
+from .options import Profile
 from .output import console
 
 
@@ -25,7 +26,7 @@ def show(
     from ..report.charts.sheet import draw_sheet
 
     if panel is None or is_small(panel):
-        torch.set_num_threads(1)  # see options.thread_count
+        torch.set_num_threads(1)  # see is_small
     path = draw_sheet(profile, panel, output)
     table = Table("effect", "", "parametric model", title=f"effects of {profile}", title_justify="left")
     for name, text, modelled in effects(profile):

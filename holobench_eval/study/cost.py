@@ -27,11 +27,11 @@ from typing import Any
 
 import torch
 
-from .. import __version__
 from ..core.device import CPU
 from ..core.errors import StorageError
 from ..core.hashing import digest
 from ..core.io import write_atomically
+from ..core.version import __version__
 from .definition import Study
 from .plan import Plan, Task
 from .versions import HARNESS

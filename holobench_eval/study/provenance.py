@@ -12,10 +12,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..core.errors import UserError
 from ..core.installed import installed
 from ..core.io import now, write_atomically
+from ..core.version import __version__
 from . import isolation
 from .cost import cpu_model
 from .definition import Study

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Mapping
 from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat, whosmat
+from scipy import io as scipy_io
 
 from ...core.errors import CellError
 from ...core.io import decode_levels
@@ -67,8 +68,9 @@ def _numbers(content: bytes, suffix: str, variable: str) -> NDArray[Any]:
         name = _chosen(sizes, variable)
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return np.asarray(arrays[name])
-    name = _chosen({name: (*shape, 16) for name, shape, _ in whosmat(io.BytesIO(content))}, variable)
-    return np.asarray(loadmat(io.BytesIO(content), variable_names=[name])[name])
+    file: Any = io.BytesIO(content)  # which SciPy reads, whatever its types say
+    name = _chosen({name: (*shape, 16) for name, shape, _ in scipy_io.whosmat(file)}, variable)
+    return np.asarray(scipy_io.loadmat(file, variable_names=[name])[name])
 
 
 def _npy_shape(file: io.BytesIO) -> tuple[int, ...]:
@@ -78,7 +80,7 @@ def _npy_shape(file: io.BytesIO) -> tuple[int, ...]:
     return (*shape, kind.itemsize)
 
 
-def _chosen(sizes: dict[str, tuple[int, ...]], variable: str) -> str:
+def _chosen(sizes: Mapping[str, tuple[int, ...]], variable: str) -> str:
     """The name of the array to read. sizes: by name, numbers whose product is the bytes that it takes at most."""
     if not variable and len(sizes) == 1:
         variable = next(iter(sizes))

@@ -11,7 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import UserError
-from ..options import is_small, thread_count
+from ...core.panels import is_small
+from ..options import thread_count
 from . import committed
 
 if TYPE_CHECKING:

@@ -14,11 +14,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ... import __version__
 from ...core.errors import CellError
 from ...core.hashing import digest
 from ...core.installed import installed
 from ...core.io import now, write_atomically
+from ...core.version import __version__
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared

@@ -1,0 +1,70 @@
+"""``holoeval solve``: one picture, one display, a few methods; a study that is written, run and reported at once."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import yaml
+
+from ..core.errors import UserError
+from .options import Learned
+
+
+def solve(
+    methods: Annotated[str, typer.Argument(help="A method, or several with commas between: names, or mine.py:solve.")],
+    picture: Annotated[Path, typer.Argument(help="An 8-bit RGB or gray image.")],
+    display: Annotated[str, typer.Option(help="A display profile: its name or its file.")] = "leto-2020",
+    panel: Annotated[tuple[int, int], typer.Option(help="Rows and columns of the simulated panel [px].")] = (256, 256),
+    output: Annotated[
+        Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the picture>]")
+    ] = None,
+    artifacts: Learned = Path("artifacts"),
+) -> None:
+    """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
+    from .run import run
+
+    folder = output or Path("holoeval-results") / picture.stem
+    config = write_study(methods.split(","), picture, display, panel, folder)
+    run(config, output=folder, executor="serial", artifacts=artifacts)
+    for what in ("figures/comparison-*.jpg", "phases/*/*", "captures/*/*"):
+        for path in sorted(folder.glob(what)):
+            print(path)
+
+
+def write_study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> Path:
+    """Copy a picture into a folder and write the study of it there; the path of the config.
+
+    UserError for a picture that is no such file, and for a folder that holds another picture.
+    """
+    from ..datasets.images import decode, opened, read
+
+    content = read(picture)
+    decode(content, str(picture), gray=True)  # what is wrong with it is said of the file that was named
+    pictures = folder / "picture"
+    other = next((file.name for file in pictures.glob("*") if file.name != picture.name), None)
+    if other is not None:
+        raise UserError(f"{pictures}: holds {other}, another picture; choose another --output")
+    pictures.mkdir(parents=True, exist_ok=True)
+    if not (pictures / picture.name).exists() or not (pictures / picture.name).samefile(picture):
+        shutil.copyfile(picture, pictures / picture.name)
+    gray = {"gray": True} if opened(content, str(picture)).mode == "L" else {}
+    profile = str(Path(display).resolve()) if Path(display).is_file() else display
+    study = {
+        "title": f"{picture.name} on {display}",
+        "display": {"profiles": [profile], "panel": list(panel)},
+        "targets": {"dataset": "folder", "params": {"path": str(pictures), **gray}},
+        "methods": [_absolute(method.strip()) for method in methods],
+        "save": {"captures": True, "phases": True},
+    }
+    config = folder / "study.yaml"
+    config.write_text(yaml.safe_dump(study, sort_keys=False), encoding="utf-8")
+    return config
+
+
+def _absolute(method: str) -> str:
+    """The name of a method; of one in a file with the whole path, since the config lies in another folder."""
+    file, colon, name = method.rpartition(":")
+    return f"{Path(file).resolve()}{colon}{name}" if file.endswith(".py") else method

@@ -1,0 +1,357 @@
+"""The package from Python: open a display, solve, capture, score, compare. NumPy in, NumPy out.
+
+A study (``holoeval run``) measures the same with repeats, intervals, tests and a record of every number, and runs the
+methods of files in processes of their own; what is here is for a notebook, where all code runs together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+from torch import Tensor
+
+from .core.errors import CellError, UserError
+from .core.panels import is_small
+from .core.plugins import build, params_of
+from .datasets.base import fit, from_srgb, planes, with_channels
+from .datasets.images import decode, read
+from .display.api import DisplaySpec, ideal_image
+from .metrics import catalogue, match
+from .metrics import score as _score
+from .optics.colour import srgb_encode
+from .study import opening
+from .study.displays import Condition, condition, real_condition
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float32]
+Numbers = ArrayLike | Tensor
+
+
+class OpenDisplay:
+    """A display that is open and registered, as ``open_display`` gives it."""
+
+    def __init__(self, display: Condition, seed: int, folder: Path) -> None:
+        self._folder = folder
+        self.spec: DisplaySpec = display.spec
+        """Nominal optics in SI units: panel, pitch, wavelengths, propagation distance, scored region."""
+        with self._threads():
+            self._bench = opening.open_display(display, seed)
+
+    def target(self, picture: str | Path | Numbers) -> Array:
+        """A picture as a target of this display: cropped to the aspect of the scored region and resized.
+
+        Parameters
+        ----------
+        picture
+            A file (8-bit RGB or gray, sRGB), or an array ``(H, W)`` or ``(H, W, 3)``: uint8 holds sRGB levels, floating
+            point holds linear light in [0, 1].
+
+        Returns
+        -------
+        ndarray
+            ``(C, h, w)`` linear light in [0, 1]; C is the number of the display's wavelengths.
+
+        Raises
+        ------
+        UserError
+            The file or the array is no such picture.
+        """
+        if isinstance(picture, str | Path):
+            light = decode(read(Path(picture)), str(picture), gray=True)
+        else:
+            light = _light(np.asarray(picture))
+        return with_channels(fit(light, self.spec.region.shape), len(self.spec.wavelengths)).numpy()
+
+    def solve(self, method: Any, target: Numbers, **params: Any) -> Array:
+        """The phase that a method finds for a target.
+
+        Parameters
+        ----------
+        method
+            A registered name, ``path/to/file.py:Name``, a function ``solve(target, bench)``, or an instance of a
+            method. A method that has to be trained needs a study, which keeps what it learned.
+        target
+            ``(C, h, w)`` linear light in [0, 1], as ``target`` gives it.
+        **params
+            Of the method.
+
+        Returns
+        -------
+        ndarray
+            ``(C, H, W)`` phase [rad].
+
+        Raises
+        ------
+        UserError
+            An unknown method or parameter, or a method that has to be trained.
+        CellError
+            The method failed, or gave what no display can show.
+        """
+        light = self._target(target)
+        solver, label = self._solver(method, params)
+        if getattr(solver, "trains", False):
+            raise UserError(f"method '{label}' has to be trained: name it in a study, and use holoeval run")
+        handle = self._bench.for_method(solver, label, light, _name(light), 0)
+        with self._threads():
+            phase = solver.solve(light[None].clone(), handle)
+        if not isinstance(phase, Tensor) or tuple(phase.shape) != (1, len(light), *self.spec.shape):
+            found = tuple(phase.shape) if isinstance(phase, Tensor) else type(phase).__name__
+            raise CellError(f"{label}: solve returned {found}, not a phase {(1, len(light), *self.spec.shape)}")
+        return phase[0].detach().cpu().numpy()
+
+    def capture(self, phase: Numbers, target: Numbers, repeat: int = 0) -> Array:
+        """Show a phase, photograph it and bring the capture into the frame of the target.
+
+        Parameters
+        ----------
+        phase
+            ``(C, H, W)`` [rad], any range.
+        target
+            ``(C, h, w)`` linear light in [0, 1]: the picture that the phase is for, which sets the exposure.
+        repeat
+            Another number is another photograph, with other noise.
+
+        Returns
+        -------
+        ndarray
+            ``(C, h, w)`` linear light; 1 is what a white pixel gets if all light of the panel went into the target.
+
+        Raises
+        ------
+        CellError
+            No display can show the phase, or the camera cannot be registered.
+        """
+        light, shown = self._target(target), _tensor(phase)
+        with self._threads():
+            return self._bench.photograph(shown, light, _name(light), repeat).image.cpu().numpy()
+
+    def ideal(self, phase: Numbers) -> Array:
+        """What the nominal model, without any fault, makes of a phase ``(C, H, W)`` [rad].
+
+        Returns
+        -------
+        ndarray
+            ``(C, h, w)`` intensity in the scored region; the mean incident light on the panel is 1.
+        """
+        return ideal_image(_tensor(phase), self.spec).numpy()
+
+    @contextmanager
+    def _threads(self) -> Iterator[None]:
+        """As many of torch's threads as a study has on this panel."""
+        before = torch.get_num_threads()
+        torch.set_num_threads(1 if is_small(self.spec.shape) else before)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(before)
+
+    def _target(self, target: Numbers) -> Tensor:
+        light, wanted = _tensor(target), (len(self.spec.wavelengths), *self.spec.region.shape)
+        if tuple(light.shape) != wanted:
+            raise UserError(f"a target of {tuple(light.shape)}; expected {wanted}, as OpenDisplay.target gives it")
+        return light
+
+    def _solver(self, method: Any, params: dict[str, Any]) -> tuple[Any, str]:
+        if isinstance(method, str):
+            return build("methods", method, params, self._folder), method.rpartition(":")[2]
+        if not inspect.isfunction(method):
+            if params:
+                raise UserError(f"{type(method).__name__} has its parameters already: {params_of(method)}")
+            return method, type(method).__name__
+        return _Function(method, params), method.__name__
+
+
+class _Function:
+    """A function as a method; what it declares (``camera = True``) is set on the function."""
+
+    def __init__(self, function: Any, params: Mapping[str, Any]) -> None:
+        vars(self).update(vars(function))
+        self._function, self._params = function, params
+
+    def solve(self, target: Tensor, bench: Any) -> Any:
+        return self._function(target, bench, **self._params)
+
+
+def open_display(
+    name: str = "leto-2020", panel: tuple[int, int] | None = (256, 256), seed: int = 0, folder: str | Path = "."
+) -> OpenDisplay:
+    """Open a display, and register its camera.
+
+    Parameters
+    ----------
+    name
+        Of a display profile, or the path of one.
+    panel
+        Rows and columns of the panel [px], None for all of it.
+    seed
+        Of all random numbers.
+    folder
+        Where relative paths of the name and of methods start.
+
+    Returns
+    -------
+    OpenDisplay
+        The display, registered.
+
+    Raises
+    ------
+    UserError
+        There is no such display.
+    CellError
+        Its camera cannot be registered.
+
+    Examples
+    --------
+    >>> display = open_display("ideal", panel=(128, 128))
+    >>> target = display.target(np.full((60, 60, 3), 0.5))
+    >>> target.shape
+    (3, 104, 104)
+    >>> phase = display.solve("double_phase", target)
+    >>> "psnr_linear" in score(display.capture(phase, target), target)
+    True
+    """
+    return OpenDisplay(condition(name, panel, Path(folder)), seed, Path(folder))
+
+
+def open_bench(file: str | Path, seed: int = 0) -> OpenDisplay:
+    """Open the devices of a real bench, check them, and register its camera.
+
+    Parameters
+    ----------
+    file
+        That describes the bench, see docs/real-bench.md. Relative paths of methods start in its folder.
+    seed
+        Of all random numbers.
+
+    Returns
+    -------
+    OpenDisplay
+        The bench, registered.
+
+    Raises
+    ------
+    UserError
+        The file is wrong, or a device does not answer.
+    CellError
+        A check failed, or the camera cannot be registered.
+    """
+    path = Path(file)
+    return OpenDisplay(real_condition(path.name, path.parent), seed, path.parent)
+
+
+def score(capture: Numbers, target: Numbers, metrics: tuple[str, ...] | None = None) -> dict[str, float]:
+    """The scores of a capture by the metric protocol, by the names that the columns of a study have.
+
+    Parameters
+    ----------
+    capture
+        ``(C, h, w)`` linear light in any unit, aligned with the target.
+    target
+        ``(C, h, w)`` linear light in [0, 1].
+    metrics
+        Names, such as ``("psnr", "ssim")``; None for all that can be computed here.
+
+    Returns
+    -------
+    dict
+        Scores by name; ``psnr_linear`` is the one that reports lead with.
+    """
+    if metrics is None:
+        metrics = tuple(metric.name for metric in catalogue() if metric.available() is None)
+    return _score(_tensor(capture), _tensor(target), metrics=metrics)
+
+
+def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path = "compared.jpg") -> Path:
+    """Draw captures side by side with their target, each with its scores, an enlarged window and the error in it.
+
+    Parameters
+    ----------
+    target
+        ``(C, h, w)`` linear light in [0, 1].
+    captures
+        ``(C, h, w)`` linear light, by the names of their columns.
+    path
+        Of the picture, a JPEG.
+
+    Returns
+    -------
+    Path
+        The picture.
+    """
+    from .report.charts.comparison import draw_comparison
+    from .report.charts.gallery import Column, Tile, error_limit, error_map
+
+    if not captures:
+        raise UserError("no captures to compare")
+    wanted = _tensor(target)
+    truth = _picture(wanted)
+    columns, errors = [], []
+    for name, capture in captures.items():
+        image = _tensor(capture)
+        shown, scores = _picture(match(image, wanted)[0]), score(image, wanted, ("psnr", "ssim"))
+        note = f"{scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
+        columns.append(Column(name, (Tile(shown, note),)))
+        errors.append(error_map(shown, truth))
+    place = Path(path)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    draw_comparison(
+        place, "captures, each at the brightness that fits best", [("", truth)], columns, error_limit(errors)
+    )
+    return place
+
+
+def load_records(folder: str | Path) -> pd.DataFrame:
+    """The records of a report, one row for each cell.
+
+    Parameters
+    ----------
+    folder
+        Of the report, with a ``records.csv``.
+
+    Returns
+    -------
+    DataFrame
+        Columns as docs/results/data.md lists them.
+
+    Raises
+    ------
+    UserError
+        There is no such file, or it is damaged.
+    """
+    from .report.compare.runs import read_run
+
+    return read_run(Path(folder)).records
+
+
+def _name(target: Tensor) -> str:
+    """What the noise of a target's captures depends on."""
+    return hashlib.sha256(target.numpy().tobytes()).hexdigest()[:16]
+
+
+def _tensor(values: Numbers) -> Tensor:
+    return torch.as_tensor(values if isinstance(values, Tensor) else np.array(values)).detach().cpu().float()
+
+
+def _light(picture: NDArray[Any]) -> Tensor:
+    if picture.ndim not in (2, 3) or (picture.ndim == 3 and picture.shape[2] != 3) or not picture.size:
+        raise UserError(f"a picture of {picture.shape}; expected (H, W) or (H, W, 3)")
+    if picture.dtype == np.uint8:
+        return from_srgb(picture)
+    if picture.dtype.kind != "f" or not bool(((picture >= 0) & (picture <= 1)).all()):
+        raise UserError("a picture holds uint8 sRGB levels, or floating-point linear light in [0, 1]")
+    return planes(picture.astype(np.float32))
+
+
+def _picture(light: Tensor) -> NDArray[np.float64]:
+    picture = srgb_encode(light).permute(1, 2, 0).double().numpy()
+    return np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture

@@ -1,0 +1,73 @@
+"""One picture is solved by one command, whose study can be run again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+from holobench_eval.commands.solve import solve
+from holobench_eval.core.errors import UserError
+
+FUNCTION = '''
+import torch
+
+
+def flat(target, bench):
+    """A flat phase."""
+    return torch.zeros(*target.shape[:2], *bench.spec.shape)
+'''
+
+
+@pytest.fixture
+def picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    image = np.random.default_rng(1).integers(0, 256, (12, 15, 3)).astype(np.uint8)
+    cv2.imwrite("my picture.png", cv2.resize(image, (300, 240)))
+    return Path("my picture.png")
+
+
+@pytest.mark.slow
+def test_several_methods_give_phases_captures_scores_and_a_picture(
+    picture: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("mine.py").write_text(FUNCTION)
+    solve("double_phase, mine.py:flat", picture, display="ideal", panel=(128, 128))
+    folder = Path("holoeval-results", "my picture")
+    printed = capsys.readouterr().out
+    for path in ("figures/comparison-ideal-1.jpg", "phases/double_phase/ideal", "captures/flat/ideal"):
+        assert str(folder / path) in printed.replace("\n", "")
+        assert (folder / path).exists()
+    table = pd.read_csv(folder / "table.csv")
+    assert set(table["label"]) >= {"double_phase", "flat"}
+    assert (folder / "study.yaml").is_file()
+
+
+def test_a_gray_picture_is_taken(picture: Path) -> None:
+    cv2.imwrite(str(picture), np.full((120, 120), 90, np.uint8))
+    solve("double_phase", picture, display="ideal", panel=(128, 128), output=Path("out"))
+    assert Path("out", "report.md").is_file()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [("gone.png", None, "gone.png: no such file"), ("text.png", b"text", "text.png: not an image")],
+)
+def test_what_is_no_picture_is_refused_and_nothing_is_written(
+    picture: Path, name: str, content: bytes | None, message: str
+) -> None:
+    if content is not None:
+        Path(name).write_bytes(content)
+    with pytest.raises(UserError, match=message):
+        solve("double_phase", Path(name), output=Path("out"))
+    assert not Path("out").exists()
+
+
+def test_a_folder_holds_one_picture(picture: Path) -> None:
+    Path("out", "picture").mkdir(parents=True)
+    Path("out", "picture", "other.png").touch()
+    with pytest.raises(UserError, match=r"holds other.png, another picture; choose another --output"):
+        solve("double_phase", picture, output=Path("out"))

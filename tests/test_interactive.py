@@ -1,0 +1,139 @@
+"""From Python: the same numbers as a study, with NumPy on both sides."""
+
+from __future__ import annotations
+
+import doctest
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import holobench_eval as hb
+from holobench_eval import interactive
+from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
+
+
+@pytest.fixture(scope="module")
+def display() -> hb.OpenDisplay:
+    return hb.open_display("ideal", panel=(128, 128))
+
+
+@pytest.fixture(scope="module")
+def target(display: hb.OpenDisplay) -> interactive.Array:
+    ramp = np.linspace(0, 1, 90, dtype=np.float32)
+    return display.target(np.stack([ramp[:, None] * ramp, ramp[:, None] * ramp[::-1], ramp[:, None] + 0 * ramp], -1))
+
+
+def test_the_examples_run() -> None:
+    found = doctest.testmod(interactive)
+    assert found.attempted
+    assert not found.failed
+
+
+def test_what_is_public_is_there_and_nothing_else() -> None:
+    assert all(getattr(hb, name) is getattr(interactive, name) for name in hb.__all__ if name[0] != "_")
+    with pytest.raises(AttributeError, match="no attribute 'solve'"):
+        _ = hb.solve  # type: ignore[attr-defined]
+
+
+@pytest.mark.slow
+def test_a_noise_free_display_gives_the_score_of_a_study(tmp_path: Path, display: hb.OpenDisplay) -> None:
+    config = tmp_path / "study.yaml"
+    config.write_text(
+        'title: "Same"\ndisplay: {profiles: [ideal], panel: [128, 128]}\n'
+        "targets: {dataset: photographs, params: {names: [coffee]}}\n"
+        "methods: [{name: gerchberg_saxton, params: {iterations: 3, initial_phase: constant}}]\n"
+    )
+    study = load_study(config)
+    output = tmp_path / "out"
+    records = run(study, plan(study), output, Serial(), Lines(lambda line: None), threads=1, artifacts=tmp_path).records
+    scored = next(record for record in records if record["label"] == "gerchberg_saxton")
+    target = study.dataset.load("coffee", display.spec.region.shape)
+    phase = display.solve("gerchberg_saxton", target, iterations=3, initial_phase="constant")
+    found = hb.score(display.capture(phase, target), target)
+    assert found == pytest.approx({name: scored["scores"][name] for name in found})
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A flat phase."""
+
+    level: float = 0.0
+
+    def solve(self, target, bench):
+        return torch.full((*target.shape[:2], *bench.spec.shape), self.level)
+
+
+def flat(target, bench, level=0.0):
+    return Flat(level).solve(target, bench)
+
+
+def test_a_function_an_instance_and_a_file_are_the_same_method(tmp_path: Path, target: interactive.Array) -> None:
+    (tmp_path / "mine.py").write_text(
+        "import torch\ndef flat(target, bench, level: float = 0.0):\n"
+        "    return torch.full((*target.shape[:2], *bench.spec.shape), level)\n"
+    )
+    opened = hb.open_display("ideal", panel=(128, 128), folder=tmp_path)
+    phases = [opened.solve(flat, target, level=1.0), opened.solve(Flat(1.0), target)]
+    phases.append(opened.solve("mine.py:flat", torch.from_numpy(target), level=1.0))
+    assert all(np.array_equal(phase, np.ones((3, 128, 128), np.float32)) for phase in phases)
+
+
+def test_a_camera_is_for_those_who_declare_it(display: hb.OpenDisplay, target: interactive.Array) -> None:
+    def with_camera(target, bench):
+        bench.capture(torch.zeros(3, 128, 128))
+        return flat(target, bench)
+
+    with pytest.raises(CellError, match="declares no camera"):
+        display.solve(with_camera, target)
+    with_camera.camera = True
+    assert display.solve(with_camera, target).shape == (3, 128, 128)
+
+
+def test_levels_and_light_give_the_same_target(display: hb.OpenDisplay, tmp_path: Path) -> None:
+    gray = np.full((50, 70), 188, np.uint8)
+    light = ((188 / 255 + 0.055) / 1.055) ** 2.4
+    wanted = np.full((3, *display.spec.region.shape), light)
+    assert display.target(gray) == pytest.approx(wanted, abs=1e-6)
+    assert display.target(np.full((50, 70, 3), light)) == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda d, t: d.target(np.ones((3, 50, 50))), r"a picture of \(3, 50, 50\); expected \(H, W\) or \(H, W, 3\)"),
+        (lambda d, t: d.target(np.full((50, 50), 2.0)), r"linear light in \[0, 1\]"),
+        (lambda d, t: d.target("gone.png"), "gone.png: no such file"),
+        (lambda d, t: d.solve("wirtingre", t), "did you mean 'wirtinger'"),
+        (lambda d, t: d.solve("wirtinger", t, iteration=3), "did you mean 'iterations'"),
+        (lambda d, t: d.solve("hil", t), "'hil' has to be trained: name it in a study"),
+        (lambda d, t: d.solve(Flat(), t, level=1.0), "has its parameters already"),
+        (lambda d, t: d.solve("wirtinger", t[:, 1:]), "as OpenDisplay.target gives it"),
+        (lambda d, t: d.solve(lambda target, bench: 3, t), r"solve returned int, not a phase \(1, 3, 128, 128\)"),
+        (lambda d, t: d.capture(np.zeros((3, 5, 5)), t), "the display shows"),
+        (lambda d, t: hb.compare(t, {}), "no captures to compare"),
+        (lambda d, t: hb.load_records("gone"), "no records.csv"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:
+    with pytest.raises((UserError, CellError), match=message) as found:
+        call(display, target)
+    assert "\n" not in str(found.value)
+
+
+def test_captures_are_compared_in_a_picture(display: hb.OpenDisplay, target: interactive.Array, tmp_path: Path) -> None:
+    ideal = display.ideal(np.zeros((3, 128, 128)))
+    path = hb.compare(target, {"flat": ideal, "perfect": target}, tmp_path / "new" / "compared.jpg")
+    assert path.stat().st_size > 10_000
+
+
+def test_records_of_a_report_are_read() -> None:
+    records = hb.load_records(Path(__file__).parents[1] / "reports" / "table3")
+    assert {"method", "condition", "target", "psnr_linear"} <= set(records.columns)
