@@ -7,13 +7,31 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..core.errors import UserError, suggest
 from ..core.panels import is_small
+from ..core.shipped import shipped_configs
 
 if TYPE_CHECKING:
     from ..study.definition import Study
 
-Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="A study, such as configs/table3.yaml.")]
-Output = Annotated[Path | None, typer.Option(help="Output folder. [default: reports/<name of the config>]")]
+
+def config_path(text: str) -> Path:
+    """The config of a study, given by its path or by the name of one that ships. UserError for a name of none."""
+    path = Path(text)
+    shipped = shipped_configs()
+    if path.is_file() or path.suffix or len(path.parts) > 1:
+        return path
+    if text not in shipped:
+        raise UserError(f"no study of the name '{text}' ships, and no such file is here; {suggest(text, shipped)}")
+    return shipped[text]
+
+
+Config = Annotated[
+    Path,
+    typer.Argument(metavar="CONFIG", parser=config_path, help="A study: its file, or the name of one that ships."),
+]
+Output = Annotated[Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the config>]")]
+RESULTS = Path("holoeval-results")
 Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
 Device = Annotated[str, typer.Option(help="Where torch computes: cpu, cuda, cuda:N, or auto, a GPU if it finds one.")]
 Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
@@ -22,7 +40,7 @@ Profile = Annotated[str, typer.Argument(help="A display profile: its name or its
 
 def output_folder(study: Study, output: Path | None) -> Path:
     """The folder that a study's records and report are written to."""
-    return output or Path("reports") / study.name
+    return output or RESULTS / study.name
 
 
 def thread_count(threads: int | None, workers: int, study: Study) -> int:

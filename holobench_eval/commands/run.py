@@ -22,7 +22,7 @@ import typer
 import yaml
 
 from ..core.panels import is_small
-from .options import Config, Device, Learned, Output, Threads, output_folder, thread_count
+from .options import RESULTS, Config, Device, Learned, Output, Threads, output_folder, thread_count
 from .output import console as open_console
 from .output import write_report
 
@@ -96,7 +96,7 @@ def _panel(config: Path) -> tuple[int, int] | None:
 def _is_finished(config: Path, output: Path | None) -> bool:
     """Whether the last run of a config, as it stands, ended: there is probably nothing to compute."""
     try:
-        described = json.loads((output or Path("reports", config.stem)).joinpath("provenance.json").read_bytes())
+        described = json.loads((output or RESULTS / config.stem).joinpath("provenance.json").read_bytes())
         text = hashlib.sha256(config.read_bytes()).hexdigest()
         return bool(described["ended"] and described["config_sha256"] == text)
     except (OSError, ValueError, TypeError, LookupError):

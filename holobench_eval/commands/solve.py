@@ -10,7 +10,7 @@ import typer
 import yaml
 
 from ..core.errors import UserError
-from .options import Learned
+from .options import RESULTS, Learned
 
 
 def solve(
@@ -26,7 +26,7 @@ def solve(
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from .run import run
 
-    folder = output or Path("holoeval-results") / picture.stem
+    folder = output or RESULTS / picture.stem
     config = write_study(methods.split(","), picture, display, panel, folder)
     run(config, output=folder, executor="serial", artifacts=artifacts)
     for what in ("figures/comparison-*.jpg", "phases/*/*", "captures/*/*"):

@@ -7,6 +7,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from types import MappingProxyType
 
 from ..core.errors import UserError
+from ..core.shipped import shipped_configs
 from ..display.api import DisplaySpec
 from ..display.simulated.profile import Profile, load_profile
 from ..display.simulated.stages import Panel
@@ -62,6 +63,8 @@ def describe(study: Study) -> Description:
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
     command = "holoeval session import with the session's folder" if study.display.session else ""
     file = study.file.name if study.file.is_absolute() else study.file.as_posix()
+    if study.file == shipped_configs().get(study.name):
+        file = study.name
     return Description(displays, file, study.text, command)
 
 
