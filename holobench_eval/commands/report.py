@@ -18,7 +18,7 @@ Print = Annotated[Path | None, typer.Option("--print", help="Draw the charts for
 
 
 def report(config: Config, output: Output = None, print_to: Print = None) -> None:
-    """Write the report of a study again from its records, or from a committed records.csv."""
+    """Write the report of a study again: from its records, or from a committed records.csv."""
     from ..report.description import describe
     from ..report.printing import print_figures
     from ..report.section import Report

@@ -48,7 +48,7 @@ def run(
     retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
     artifacts: Learned = Path("artifacts"),
 ) -> None:
-    """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
+    """Compute what is missing of a study and write its report. A stopped run goes on with the same command."""
     with _resumable():
         if retrain or retry_failed or retime or not _is_finished(config, output):
             from ..study.executors import begin
