@@ -65,7 +65,7 @@ def headline_table(results: Results, condition: str) -> Table:
 
     score, layout, methods = results.headline, results.layout, results.methods(condition)
     several = len({layout.category(name) for name in methods} - {ORACLE}) > 1
-    table = Table(title=escape(f"{condition}: {score.heading}, mean and 95 % interval"), title_justify="left")
+    table = Table(title=escape(f"{condition}: {score.heading}"), title_justify="left")
     table.add_column("method", overflow="fold")
     table.add_column(escape(f"{score.title} [{score.unit}]" if score.unit else score.title), no_wrap=True)
     table.add_column("rank", no_wrap=True)

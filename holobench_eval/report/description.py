@@ -60,8 +60,9 @@ def describe(study: Study) -> Description:
     else:
         profile = study.display.learned.profile
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
-    command = "holoeval session import with the session's folder" if study.display.session else ""
     file = study.file.name if study.file.is_absolute() else study.file.as_posix()
+    command = "holoeval session import with the session's folder" if study.display.session else ""
+    command = f"holoeval run {file} {study.changes}" if study.changes else command
     return Description(displays, file, study.text, command)
 
 

@@ -13,6 +13,7 @@ from annotated_types import Interval, MinLen
 from ..core import plugins
 from ..core.errors import UserError
 from ..display.api import Exposure
+from .changes import Changes
 
 LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
@@ -61,10 +62,11 @@ class DisplayGrid:
 
 @dataclass(frozen=True)
 class Targets:
-    """The images that are scored: a registered dataset and its parameters."""
+    """The images that are scored: a registered dataset and its parameters; only: some of them (none: all)."""
 
     dataset: Text
     params: Mapping[str, Any] = field(default_factory=dict)
+    only: tuple[str, ...] = field(default=(), metadata={"key": False})
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,7 @@ class Study:
     are also given to; headline: the column the report leads with.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` none; limits: of these processes.
-    file, text: the config file as the user named it, and what is in it.
+    file, text: the config file as the user named it, and what is in it; changes: those of the command line.
     """
 
     title: Text
@@ -206,6 +208,7 @@ class Study:
     reported: Reported | None = None
     file: Path = field(default=Path(), metadata={"key": False})
     text: str = field(default="", metadata={"key": False})
+    changes: Changes = field(default=Changes(), metadata={"key": False})
 
     @property
     def folder(self) -> Path:
@@ -231,6 +234,11 @@ class Study:
         if getattr(dataset, "training", False):
             raise UserError(f"dataset '{name}' holds training images, which are never scored; choose another one")
         return dataset
+
+    @property
+    def items(self) -> tuple[str, ...]:
+        """Names of the images that are scored, in the order of the dataset."""
+        return self.targets.only or tuple(self.dataset.items())
 
     @cached_property
     def training_images(self) -> tuple[tuple[str, str], ...]:

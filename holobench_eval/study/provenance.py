@@ -17,6 +17,7 @@ from ..core.errors import UserError
 from ..core.installed import installed
 from ..core.io import now, write_atomically
 from . import isolation
+from .changes import noted
 from .cost import cpu_model
 from .definition import Study
 from .displays import Condition
@@ -46,6 +47,7 @@ def describe(
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
+        **noted(study.changes),
         **_basis(plan),
         "python": platform.python_version(),
         "packages": {name: installed(name) for name in PACKAGES},

@@ -50,7 +50,7 @@ def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(
     assert "…" not in text
     assert "?" not in text
     for condition in results.conditions:
-        assert f"{condition}: PSNR, linear light [dB], mean and 95 % interval" in text
+        assert f"{condition}: PSNR, linear light [dB]" in text
         for name in results.methods(condition):
             assert results.headline.in_row(results.row(name, condition)) in text
 
