@@ -100,6 +100,6 @@ def print_holes(console: Console, results: Results) -> None:
     for (state, _), cells in list(groups.items())[:MOST_REASONS]:
         whose = ", ".join(dict.fromkeys(f"{method} on {condition}" for method, condition, _ in cells))
         line = f"{len(cells)} {state} ({whose}): {cells[0][2] or 'no reason given'}"
-        console.print(Padding(escape(line), (0, 0, 0, 2)), highlight=False)
+        console.print(Padding(escape(line), (0, 0, 0, 2), expand=False), highlight=False)
     if len(groups) > MOST_REASONS:
         console.print(f"  and {len(groups) - MOST_REASONS} more reasons, in details.md", highlight=False)

@@ -56,7 +56,7 @@ def describe(study: Study) -> Description:
         profiles = [load_profile(source, study.folder) for source in study.display.profiles]
         methods = {entry.label: isolation.find(entry.name, study.folder) for entry in study.methods}
         forms = {label: method.form for label, method in methods.items() if hasattr(method, "form")}
-        displays = tuple(_simulated(profile, study.display.panel, forms) for profile in profiles)
+        displays = tuple(simulated(profile, study.display.panel, forms) for profile in profiles)
     else:
         profile = study.display.learned.profile
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
@@ -88,9 +88,10 @@ def _real(condition: Condition) -> Display:
     )
 
 
-def _simulated(
+def simulated(
     profile: Profile, panel: tuple[int, int] | None, forms: Mapping[str, frozenset[str]] = MappingProxyType({})
 ) -> Display:
+    """A simulated display on a panel (None: its full one). forms: the effects that methods model, by label."""
     effects = [effect.name for effect in profile.effects()]
     return Display(
         name=profile.name,
