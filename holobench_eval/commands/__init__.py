@@ -21,10 +21,11 @@ from ..core.errors import UserError
 COMMANDS = {
     "A study": (
         "list_",
-        "show",
         "plan",
         "run",
         "report",
+        "show",
+        "schema",
     ),
     "Finished reports": (
         "check",

@@ -19,6 +19,7 @@ Schema = Mapping[str, Any]
 
 _WORDS = {"integer": "whole number", "boolean": "true or false", "string": "text", "null": "null", "object": "mapping"}
 _NONE_GIVEN = "needed"
+LARGEST = 1e15  # above it a maximum is that of the machine, and not said
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,7 @@ def allowed(entry: Schema, definitions: Schema) -> str:
 
 
 def _range(entry: Schema) -> str:
+    entry = {key: value for key, value in entry.items() if key != "maximum" or value < LARGEST}
     if "minimum" in entry and "maximum" in entry:
         return f" from {entry['minimum']:g} to {entry['maximum']:g}"
     words = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
