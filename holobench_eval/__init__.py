@@ -5,7 +5,7 @@ From Python: ``open_display``, ``open_bench``, ``score``, ``compare`` and ``load
 
 from typing import TYPE_CHECKING, Any
 
-from .core.version import __version__
+from .core.installed import __version__
 
 if TYPE_CHECKING:
     from .interactive import OpenDisplay, compare, load_records, open_bench, open_display, score

@@ -27,7 +27,7 @@ def bench(
     ] = None,
     against: Annotated[str | None, typer.Option(help="Compare the working tree with this git revision.")] = None,
 ) -> None:
-    """Time propagations, gradient steps, captures, metrics and cells beside others' code, or against a revision."""
+    """Time the package beside others' code, or against a revision: propagations, steps, captures, metrics, cells."""
     from ..benchmarks import machine, report
     from ..benchmarks.measure import measure
 

@@ -25,7 +25,7 @@ def check(
     seed: Annotated[int, typer.Option(help="Which cells are drawn for --rerun.")] = 0,
     artifacts: Learned = Path("artifacts"),
 ) -> None:
-    """Check that reports still follow from their records, configs and profiles; with --rerun, from their methods."""
+    """Check that reports still follow from their records; with --rerun, also from their methods."""
     reports, problems = problems_in(folder)
     if rerun:
         problems += rerun_in(folder, rerun, seed, artifacts, print)

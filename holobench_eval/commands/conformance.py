@@ -12,7 +12,7 @@ def conformance(
         str | None, typer.Argument(help="Your own, path/to/file.py:Name (docs/propagation.md), in place of ours.")
     ] = None,
 ) -> None:
-    """Check propagators against direct integration, and registration over random poses of a camera."""
+    """Check the optics and the registration, or your own propagator: against direct integration, over random poses."""
     from ..testing.propagation_conformance import main as check_optics
     from ..testing.propagator import load_subject
 

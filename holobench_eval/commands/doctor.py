@@ -91,7 +91,7 @@ class Finding:
 
 
 def doctor() -> None:
-    """List what is installed, which panels and cameras answer, and what to do about each thing missing."""
+    """List what is installed and which devices answer: packages, panels, cameras, and what to do about the rest."""
     screen, findings = console(), examine()
     table = Table(title="holoeval doctor", title_justify="left")
     for heading in ("", "", "found"):

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
+import sys
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.console import Console
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Table
 
 from ..core.errors import UserError, suggest
@@ -15,22 +20,39 @@ from .output import console
 
 if TYPE_CHECKING:
     from ..core import plugins
+    from ..display.simulated.changes.kind import Kind as Change
 
 Entries = Iterator[tuple[str, str]]  # names and descriptions
 
 
 def list_(
-    kind: Annotated[str | None, typer.Argument(help="methods, datasets, profiles or metrics; all without.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="methods, datasets, profiles, metrics, conditions, or one by its name.")
+    ] = None,
 ) -> None:
-    """List what a config may name."""
-    if kind is not None and kind not in KINDS:
-        raise UserError(f"unknown kind '{kind}'; {suggest(kind, KINDS)}")
+    """List what a config may name; of one method, dataset or other name, its parameters and its paper."""
     screen = console()
-    for name in [kind] if kind else KINDS:
-        table = Table(title=name, title_justify="left", show_header=False)
-        for entry, text in KINDS[name]():
-            table.add_row(entry, escape(text))
-        screen.print(table)
+    if name is None or name in KINDS:
+        for kind in [name] if name else KINDS:
+            table = Table(title=kind, title_justify="left", show_header=False)
+            for entry, text in KINDS[kind]():
+                table.add_row(entry, escape(text))
+            screen.print(table)
+        return
+    found = [kind for kind in KINDS if name in dict(KINDS[kind]())]
+    if not found:
+        raise UserError(_unknown(name))
+    for kind in found:
+        EXPLAINED[kind](screen, name)
+
+
+def _unknown(name: str) -> str:
+    """What to say of a name that is none."""
+    names = {entry for kind in KINDS for entry, _ in KINDS[kind]()}
+    near = difflib.get_close_matches(name, [*KINDS, *names], n=1)
+    if not near or near[0] in KINDS:
+        return f"unknown kind '{name}'; {suggest(name, KINDS)}, or a name that holoeval list shows"
+    return f"unknown name '{name}'; did you mean '{near[0]}'? holoeval list shows them all"
 
 
 def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
@@ -71,9 +93,107 @@ def metrics() -> Entries:
         yield metric.name, text if reason is None else f"{text}; not available: {reason}"
 
 
+def conditions() -> Entries:
+    """Every change at test time that a sweep may name, with unit and range of its values."""
+    from ..display.simulated.changes import KINDS as CHANGES
+
+    for name, kind in CHANGES.items():
+        yield name, f"{kind.words}; {_values_of(kind)}"
+
+
+def _values_of(kind: Change) -> str:
+    """What the values of a change at test time may be."""
+    if kind.counted:
+        return "values: whole numbers from 1, or a count"
+    if not kind.numeric:
+        return "values: names"
+    unit = f" [{kind.unit}]" if kind.unit else ""
+    return f"values{unit} from {kind.low:g} to {kind.high:g}; {kind.nominal:g} changes nothing"
+
+
+def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
+    """Print what a method or a dataset is, its paper and its parameters."""
+    from ..core import plugins
+    from ..core.parameters import parameters, source, summary
+
+    cls = plugins.find(kind, name)
+    marks = [word for flag, word in MARKS.items() if getattr(cls, flag, False)]
+    _heading(screen, kind, name, marks)
+    screen.print(escape(summary(cls)), highlight=False)
+    if paper := source(cls):
+        screen.print(f"\nSource: {escape(paper)}", highlight=False)
+    if hasattr(cls, "tuned"):
+        screen.print(f"\nTuned: {escape(cls.tuned)}", highlight=False)
+    screen.print("\nIts parameters (params: in a config), each with its default and what it may be:", highlight=False)
+    for entry in parameters(cls):
+        default = f" = {entry.default}" if entry.default else ""
+        screen.print(f"[bold]{entry.name}[/bold]{escape(default)}   ({escape(entry.allowed)})", highlight=False)
+        screen.print(Padding(escape(entry.meaning), (0, 0, 0, 4), expand=False), highlight=False)
+
+
+def explain_profile(screen: Console, name: str) -> None:
+    """Print what a display profile is, the parameters of its stages, and its effects."""
+    from ..display import load_profile
+    from ..report.description import simulated
+
+    profile = load_profile(name)
+    shown = simulated(profile, None)
+    _heading(screen, "profiles", name, [])
+    screen.print(escape("\n".join((shown.heading, shown.basis, *shown.lines))), highlight=False)
+    table = Table(title="\neffects", title_justify="left", show_header=False)
+    for effect in profile.effects():
+        table.add_row(effect.name, escape(effect.text))
+    screen.print(table)
+    screen.print(f"holoeval show {name} draws them.", highlight=False)
+
+
+def explain_metric(screen: Console, name: str) -> None:
+    """Print what a metric is, its source, and its columns."""
+    from ..metrics import catalogue
+
+    metric = next(metric for metric in catalogue() if metric.name == name)
+    _heading(screen, "metrics", name, [])
+    function: Any = getattr(metric.function, "func", metric.function)  # one of a family is a partial function
+    text = inspect.cleandoc(sys.modules[function.__module__].__doc__ or "")
+    paragraphs = (" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
+    screen.print(escape("\n\n".join(paragraphs)), highlight=False)
+    screen.print(f"\n{escape(dict(metrics())[name])}\ncolumns: {', '.join(metric.columns)}", highlight=False)
+
+
+def explain_condition(screen: Console, name: str) -> None:
+    """Print what a change at test time is, its values and its model."""
+    from ..display.simulated.changes import KINDS as CHANGES
+
+    kind = CHANGES[name]
+    _heading(screen, "conditions", name, [])
+    lines = (f"{kind.words}; {_values_of(kind)}", f"Model: {kind.model}", f"Changes: {', '.join(kind.stages)}")
+    screen.print(escape("\n".join(lines)), highlight=False)
+    values = "count: 3" if kind.counted else "values: [...]"
+    screen.print(f"In a config: sweeps: [{{condition: {name}, {values}}}]", markup=False, highlight=False)
+
+
+def _heading(screen: Console, kind: str, name: str, marks: list[str]) -> None:
+    marked = f" ({', '.join(marks)})" if marks else ""
+    screen.print(f"[bold]{name}[/bold], one of the {kind}{marked}", highlight=False)
+
+
+MARKS = {
+    "camera": "captures",
+    "trains": "is trained first",
+    "privileged": "privileged",
+    "training": "for training, never scored",
+}
 KINDS: dict[str, Callable[[], Entries]] = {
     "methods": partial(plug_ins, "methods", camera="captures", privileged="privileged"),
     "datasets": partial(plug_ins, "datasets", training="for training, never scored"),
     "profiles": profiles,
     "metrics": metrics,
+    "conditions": conditions,
+}
+EXPLAINED: dict[str, Callable[[Console, str], None]] = {
+    "methods": partial(explain_plug_in, "methods"),
+    "datasets": partial(explain_plug_in, "datasets"),
+    "profiles": explain_profile,
+    "metrics": explain_metric,
+    "conditions": explain_condition,
 }

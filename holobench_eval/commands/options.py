@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import UserError, suggest
+from ..core.installed import shipped_configs
 from ..core.panels import is_small
-from ..core.shipped import shipped_configs
 
 if TYPE_CHECKING:
+    from ..study.changes import Changes
     from ..study.definition import Study
 
 
@@ -30,17 +31,49 @@ Config = Annotated[
     Path,
     typer.Argument(metavar="CONFIG", parser=config_path, help="A study: its file, or the name of one that ships."),
 ]
-Output = Annotated[Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the config>]")]
+Output = Annotated[
+    Path | None,
+    typer.Option(help="Output folder. [default: holoeval-results/<name of the config>, or <name>-changed]"),
+]
 RESULTS = Path("holoeval-results")
 Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
 Device = Annotated[str, typer.Option(help="Where torch computes: cpu, cuda, cuda:N, or auto, a GPU if it finds one.")]
 Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
+Methods = Annotated[list[str] | None, typer.Option(metavar="A,B", help="Only these methods, by their labels or names.")]
+Targets = Annotated[list[str] | None, typer.Option(metavar="X,Y", help="Only these targets.")]
+Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="Only the first N targets.")]
+Values = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Another value in the config: display.panel=[192, 192]."),
+]
 Profile = Annotated[str, typer.Argument(help="A display profile: its name or its file.")]
 
 
+def changes_of(
+    methods: list[str] | None, targets: list[str] | None, limit: int | None, values: list[str] | None
+) -> Changes:
+    """What the options change in a config."""
+    from ..study.changes import Changes
+
+    return Changes(tuple(methods or ()), tuple(targets or ()), limit, tuple(values or ()))
+
+
 def output_folder(study: Study, output: Path | None) -> Path:
-    """The folder that a study's records and report are written to."""
-    return output or RESULTS / study.name
+    """The folder that a study's records and report are written to.
+
+    A changed study has a folder of its own. UserError: the folder holds the report of the whole study.
+    """
+    from ..study import provenance
+    from ..study.changes import recorded
+
+    if not study.changes:
+        return output or RESULTS / study.name
+    folder = output or RESULTS / f"{study.name}-changed"
+    if (known := provenance.read(folder)) and not recorded(known):
+        raise UserError(
+            f"{folder}: holds the report of a whole study, and this is a part of one; give another --output"
+        )
+    return folder
 
 
 def thread_count(threads: int | None, workers: int, study: Study) -> int:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Table
 
 if TYPE_CHECKING:
     from ..report import Results
     from ..study.definition import Study
+
+MOST_REASONS = 10  # that a terminal shows; details.md has all
 
 
 def console() -> Console:
@@ -28,7 +33,7 @@ def write_report(
     known: dict[str, object],
     keep_pictures: bool = False,
 ) -> Results:
-    """Write a study's report, print its headline tables and return its numbers.
+    """Write a study's report, print its headline tables and the reasons of holes, and return its numbers.
 
     known: its provenance; keep_pictures: see build_report.
     """
@@ -36,18 +41,65 @@ def write_report(
 
     written, results = build_report(study, records, output, known, keep_pictures)
     print_headline(console, results)
+    print_holes(console, results)
     files = (written, written.with_suffix(".html"), output / "table.csv", output / "records.csv")
     console.print("\n".join(map(str, files)), highlight=False, soft_wrap=True)
     return results
 
 
 def print_headline(console: Console, results: Results) -> None:
-    """Print the headline table of every condition."""
-    from ..report import headline_rows
-
+    """Print the headline score, rank and captures of every method, a table a condition, in 80 columns."""
     for condition in results.conditions:
-        headings, rows = headline_rows(results, condition)
-        table = Table(*map(escape, headings), title=escape(condition), title_justify="left")
-        for row in rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
+        console.print(headline_table(results, condition))
+
+
+def headline_table(results: Results, condition: str) -> Table:
+    """A condition's table for a terminal; the report has the other columns. Only names are broken into lines.
+
+    A rank is that among methods which were given as much of the camera, and named by them where there are several such
+    categories.
+    """
+    from ..report.data.categories import ORACLE
+    from ..report.data.marks import marked
+    from ..report.data.text import FILES, number
+
+    score, layout, methods = results.headline, results.layout, results.methods(condition)
+    several = len({layout.category(name) for name in methods} - {ORACLE}) > 1
+    table = Table(title=escape(f"{condition}: {score.heading}"), title_justify="left")
+    table.add_column("method", overflow="fold")
+    table.add_column(escape(f"{score.title} [{score.unit}]" if score.unit else score.title), no_wrap=True)
+    table.add_column("rank", no_wrap=True)
+    spends = layout.measure != FILES and "total_captures" in results.table
+    if spends:
+        table.add_column("captures", justify="right", no_wrap=True)
+    for name in methods:
+        row, category = results.row(name, condition), layout.category(name)
+        scored = f" ({row['n']:.0f} of {len(results.targets)} targets)" * (row["n"] < len(results.targets))
+        rank = number(row.get("rank", math.nan))
+        place = f"{rank} {category}" if several and rank != "–" else rank
+        captures = [number(row["total_captures"])] if spends else []
+        table.add_row(
+            *map(escape, (f"{marked(results, name, condition)}{scored}", score.in_row(row), place, *captures))
+        )
+    return table
+
+
+def print_holes(console: Console, results: Results) -> None:
+    """Print why cells have no score: a line for every reason, with the number of its cells and whose they are.
+
+    Reasons that differ in numbers alone count as one.
+    """
+    groups: dict[tuple[str, str], list[tuple[str, str, str]]] = {}
+    columns = ["method", "condition", "state", "reason"]
+    for method, condition, state, reason in results.holes[columns].itertuples(index=False):
+        alike = re.sub(r"\d+(?:\.\d+)?", "0", reason)
+        groups.setdefault((state, alike), []).append((method, condition, reason))
+    if not groups:
+        return
+    console.print(f"without a score: {len(results.holes)} of {len(results.frame)} cells", highlight=False)
+    for (state, _), cells in list(groups.items())[:MOST_REASONS]:
+        whose = ", ".join(dict.fromkeys(f"{method} on {condition}" for method, condition, _ in cells))
+        line = f"{len(cells)} {state} ({whose}): {cells[0][2] or 'no reason given'}"
+        console.print(Padding(escape(line), (0, 0, 0, 2), expand=False), highlight=False)
+    if len(groups) > MOST_REASONS:
+        console.print(f"  and {len(groups) - MOST_REASONS} more reasons, in details.md", highlight=False)

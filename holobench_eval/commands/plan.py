@@ -12,7 +12,20 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..core.panels import is_small
-from .options import Config, Device, Learned, Output, Threads, output_folder, thread_count
+from .options import (
+    Config,
+    Device,
+    Learned,
+    Limit,
+    Methods,
+    Output,
+    Targets,
+    Threads,
+    Values,
+    changes_of,
+    output_folder,
+    thread_count,
+)
 from .output import console as open_console
 
 if TYPE_CHECKING:
@@ -27,6 +40,10 @@ FLOOR = "floor"  # the label of the row of floor cells
 def plan(
     config: Config,
     output: Output = None,
+    methods: Methods = None,
+    targets: Targets = None,
+    limit: Limit = None,
+    values: Values = None,
     threads: Threads = None,
     device: Device = "auto",
     artifacts: Learned = Path("artifacts"),
@@ -39,7 +56,8 @@ def plan(
     from ..study.plan import plan as plan_cells
     from ..study.store import Store
 
-    console, study = open_console(), load_study(config)
+    console = open_console()
+    study = load_study(config, changes_of(methods, targets, limit, values))
     folder = output_folder(study, output)
     workers = executor("auto", None, is_small(study.display.panel), gpus=gpus(device)).workers
     grid, many = plan_cells(study), thread_count(threads, workers, study)

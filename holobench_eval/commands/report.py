@@ -18,22 +18,24 @@ Print = Annotated[Path | None, typer.Option("--print", help="Draw the charts for
 
 
 def report(config: Config, output: Output = None, print_to: Print = None) -> None:
-    """Write the report of a study again from its records, or from a committed records.csv."""
+    """Write the report of a study again: from its records, or from a committed records.csv."""
     from ..report.description import describe
     from ..report.printing import print_figures
     from ..report.section import Report
     from ..study import provenance
+    from ..study.changes import recorded
     from ..study.config import load_study
     from ..study.plan import plan
     from ..study.store import Store
 
-    study = load_study(config)
+    changes = recorded(provenance.read(output)) if output else None
+    study = load_study(config, changes)
     folder, grid = output_folder(study, output), plan(study)
     store, committed = Store(folder), folder / "records.csv"
     raw = store.folder.is_dir()
     if not raw and not committed.is_file():
         raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
-    again = f"holoeval run {config} --output {folder}"
+    again = " ".join(filter(None, (f"holoeval run {config} --output {folder}", str(changes or ""))))
     records = store.load(grid) if raw else _committed(grid, committed, again)
     missing = sum(record["state"] == "missing" for record in records)
     if missing == len(records):

@@ -22,7 +22,21 @@ import typer
 import yaml
 
 from ..core.panels import is_small
-from .options import RESULTS, Config, Device, Learned, Output, Threads, output_folder, thread_count
+from .options import (
+    RESULTS,
+    Config,
+    Device,
+    Learned,
+    Limit,
+    Methods,
+    Output,
+    Targets,
+    Threads,
+    Values,
+    changes_of,
+    output_folder,
+    thread_count,
+)
 from .output import console as open_console
 from .output import write_report
 
@@ -37,6 +51,10 @@ INTERRUPTED = 130
 def run(
     config: Config,
     output: Output = None,
+    methods: Methods = None,
+    targets: Targets = None,
+    limit: Limit = None,
+    values: Values = None,
     executor: Annotated[
         str, typer.Option(help="Where to compute: serial, local (worker processes), slurm, address, or auto.")
     ] = "auto",
@@ -49,9 +67,13 @@ def run(
     retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
     artifacts: Learned = Path("artifacts"),
 ) -> None:
-    """Compute what is missing of a study, then write its report. A stopped run goes on with the same command."""
+    """Compute what is missing of a study and write its report. A stopped run goes on with the same command.
+
+    With --methods, --targets, --limit or --set, a part or a variant of the study is run, and its report says so.
+    """
+    changes = changes_of(methods, targets, limit, values)
     with _resumable():
-        if retrain or retry_failed or retime or not _is_finished(config, output):
+        if changes or retrain or retry_failed or retime or not _is_finished(config, output):
             from ..study.executors import begin
 
             begin(executor, workers, is_small(_panel(config)))
@@ -62,7 +84,7 @@ def run(
         from ..study.run import run as compute
         from ..study.training import keep_training_records
 
-        console, study = open_console(), load_study(config)
+        console, study = open_console(), load_study(config, changes)
         device, where = _where(study, device, executor, workers, address)
         if study.display.real:
             open_displays(study)

@@ -20,7 +20,7 @@ def show(
     panel: Annotated[tuple[int, int] | None, typer.Option(help="Rows and columns in pixels.")] = None,
     output: Annotated[Path | None, typer.Option(help="Picture to write.")] = None,
 ) -> None:
-    """Draw what a display does to a hologram, stage by stage, and list its effects."""
+    """Draw what a display does to a hologram: stage by stage, with a list of its effects."""
     import torch
 
     from ..report.charts.sheet import draw_sheet

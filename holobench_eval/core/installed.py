@@ -1,8 +1,13 @@
-"""Which version of a package is installed; imports nothing, so that it can be asked where nothing else works."""
+"""What is installed: this package's version and the studies that ship with it, and other packages; imports no other."""
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+
+__version__ = "0.1.0"
 
 
 def installed(package: str) -> str | None:
@@ -11,3 +16,10 @@ def installed(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
+
+
+@cache
+def shipped_configs() -> dict[str, Path]:
+    """The configs that ship, by name such as ``table3``."""
+    folder = Path(str(files(f"{__package__.partition('.')[0]}.configs")))
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}

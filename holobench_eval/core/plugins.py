@@ -22,6 +22,7 @@ from .hashing import canonical
 from .schema import checked
 
 Kind = Literal["methods", "datasets"]
+KINDS: tuple[Kind, ...] = ("methods", "datasets")
 
 
 @lru_cache

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,7 +36,7 @@ class Document:
     """A YAML mapping as plain Python values, and where each of them stands.
 
     name: the path as the user gave it; text: the file's contents; keys, values: positions of every mapping
-    key and of every value.
+    key and of every value; options: the option of the command line behind a value that is not in the file.
     """
 
     name: str
@@ -44,6 +44,7 @@ class Document:
     data: dict[str, Any]
     keys: dict[Keys, Position]
     values: dict[Keys, Position]
+    options: dict[Keys, str] = field(default_factory=dict)
 
     def error(self, where: Keys, message: str, at_key: bool = False) -> UserError:
         """An error at a value (or at its key), or at the nearest enclosing value that is in the file."""
@@ -51,7 +52,7 @@ class Document:
         while where not in positions:
             where = where[:-1]
         line, column = positions[where]
-        return UserError(f"{self.name}:{line}:{column}: {message}")
+        return UserError(f"{self.options.get(where) or f'{self.name}:{line}:{column}'}: {message}")
 
 
 def load(path: Path) -> Document:

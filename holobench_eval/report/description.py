@@ -7,7 +7,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from types import MappingProxyType
 
 from ..core.errors import UserError
-from ..core.shipped import shipped_configs
+from ..core.installed import shipped_configs
 from ..display.api import DisplaySpec
 from ..display.simulated.profile import Profile, load_profile
 from ..display.simulated.stages import Panel
@@ -57,14 +57,15 @@ def describe(study: Study) -> Description:
         profiles = [load_profile(source, study.folder) for source in study.display.profiles]
         methods = {entry.label: isolation.find(entry.name, study.folder) for entry in study.methods}
         forms = {label: method.form for label, method in methods.items() if hasattr(method, "form")}
-        displays = tuple(_simulated(profile, study.display.panel, forms) for profile in profiles)
+        displays = tuple(simulated(profile, study.display.panel, forms) for profile in profiles)
     else:
         profile = study.display.learned.profile
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
-    command = "holoeval session import with the session's folder" if study.display.session else ""
     file = study.file.name if study.file.is_absolute() else study.file.as_posix()
     if study.file == shipped_configs().get(study.name):
         file = study.name
+    command = "holoeval session import with the session's folder" if study.display.session else ""
+    command = f"holoeval run {file} {study.changes}" if study.changes else command
     return Description(displays, file, study.text, command)
 
 
@@ -90,9 +91,10 @@ def _real(condition: Condition) -> Display:
     )
 
 
-def _simulated(
+def simulated(
     profile: Profile, panel: tuple[int, int] | None, forms: Mapping[str, frozenset[str]] = MappingProxyType({})
 ) -> Display:
+    """A simulated display on a panel (None: its full one). forms: the effects that methods model, by label."""
     effects = [effect.name for effect in profile.effects()]
     return Display(
         name=profile.name,

@@ -20,19 +20,22 @@ from ..imaging.grid import SMALLEST_REGION
 from ..metrics import Metric, catalogue
 from ..metrics.lpips import find_weights
 from . import isolation
+from .changes import Changes, changed, chosen
 from .definition import DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
 from .displays import condition, displays, real_condition
 from .focal_stacks import SCORES, planes_of
 from .plan import FLOORS, REFERENCE
 
 
-def load_study(path: Path | str) -> Study:
+def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     """Read a study and check all of it.
 
     Parameters
     ----------
     path
         A YAML file; relative paths in it start in its folder.
+    changes
+        What the command line changes in it; a fault of such a value is told at its option.
 
     Returns
     -------
@@ -49,8 +52,9 @@ def load_study(path: Path | str) -> Study:
     >>> load_study("configs/quick.yaml").labels
     ('double_phase', 'gerchberg_saxton', 'wirtinger', 'oracle')
     """
-    document = load(Path(path))
-    study = replace(typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text)
+    document, changes = load(Path(path)), changes or Changes()
+    document = changed(replace(document, data=_long_form(document.data)), changes)
+    study = replace(typed(document, Study), file=Path(path), text=document.text, changes=changes)
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
@@ -68,7 +72,11 @@ def load_study(path: Path | str) -> Study:
     for key, label in (("baseline", study.baseline), ("second_baseline", study.second_baseline)):
         if label and label not in study.labels:
             raise document.error((key,), f"no method has the label '{label}'; {suggest(label, study.labels)}")
-    return replace(study, baseline=study.baseline or study.labels[0])
+    study = replace(study, baseline=study.baseline or study.labels[0])
+    if not changes:
+        return study
+    note = f"{changes.note} {study.note}".strip()
+    return replace(study, title=f"{study.title} (changed: {changes})", note=note)
 
 
 def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,7 +94,18 @@ def _targets(study: Study, document: Document) -> Targets:
             raise UserError(f"dataset '{study.targets.dataset}' has no images")
         if study.measure == "focus":
             planes_of(dataset, study.targets.dataset)
-    return replace(study.targets, params=plugins.params_of(dataset))
+    return replace(study.targets, params=plugins.params_of(dataset), only=_only(study))
+
+
+def _only(study: Study) -> tuple[str, ...]:
+    """The targets that the command line left, none for all."""
+    items, changes = study.dataset.items(), study.changes
+    if not (changes.targets or changes.limit):
+        return ()
+    if study.measure == "focus":
+        raise UserError("--targets, --limit: the targets of focal stacks are planes of scenes, and belong together")
+    wanted = chosen("--targets", changes.targets, items, "target in the dataset") if changes.targets else items
+    return tuple([item for item in items if item in wanted][: changes.limit])
 
 
 def _training(study: Study, document: Document) -> Training:

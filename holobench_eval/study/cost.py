@@ -30,8 +30,8 @@ import torch
 from ..core.device import CPU
 from ..core.errors import StorageError
 from ..core.hashing import digest
+from ..core.installed import __version__
 from ..core.io import write_atomically
-from ..core.version import __version__
 from .definition import Study
 from .plan import Plan, Task
 from .versions import HARNESS

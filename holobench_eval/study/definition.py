@@ -13,6 +13,7 @@ from annotated_types import Interval, MinLen
 from ..core import plugins
 from ..core.errors import UserError
 from ..display.api import Exposure
+from .changes import Changes
 
 LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
@@ -24,7 +25,11 @@ PREDICTIONS = ("prediction", "error_budget")  # measures of captures that method
 
 @dataclass(frozen=True)
 class Learned:
-    """A display that is the frozen network of a trained method (paper 6.3), trained on captures of ``profile``."""
+    """A display that is the frozen network of a trained method (paper 6.3).
+
+    method: the method, by its registered name or as ``path/to/file.py:Class``; profile: the display whose captures it
+    is trained on; params: parameters of the method.
+    """
 
     method: Text
     profile: Text
@@ -35,9 +40,11 @@ class Learned:
 class DisplayGrid:
     """The displays of a study.
 
-    profiles: names of profiles or paths of profile files; or learned: a trained network; or bench: the file of a
-    real bench (``lab.bench_file``); panel: rows and columns in pixels (None: the profile's full panel);
-    exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures). session:
+    A study names its displays by one of profiles, learned and bench.
+
+    profiles: names of profiles or paths of profile files; learned: a trained network in the place of a display; bench:
+    the file of a real bench (docs/real-bench.md); panel: rows and columns in pixels (None: the profile's full panel);
+    exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures); session:
     the folder that stands for the display, when photographs are exchanged as files.
     """
 
@@ -61,16 +68,22 @@ class DisplayGrid:
 
 @dataclass(frozen=True)
 class Targets:
-    """The images that are scored: a registered dataset and its parameters."""
+    """The images that are scored.
+
+    dataset: a registered name or ``path/to/file.py:Class``; params: parameters of the dataset; only: some of its images
+    (none: all).
+    """
 
     dataset: Text
     params: Mapping[str, Any] = field(default_factory=dict)
+    only: tuple[str, ...] = field(default=(), metadata={"key": False})
 
 
 @dataclass(frozen=True)
 class Training:
     """The images that methods may train on, never scored; equal for all methods of a study.
 
+    dataset: a registered name or ``path/to/file.py:Class``; params: parameters of the dataset;
     held_out: how many of the last images are kept back to watch the training; captures: the most captures that a
     method may take for its training, those of held-out images included (None: no limit).
     """
@@ -83,7 +96,10 @@ class Training:
 
 @dataclass(frozen=True)
 class Probe:
-    """The method whose holograms are shown when predictions of captures are scored (paper Table 1)."""
+    """The method whose holograms are shown when predictions of captures are scored (paper Table 1).
+
+    name: a registered name or ``path/to/file.py:Class``; params: parameters of the method.
+    """
 
     name: Text = "wirtinger"
     params: Mapping[str, Any] = field(default_factory=dict)
@@ -93,7 +109,7 @@ class Probe:
 class Sweep:
     """A change of the displays at test time, with a list of values; methods were prepared without it.
 
-    condition: its kind, see ``display.simulated.changes``; values: numbers or names; count: how many siblings or draws
+    condition: its kind (``holoeval list conditions``); values: numbers or names; count: how many siblings or draws
     to take instead of values; profiles: the displays that are changed, a subset of the study's.
     """
 
@@ -107,10 +123,10 @@ class Sweep:
 class MethodEntry:
     """A method of a study.
 
-    name: registered name or ``path/to/file.py:Class``; label: its name in tables; params: every parameter of
-    the method, defaults filled in; profiles: the displays it is shown on, a subset of the study's; captures: the most
-    that the display allows a method with a camera for one target (None: no limit); exposure: of its scored captures
-    (None: that of the study's displays).
+    name: a registered name or ``path/to/file.py:Class``; label: its name in tables (without one: its name, or that of
+    its class); params: parameters of the method, its defaults for others; profiles: the displays it is shown on, a
+    subset of the study's; captures: the most that the display allows a method with a camera for one target (None: no
+    limit); exposure: of its scored captures (None: that of the study's displays).
     """
 
     name: Text
@@ -123,8 +139,11 @@ class MethodEntry:
 
 @dataclass(frozen=True)
 class Protocol:
-    """Version of the metric protocol; names of the metrics to compute (None: all; they take 10 s for a capture of
-    1080 x 1920 pixels); a file or folder of LPIPS trunk weights (None: torch's hub cache)."""
+    """How captures are scored.
+
+    version: of the metric protocol; metrics: names of the metrics to compute (None: all; they take 10 s for a capture
+    of 1080 x 1920 pixels); lpips_weights: a file or folder of LPIPS trunk weights (None: torch's hub cache).
+    """
 
     version: Literal["v1"] = "v1"
     metrics: tuple[Text, ...] | None = None
@@ -133,7 +152,11 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Save:
-    """What else is written beside the scores: rectified captures (16 bit), and phases (as PNG of 8 bits and exact)."""
+    """What else is written beside the scores, in folders beside the report.
+
+    captures: every rectified capture (PNG, 16 bit); phases: every hologram's phase (PNG of 8 bits, and
+    exact as .npy, which the method ``phases`` reads).
+    """
 
     captures: bool = False
     phases: bool = False
@@ -152,8 +175,9 @@ class Limits:
 
 @dataclass(frozen=True)
 class Reported:
-    """Published figures to print beside the measured ones, by method label, and where they were published.
+    """Published figures to print beside the measured ones.
 
+    source: where they were published; rows: by a method's label, figures by the name of the metric, such as psnr;
     beside: the profile whose rows they stand beside, as ``display.profiles`` names it; none: every profile's.
     """
 
@@ -166,20 +190,25 @@ class Reported:
 class Study:
     """A grid of cells and the tables drawn from it; see ``load_study``.
 
+    title: heads the report; display: what shows the holograms; targets: the images that are scored; methods: what is
+    compared, each a name or a mapping, in the order of the tables.
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
-    captures of ``holograms`` against those captures; ``error_budget`` also splits the error of these captures by what
-    the methods, in the order of the config, explain of it; ``focus`` scores the planes of focal stacks, each at its own
-    distance. question: what the study asks; its report answers it first, for the methods whose labels the question
-    names; would_change: which result would change the answer. note: a paragraph that the report prints among the
-    limits of its answer.
-    repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a solution's seconds beside
-    whatever other workers do, ``alone`` measures one solution a row of the tables with nothing beside it; sweeps:
-    changes of the displays at test time; baseline: label that paired tests compare against (the first method when the
-    config names none); second_baseline: label of another one, such as the strongest open-loop row, that differences
-    are also given to; headline: the column the report leads with.
+    captures of the holograms' method against those captures; ``error_budget`` also splits the error of these captures
+    by what the methods, in the order of the config, explain of it; ``focus`` scores the planes of focal stacks, each at
+    its own distance. holograms: for predictions, the method whose holograms are captured; training: the images that
+    methods may train on, the same for all; sweeps: changes of the displays at test time. question: what the study asks,
+    which its report answers first, for the methods whose labels the question names; would_change: which result would
+    change the answer; note: a paragraph that the report prints among the limits of its answer.
+    seed: of all random numbers, so that the same config gives the same numbers; repeats: how often every cell is
+    measured, with new noise; timing: ``shared`` takes a solution's seconds beside whatever other workers do, ``alone``
+    measures one solution a row of the tables with nothing beside it; protocol: how captures are scored; baseline: label
+    that paired tests compare against (empty: that of the first method); second_baseline: label of another one, such as
+    the strongest open-loop row, that differences are also given to (empty: none); headline: the column that the report
+    leads with, a metric and a domain; save: what else is written beside the scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
-    those that look into the bench, ``none`` none; limits: of these processes.
-    file, text: the config file as the user named it, and what is in it.
+    those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
+    published figures to print beside the measured ones.
+    file, text: the config file as the user named it, and what is in it; changes: those of the command line.
     """
 
     title: Text
@@ -206,6 +235,7 @@ class Study:
     reported: Reported | None = None
     file: Path = field(default=Path(), metadata={"key": False})
     text: str = field(default="", metadata={"key": False})
+    changes: Changes = field(default=Changes(), metadata={"key": False})
 
     @property
     def folder(self) -> Path:
@@ -231,6 +261,11 @@ class Study:
         if getattr(dataset, "training", False):
             raise UserError(f"dataset '{name}' holds training images, which are never scored; choose another one")
         return dataset
+
+    @property
+    def items(self) -> tuple[str, ...]:
+        """Names of the images that are scored, in the order of the dataset."""
+        return self.targets.only or tuple(self.dataset.items())
 
     @cached_property
     def training_images(self) -> tuple[tuple[str, str], ...]:

@@ -172,7 +172,7 @@ def plan(study: Study) -> Plan:
     >>> len(grid.tasks), len(grid.cells)
     (10, 20)
     """
-    targets = [(item, study.dataset.digest(item)) for item in study.dataset.items()]
+    targets = [(item, study.dataset.digest(item)) for item in study.items]
     displays_by_source = displays(study)
     ground = _Ground(study, _metrics(study))
     first = next(iter(displays_by_source.values()))

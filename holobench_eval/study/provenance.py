@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import UserError
-from ..core.installed import installed
+from ..core.installed import __version__, installed
 from ..core.io import now, write_atomically
-from ..core.version import __version__
 from . import isolation
+from .changes import noted
 from .cost import cpu_model
 from .definition import Study
 from .displays import Condition
@@ -46,6 +46,7 @@ def describe(
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
+        **noted(study.changes),
         **_basis(plan),
         "python": platform.python_version(),
         "packages": {name: installed(name) for name in PACKAGES},

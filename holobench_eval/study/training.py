@@ -15,8 +15,8 @@ import torch
 from ..core import plugins
 from ..core.device import CPU, find, gpu_name, moved, repeatable
 from ..core.errors import CellError, Pending, StopError, reason
+from ..core.installed import __version__
 from ..core.io import now, write_atomically
-from ..core.version import __version__
 from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
 from ..display.simulated.ground_truth import truth

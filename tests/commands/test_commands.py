@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
@@ -84,6 +85,7 @@ def test_a_study_from_run_to_check(
     shown = capsys.readouterr().out
     assert "1 cell failed" in shown
     assert "Flat" in shown
+    assert "1 failed (Blind on ideal): " in shown
     assert Path("reports/toy/report.md").exists()
     tables = [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")]
     assert b"Blind,open loop,,,,,0,1," in tables[0]
@@ -184,9 +186,43 @@ def test_a_new_command_is_one_file_and_one_line(tmp_path: Path) -> None:
 
     lines = [line.split() for line in output("--help").splitlines()]
     names = [line[0] for line in lines if line]
-    assert names[names.index("plan") :][:3] == ["plan", "greet-all", "report"]
+    assert names[names.index("plan") :][:3] == ["plan", "greet-all", "run"]
     assert ["greet-all", "Greet", "everybody."] in lines
     assert output("greet-all") == "hello\n"
+
+
+def test_the_help_lists_commands_in_the_order_of_work_a_line_each(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert holoeval(monkeypatch, "-h") == 0
+    lines = capsys.readouterr().out.partition("A study:\n")[2].splitlines()
+    entries = [line.split(maxsplit=1) for line in lines[:-1] if line.startswith("  ")]
+    names = [words[0] for words in entries]
+    assert names[:4] == ["list", "plan", "run", "report"]
+    assert sorted(names) == sorted(every_command())
+    assert all(len(words) == 2 and words[1].endswith(".") and "..." not in words[1] for words in entries)
+    assert max(map(len, lines)) <= 80
+
+
+def every_command() -> list[str]:
+    """Names of commands, and of groups of commands."""
+    return [str(entry.name) for entry in (*commands.app.registered_commands, *commands.app.registered_groups)]
+
+
+@pytest.mark.parametrize("command", [*every_command(), "session export"])
+def test_every_command_explains_itself(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    assert holoeval(monkeypatch, *command.split(), "-h") == 0
+    assert f"Usage: holoeval {command}" in capsys.readouterr().out
+
+
+def test_the_version_is_that_of_the_package(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert holoeval(monkeypatch, "--version") == 0
+    assert capsys.readouterr().out == f"holoeval {version('holobench_eval')}\n"
 
 
 def test_help_needs_no_heavy_import() -> None:

@@ -16,6 +16,7 @@ NEEDED = ("records.csv", "table.csv")
 def read(report: Path) -> tuple[Study, dict[str, Any]]:
     """The study of a report and its provenance. UserError: the report is not finished, or what of it is missing."""
     from ...study import provenance
+    from ...study.changes import recorded
     from ...study.config import load_study
 
     known = provenance.read(report)
@@ -29,4 +30,4 @@ def read(report: Path) -> tuple[Study, dict[str, Any]]:
     missing = [name for name in NEEDED if not (report / name).is_file()]
     if missing:
         raise UserError(f"{' and '.join(missing)} missing; 'holoeval report' on its config writes them")
-    return load_study(config), known
+    return load_study(config, recorded(known)), known

@@ -187,7 +187,7 @@ def layout_of(study: Study) -> Layout:
             for source in entry.profiles
             for condition in changed(study, source, conditions[source])
         ),
-        targets=tuple(study.dataset.items()),
+        targets=study.items,
         seed=study.seed,
         headline=study.headline,
         baseline=study.baseline,

@@ -16,9 +16,8 @@ from torch import Tensor
 
 from ...core.errors import CellError
 from ...core.hashing import digest
-from ...core.installed import installed
+from ...core.installed import __version__, installed
 from ...core.io import now, write_atomically
-from ...core.version import __version__
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared

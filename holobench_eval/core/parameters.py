@@ -1,0 +1,166 @@
+"""The parameters of a dataclass in words: what each may be, what it is without being given, and what it means.
+
+Types and ranges come from the annotations, by way of a JSON schema; meanings from the description of a field or from
+the docstrings of the class and its bases, in numpy's form (``Parameters``) or as ``name: meaning; other: meaning``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter
+
+Schema = Mapping[str, Any]
+
+_WORDS = {"integer": "whole number", "boolean": "true or false", "string": "text", "null": "null", "object": "mapping"}
+_NONE_GIVEN = "needed"
+LARGEST = 1e15  # above it a maximum is that of the machine, and not said
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: its name (of one inside another with a dot), its default, what it may be, and its meaning."""
+
+    name: str
+    default: str
+    allowed: str
+    meaning: str
+
+
+def parameters(cls: type[Any]) -> list[Parameter]:
+    """Every parameter of a dataclass, those of dataclasses in it after their own.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Lamp:
+    ...     \"\"\"A lamp.
+    ...
+    ...     power: of its light [W]; name: of the lamp.
+    ...     \"\"\"
+    ...     power: float = 1.0
+    ...     name: str = "desk"
+    >>> for parameter in parameters(Lamp):
+    ...     print(parameter.name, parameter.default, parameter.allowed, parameter.meaning, sep=" | ")
+    power | 1.0 | number | of its light [W]
+    name | desk | text | of the lamp
+    """
+    return list(_entries(cls, TypeAdapter(cls).json_schema(), {}, "", None))
+
+
+def _entries(
+    cls: type[Any] | None, schema: Schema, definitions: Schema, prefix: str, given: Any
+) -> Iterator[Parameter]:
+    definitions = schema.get("$defs", definitions)
+    known = meanings(cls) if cls else {}
+    for name, entry in schema.get("properties", {}).items():
+        default = given[name] if isinstance(given, Mapping) and name in given else entry.get("default", _NONE_GIVEN)
+        inner = _resolved(entry, definitions)
+        meaning = entry.get("description") or known.get(name, "")
+        if "properties" in inner:
+            yield Parameter(f"{prefix}{name}", "", "mapping of:", meaning)
+            yield from _entries(_nested(cls, name), inner, definitions, f"{prefix}{name}.", default)
+        else:
+            text = default if isinstance(default, str) else json.dumps(default)
+            yield Parameter(f"{prefix}{name}", text, allowed(entry, definitions), meaning)
+
+
+def _resolved(entry: Schema, definitions: Schema) -> Schema:
+    """The schema behind a reference."""
+    reference = entry.get("$ref") or next((part["$ref"] for part in entry.get("allOf", ()) if "$ref" in part), None)
+    return definitions[reference.rpartition("/")[2]] if reference else entry
+
+
+def _nested(cls: type[Any] | None, name: str) -> type[Any] | None:
+    """The dataclass that a field's default is an instance of."""
+    return type(getattr(cls, name)) if hasattr(cls, name) else None
+
+
+def allowed(entry: Schema, definitions: Schema) -> str:
+    """What a value may be, in words: ``whole number from 1 to 100``."""
+    entry = _resolved(entry, definitions)
+    if "anyOf" in entry:
+        return " or ".join(dict.fromkeys(allowed(part, definitions) for part in entry["anyOf"]))
+    if "enum" in entry or "const" in entry:
+        return " or ".join(map(str, entry.get("enum", [entry.get("const")])))
+    kind = str(entry.get("type", ""))
+    if kind == "array":
+        items = entry.get("items") or entry.get("prefixItems", [{}])[0]
+        count = f"{entry['minItems']} values" if entry.get("minItems") == entry.get("maxItems", -1) else "list"
+        return f"{count}, each {allowed(items, definitions)}" if items else count
+    if kind == "object" and isinstance(entry.get("additionalProperties"), Mapping):
+        return f"mapping of names to {allowed(entry['additionalProperties'], definitions)}"
+    return f"{_WORDS.get(kind, kind or 'any value')}{_range(entry)}"
+
+
+def _range(entry: Schema) -> str:
+    entry = {key: value for key, value in entry.items() if key != "maximum" or value < LARGEST}
+    if "minimum" in entry and "maximum" in entry:
+        return f" from {entry['minimum']:g} to {entry['maximum']:g}"
+    words = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
+    parts = [f"{word} {entry[key]:g}" for key, word in words.items() if key in entry]
+    return f" {', '.join(parts)}" if parts else ""
+
+
+def meanings(cls: type[Any]) -> dict[str, str]:
+    """What docstrings say of the fields of a dataclass, by name; those of its bases where its own says nothing."""
+    found: dict[str, str] = {}
+    fields = list(getattr(cls, "__dataclass_fields__", {}))
+    for base in cls.__mro__:
+        text = inspect.cleandoc(base.__doc__ or "")
+        for name, meaning in {**_inline(text, fields), **_numpy(text)}.items():
+            if name in fields and meaning:
+                found.setdefault(name, meaning)
+    return found
+
+
+def summary(cls: type[Any]) -> str:
+    """A docstring as far as it is about the class, without sections and signs of markup, a line a paragraph."""
+    text = inspect.cleandoc(cls.__doc__ or "")
+    text = re.split(r"\n\n\w+\n-{3,}\n", text)[0]
+    fields = list(getattr(cls, "__dataclass_fields__", {}))
+    paragraphs = [
+        one for one in text.split("\n\n") if not re.match(rf"(?:{'|'.join(fields) or '-'})(?:,[^:]*)?: ", one)
+    ]
+    return "\n\n".join(_plain(one) for one in paragraphs)
+
+
+def source(cls: type[Any]) -> str:
+    """The paper behind a class: the paragraphs of its file's docstring, after the first, that name a year; or empty."""
+    module = inspect.getmodule(cls)
+    paragraphs = inspect.cleandoc((module and module.__doc__) or "").split("\n\n")[1:]
+    return " ".join(_plain(one) for one in paragraphs if re.search(r"\b(?:19|20)\d\d\b", one))
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.replace("`", "").split())
+
+
+def _numpy(text: str) -> dict[str, str]:
+    """Meanings in a section ``Parameters``, where several names may share an entry."""
+    section = re.search(r"\nParameters\n-+\n(.*?)(?=\n\n\w+\n-{3,}\n|\Z)", f"\n{text}", re.DOTALL)
+    found = {}
+    for names, meaning in (
+        re.findall(r"^(\w[\w, ]*?)(?: :[^\n]*)?\n((?:[ \t]+[^\n]*\n?|\n)+)", section[1] + "\n", re.M) if section else ()
+    ):
+        found.update(dict.fromkeys(re.split(r",\s*", names), _plain(meaning)))
+    return found
+
+
+def _inline(text: str, fields: list[str]) -> dict[str, str]:
+    """Meanings as ``name: meaning; other, another: meaning``."""
+    if not fields:
+        return {}
+    name = rf"(?:{'|'.join(fields)})"
+    flat = " ".join(text.split())
+    parts = re.split(rf"(?:^|(?<=[.;:)] )|(?<=^))({name}(?:, {name})*): ", flat)
+    found = {}
+    for names, meaning in zip(parts[1::2], parts[2::2], strict=True):
+        found.update(dict.fromkeys(names.split(", "), _plain(meaning).rstrip(".; ")))
+    return found

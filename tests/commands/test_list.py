@@ -1,0 +1,76 @@
+"""What ``holoeval list`` says of a single name."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from holobench_eval.commands.list_ import KINDS, list_
+from holobench_eval.core import plugins
+from holobench_eval.core.errors import UserError
+from holobench_eval.core.parameters import parameters
+
+
+def shown(capsys: pytest.CaptureFixture[str], name: str) -> str:
+    list_(name)
+    return re.sub(r"\s+", " ", capsys.readouterr().out)
+
+
+def test_a_method_is_shown_with_its_paper_and_every_parameter(capsys: pytest.CaptureFixture[str]) -> None:
+    text = shown(capsys, "wirtinger")
+    assert 'Source: Chakravarthula, Peng, Kollin, Fuchs & Heide, "Wirtinger holography for near-eye displays"' in text
+    assert "iterations = 200 (whole number from 1 to 100000) Evaluations of loss and gradient" in text
+    assert "step = 0.1 (number above 0, at most 10) Adam's step [rad]" in text
+    assert "schedule = constant (constant or cosine)" in text
+
+
+def test_parameters_inside_others_have_dotted_names(capsys: pytest.CaptureFixture[str]) -> None:
+    text = shown(capsys, "hil")
+    assert "retrieval.step = 0.06 (number above 0, at most 10) Adam's step [rad]" in text  # HIL's, not the class's own
+    assert "is trained first" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("leto-2020", ("Version ", "crosstalk: width = 0.361", "stray_light", "holoeval show leto-2020")),
+        ("drift", ("values [days] from 0 to 3650", "dust that settles", "sweeps: [{condition: drift")),
+        ("draw", ("count: 3",)),
+        ("ssim", ("IEEE Trans. Image Process. 13", "columns: ssim_linear, ssim_amplitude, ssim_srgb")),
+        ("lpips_alex", ("lower is better", "columns: lpips_alex_srgb")),
+        ("crops", ("size = 208 (whole number from 32 to 4096) pixels a side",)),
+        ("conditions", ("camera_shift_x", "values [mm] from -40 to 40")),
+    ],
+)
+def test_a_name_of_any_kind_is_explained(capsys: pytest.CaptureFixture[str], name: str, words: tuple[str, ...]) -> None:
+    text = shown(capsys, name)
+    for word in words:
+        assert word in text
+
+
+@pytest.mark.parametrize("kind", ["methods", "datasets"])
+def test_every_parameter_of_what_ships_has_a_meaning(kind: plugins.Kind) -> None:
+    for name in plugins.names(kind):
+        assert [entry.name for entry in parameters(plugins.find(kind, name)) if not entry.meaning] == [], name
+
+
+def test_everything_that_is_listed_can_be_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    for kind in KINDS.values():
+        for name, _ in kind():
+            assert f"{name}, one of the " in shown(capsys, name)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("wirtinker", "unknown name 'wirtinker'; did you mean 'wirtinger'?"),
+        ("leto2020", "unknown name 'leto2020'; did you mean 'leto-2020'?"),
+        ("condition", "unknown kind 'condition'; did you mean 'conditions'?"),
+        ("?", "unknown kind '?'; allowed: conditions, datasets, methods, metrics, profiles, or a name that"),
+    ],
+)
+def test_an_unknown_name_gets_the_nearest(name: str, message: str) -> None:
+    with pytest.raises(UserError) as caught:
+        list_(name)
+    assert str(caught.value).startswith(message)

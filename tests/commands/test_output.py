@@ -1,0 +1,93 @@
+"""What a study leaves on the terminal: tables that fit it, and why cells have no score."""
+
+from __future__ import annotations
+
+import codecs
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from holobench_eval.commands import _plain
+from holobench_eval.commands.output import MOST_REASONS, print_headline, print_holes
+from holobench_eval.report import Results, records_frame
+from tests.support.synthetic_study import cell, layout, record, study
+
+LONG = "a method whose label is as long as a label may ever be, sixty"
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    return study(tmp_path_factory.mktemp("study"), size=24)
+
+
+def found(records: list[dict[str, Any]], **changes: Any) -> Results:
+    shape = layout(**changes)
+    return Results(records_frame(records, shape), shape)
+
+
+def printed(results: Results, encoding: str = "utf-8", width: int = 80) -> list[str]:
+    codecs.register_error("plain", _plain)
+    file = io.TextIOWrapper(io.BytesIO(), encoding=encoding, errors="plain")
+    console = Console(file=file, width=width)
+    print_headline(console, results)
+    print_holes(console, results)
+    file.seek(0)
+    return file.read().splitlines()
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(
+    records: list[dict[str, Any]], encoding: str
+) -> None:
+    renamed = [{**one, "label": LONG if one["label"] == "HIL" else one["label"]} for one in records]
+    pairs = tuple((LONG if label == "HIL" else label, name) for label, name in layout().pairs)
+    results = found(renamed, pairs=pairs, camera=frozenset({LONG}), reported={})
+    lines = printed(results, encoding)
+    assert max(map(len, lines)) <= 80
+    text = "\n".join(lines)
+    assert "…" not in text
+    assert "?" not in text
+    for condition in results.conditions:
+        assert f"{condition}: PSNR, linear light [dB]" in text
+        for name in results.methods(condition):
+            assert results.headline.in_row(results.row(name, condition)) in text
+
+
+def test_a_rank_is_named_by_its_category_where_there_are_several(records: list[dict[str, Any]]) -> None:
+    plain = "\n".join(printed(found(records)))
+    assert "open loop" not in plain
+    assert "Oracle, ceiling (privileged)" in plain
+    lines = printed(found(records, camera=frozenset({"HIL"})))
+    (hil, *_) = [line for line in lines if "HIL" in line]
+    assert "1 online" in hil
+    assert hil.rstrip("│ ").endswith("300")  # captures of six targets
+    assert any("1 open loop" in line for line in lines)
+
+
+def test_a_row_with_a_hole_has_no_rank_and_says_how_many_targets_it_has(records: list[dict[str, Any]]) -> None:
+    (row, *_) = [line for line in printed(found(records)) if "GS" in line]
+    assert "GS (5 of 6 targets)" in row
+    assert "–" in row
+
+
+def test_reasons_of_holes_are_grouped_and_counted(records: list[dict[str, Any]]) -> None:
+    text = " ".join(" ".join(printed(found(records))).split())
+    assert f"without a score: 1 of {len(records)} cells 1 failed (GS on leto-aged): CellError: registration" in text
+    holes = [
+        record("SGD", cell("sgd", f"target {number}", "ideal"), {}, state=state, reason=f"{number} values are NaN")
+        for number, state in enumerate(["failed", "failed", "unavailable"])
+    ]
+    text = " ".join(" ".join(printed(found([*records, *holes]), width=160)).split())
+    assert "2 failed (SGD on ideal): 0 values are NaN 1 unavailable (SGD on ideal): 2 values are NaN" in text
+
+
+def test_many_reasons_are_cut_and_a_study_without_holes_has_no_such_line(records: list[dict[str, Any]]) -> None:
+    done = [one for one in records if one["state"] == "done"]
+    assert not any("without a score" in line for line in printed(found(done)))
+    holes = [
+        record("SGD", cell("sgd", f"target {letter}", "ideal"), {}, state="failed", reason=f"reason {letter}")
+        for letter in "abcdefghijklmnopqrstuvwxyz"
+    ]
+    assert printed(found([*done, *holes]))[-1] == f"  and {26 - MOST_REASONS} more reasons, in details.md"

@@ -1,0 +1,101 @@
+"""The JSON schema of configs: it takes what ships, and refuses by structure what a config may not be."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holobench_eval.commands.schema import schema, study_schema
+from holobench_eval.core.errors import UserError
+from holobench_eval.core.yaml_source import load, parse
+from tests.study.test_config import CHANGES, FULL
+from tests.support.json_schema import faults
+
+ROOT = Path(__file__).parents[2]
+
+# Mistakes that only the program finds: they are about other values, files, images and optics, not about structure.
+BEYOND = (
+    ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n"),
+    ("profiles: [ideal]\n", "profiles: [absent.yaml]\n"),
+    ("panel: [128, 256]", "panel: [64, 64]"),
+    ("sets.py:Images", "sets.py:Training"),
+    ("sets.py:Images", "gone.py:Images"),
+    ("count: 3", "cuont: 3"),
+    ("count: 3", "count: -3"),
+    ("count: 3", "count: 0"),
+    ("profiles: [ideal]}", "profiles: [idael]}"),
+    ('label: "GS"', 'label: "Wirtinger "'),
+    ('label: "GS"', "label: wirtinger"),
+    ('label: "GS"', "label: floor_black"),
+    ('label: "GS"', 'label: "a\\nb"'),
+    ("baseline: GS", "baseline: gs"),
+    ("GS: {psnr", "gS: {psnr"),
+    ("rows: {GS", "beside: idael, rows: {GS"),
+    ("repeats: 2", "protocol: {lpips_weights: no.pth}"),
+    ("headline: ssim_srgb", "headline: ms_ssim_linear"),
+    ("repeats: 2", "protocol: {metrics: [psnr]}"),
+)
+
+
+@pytest.fixture(scope="module")
+def known() -> dict[str, Any]:
+    return study_schema()
+
+
+def test_every_config_that_ships_fits(known: dict[str, Any]) -> None:
+    for path in sorted((ROOT / "configs").glob("*.yaml")):
+        assert list(faults(load(path).data, known, known)) == [], path
+
+
+def test_the_full_config_of_the_tests_fits(known: dict[str, Any]) -> None:
+    assert list(faults(parse("full.yaml", FULL).data, known, known)) == []
+
+
+@pytest.mark.parametrize(("old", "new"), [(old, new) for old, new, _ in CHANGES])
+def test_a_mistake_of_structure_does_not_fit(known: dict[str, Any], old: str, new: str) -> None:
+    try:
+        data = parse("full.yaml", FULL.replace(old, new, 1)).data
+    except UserError:
+        return  # no YAML of ours, whatever the schema says
+    assert bool(list(faults(data, known, known))) == ((old, new) not in BEYOND)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{name: hil, params: {retrieval: {stepp: 1}}}",
+        "{name: hil, params: {retrieval: {step: 0}}}",
+        "{name: sgd, params: {privileged: true}}",
+        "{params: {iterations: 3}}",
+    ],
+)
+def test_parameters_are_those_of_the_method(known: dict[str, Any], text: str) -> None:
+    data = parse("full.yaml", FULL.replace("- wirtinger", f"- {text}")).data
+    assert list(faults(data, known, known))
+
+
+def test_parameters_of_a_default_method_are_those_of_that_method(known: dict[str, Any]) -> None:
+    data = parse("full.yaml", FULL).data
+    assert not list(faults({**data, "holograms": {"params": {"iterations": 3}}}, known, known))
+    assert list(faults({**data, "holograms": {"params": {"beta": 0.9}}}, known, known))
+
+
+def test_every_key_has_a_description(known: dict[str, Any]) -> None:
+    def keys(schema: Any, where: str) -> Iterator[tuple[str, Any]]:
+        for name, entry in schema.get("properties", {}).items():
+            yield f"{where}.{name}", entry
+
+    found = dict(keys(known, "study"))
+    for name, definition in known["$defs"].items():
+        found |= dict(keys(definition, name))
+    assert len(found) > 100
+    assert [name for name, entry in found.items() if not entry.get("description")] == []
+
+
+def test_what_is_printed_is_that_schema(known: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    schema()
+    assert json.loads(capsys.readouterr().out) == known

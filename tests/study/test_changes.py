@@ -1,0 +1,137 @@
+"""A part or a variant of a study: what the command line changes, where faults are told, and what its report says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.commands import run as command
+from holobench_eval.commands.check import problems_in
+from holobench_eval.commands.options import changes_of, output_folder
+from holobench_eval.commands.report import report
+from holobench_eval.core.errors import UserError
+from holobench_eval.study.changes import Changes, noted, recorded
+from holobench_eval.study.config import load_study
+from holobench_eval.study.plan import plan
+from tests.study.test_config import FULL, write
+from tests.support.fake_study import write_config
+
+TOYS = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: "toy, bright", params: {value: 2.0}}', "plugins.py:Seeing")
+
+
+def test_methods_are_chosen_by_label_or_name_in_the_order_of_the_config(tmp_path: Path) -> None:
+    config = write_config(tmp_path, TOYS)
+
+    def labels(*methods: str) -> tuple[str, ...]:
+        return load_study(config, Changes(methods=methods)).labels
+
+    assert labels("Seeing, Toy") == ("Toy", "Seeing")
+    assert labels("toy, bright") == ("toy, bright",)
+    assert labels("Toy") == ("Toy",)
+    assert labels("plugins.py:Toy") == ("Toy", "toy, bright")
+    assert labels("toy, bright", "Seeing") == ("toy, bright", "Seeing")
+
+
+def test_what_a_config_says_of_methods_that_are_left_out_goes_with_them(tmp_path: Path) -> None:
+    path = write(tmp_path, FULL)
+    study = load_study(path, Changes(methods=("wirtinger",)))
+    assert study.baseline == "wirtinger"
+    assert study.reported is not None
+    assert study.reported.rows == {}
+    assert load_study(path, Changes(methods=("GS",))).baseline == "GS"
+
+
+def test_targets_are_chosen_by_name_or_number_and_their_cells_are_those_of_the_whole_study(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    whole = {cell.id for cell in plan(load_study(config)).cells}
+    for changes, items in (
+        (Changes(targets=("gray 2,gray 0",)), ("gray 0", "gray 2")),
+        (Changes(limit=2), ("gray 0", "gray 1")),
+        (Changes(targets=("gray 1", "gray 2"), limit=1), ("gray 1",)),
+        (Changes(limit=99), ("gray 0", "gray 1", "gray 2")),
+    ):
+        study = load_study(config, changes)
+        assert study.items == items
+        cells = [cell for cell in plan(study).cells if not cell.method.startswith("floor")]
+        assert [cell.target for cell in cells] == list(items)
+        assert {cell.id for cell in cells} <= whole
+
+
+def test_a_value_replaces_that_of_the_config_and_its_defaults(tmp_path: Path) -> None:
+    values = ("seed=9", "display.panel=[192, 192]", "methods.1.params.iterations=5", "save.phases=true", "note=a = b")
+    study = load_study(write(tmp_path, FULL), Changes(values=(*values, "methods.0.params.step=0.5")))
+    assert (study.seed, study.display.panel, study.methods[1].params["iterations"]) == (9, (192, 192), 5)
+    assert study.save.phases
+    assert study.methods[0].params["step"] == 0.5
+    assert study.note.endswith(" a = b")
+
+
+FAULTS = [
+    (Changes(values=("seed=-1",)), "--set seed=-1: seed should be greater than or equal to 0, got -1"),
+    (Changes(values=("sede=3",)), "--set sede=3: unknown key 'sede' in the document; did you mean 'seed'?"),
+    (Changes(values=("saves.phases=true",)), "--set saves.phases=true: unknown key 'saves' in the document"),
+    (Changes(values=("methods.1.params.iterations=0",)), "--set methods.1.params.iterations=0: method 'gerchberg_sax"),
+    (Changes(values=("methods.1.params.itterations=9",)), "--set methods.1.params.itterations=9: method 'gerchberg"),
+    (Changes(values=("display.profiles.0=idael",)), "--set display.profiles.0=idael: unknown profile 'idael'; did"),
+    (Changes(values=("display={profiles: [idael]}",)), "--set display={profiles: [idael]}: unknown profile 'idael'"),
+    (Changes(values=("methods.7.label=x",)), "--set methods.7.label=x: 'methods' is a list; give a number from 0 to 1"),
+    (Changes(values=("seed.x=1",)), "--set seed.x=1: 'seed' is a single value and has no 'x'"),
+    (Changes(values=("seed",)), "--set seed: expected key=value, such as"),
+    (Changes(values=("=3",)), "--set =3: expected key=value, such as"),
+    (Changes(values=("seed=[",)), "--set seed=[: "),
+    (Changes(values=("seed=1\nrepeats: 3",)), "--set seed=1"),
+    (Changes(methods=("wirtinker",)), "--methods wirtinker: no such method in the config; did you mean 'wirtinger'?"),
+    (Changes(targets=("image 9",)), "--targets image 9: no such target in the dataset; did you mean 'image "),
+    (Changes(targets=("",)), "--targets : no such target in the dataset"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), FAULTS)
+def test_a_fault_is_told_at_its_option(tmp_path: Path, changes: Changes, message: str) -> None:
+    with pytest.raises(UserError) as caught:
+        load_study(write(tmp_path, FULL), changes)
+    assert str(caught.value).startswith(message)
+
+
+def test_a_fault_of_the_config_keeps_its_line_when_methods_before_it_are_left_out(tmp_path: Path) -> None:
+    path = write(tmp_path, FULL.replace("iterations: 12", "iterations: 0"))
+    with pytest.raises(UserError, match=r"study\.yaml:10:64: method 'gerchberg_saxton': parameter 'iterations'"):
+        load_study(path, Changes(methods=("GS",)))
+    assert load_study(path, Changes(methods=("wirtinger",))).labels == ("wirtinger",)
+
+
+def test_changes_are_read_back_as_they_were_noted() -> None:
+    changes = Changes(("a, b",), (), 3, ("seed=1",))
+    assert recorded(json.loads(json.dumps(noted(changes)))) == changes
+    assert str(changes) == "--methods 'a, b' --limit 3 --set seed=1"
+    assert noted(Changes()) == {}
+    assert recorded({}) == Changes()
+    with pytest.raises(UserError, match="unknown key 'more'"):
+        recorded({"changes": {"more": 1}})
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_physics")
+def test_a_changed_study_says_so_in_its_report_and_leaves_the_whole_one_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    config = write_config(tmp_path)
+    monkeypatch.setattr(command, "sheets", lambda *_: [])
+    command.run(config, executor="serial", threads=1)
+    before = Path("reports/study/records.csv").read_bytes()
+    command.run(config, executor="serial", threads=1, limit=2, values=["seed=4"])
+    assert Path("reports/study/records.csv").read_bytes() == before
+    text = Path("reports/study-changed/report.md").read_text()
+    assert text.startswith("# Fake (changed: --limit 2 --set seed=4)")
+    assert "not the whole study of the config, and not its result: it was run with --limit 2 --set seed=4." in text
+    assert "\nholoeval run study.yaml --limit 2 --set seed=4\n" in text
+    assert problems_in(Path("reports"))[1] == []
+
+    Path("reports/study-changed/report.md").unlink()
+    report(config, Path("reports/study-changed"))
+    assert Path("reports/study-changed/report.md").read_text() == text
+    with pytest.raises(UserError, match="reports/study: holds the report of a whole study"):
+        output_folder(load_study(config, changes_of(None, None, 2, None)), Path("reports/study"))
