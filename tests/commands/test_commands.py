@@ -78,7 +78,7 @@ def test_a_study_from_run_to_check(
     config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert holoeval(monkeypatch, "plan", config) == 0
-    assert not Path("reports").exists()
+    assert not Path("holoeval-results").exists()
     assert "missing" in capsys.readouterr().out
 
     assert holoeval(monkeypatch, "run", config, "--executor", "serial", "--threads", 1) == 1
@@ -86,15 +86,15 @@ def test_a_study_from_run_to_check(
     assert "1 cell failed" in shown
     assert "Flat" in shown
     assert "1 failed (Blind on ideal): " in shown
-    assert Path("reports/toy/report.md").exists()
-    tables = [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")]
+    assert Path("holoeval-results/toy/report.md").exists()
+    tables = [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")]
     assert b"Blind,open loop,,,,,0,1," in tables[0]
     assert b"1 values that are NaN" not in tables[1]
     assert b"values that are NaN or infinite" in tables[1]
 
-    shutil.rmtree("reports/toy/figures", ignore_errors=True)
+    shutil.rmtree("holoeval-results/toy/figures", ignore_errors=True)
     assert holoeval(monkeypatch, "report", config) == 0
-    assert [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
+    assert [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
 
     assert holoeval(monkeypatch, "report", config, "--print", "printed") == 0
     assert Path("printed/single/quality-by-target.svg").exists()
@@ -102,13 +102,13 @@ def test_a_study_from_run_to_check(
 
     another = config.with_name("another.yaml")
     another.write_text(f"{config.read_text()}\nseed: 99\n")
-    assert holoeval(monkeypatch, "report", another, "--output", "reports/toy") == 2
+    assert holoeval(monkeypatch, "report", another, "--output", "holoeval-results/toy") == 2
     assert "no cell of this study has a record here" in capsys.readouterr().err
-    assert [Path("reports/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
+    assert [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
 
-    assert holoeval(monkeypatch, "check") == 0
-    Path("reports/toy/table.csv").write_text("changed")
-    assert holoeval(monkeypatch, "check") == 1
+    assert holoeval(monkeypatch, "check", "holoeval-results") == 0
+    Path("holoeval-results/toy/table.csv").write_text("changed")
+    assert holoeval(monkeypatch, "check", "holoeval-results") == 1
     assert "1 report, 1 problem" in capsys.readouterr().out
 
 
@@ -145,7 +145,7 @@ def test_a_mistake_in_a_config_leaves_nothing_behind(
     config.write_text(CONFIG.replace("panel", "pannel"))
     assert holoeval(monkeypatch, "run", config) == 2
     assert f"{config}:2:30: unknown key 'pannel' in display; did you mean 'panel'?" in capsys.readouterr().err
-    assert not Path("reports").exists()
+    assert not Path("holoeval-results").exists()
 
 
 @pytest.mark.parametrize("option", ["--threads", "--workers"])

@@ -31,4 +31,4 @@ def test_a_study_is_run_and_reported_without_a_network(tmp_path: Path) -> None:
     command = [str(Path(sys.executable).with_name("holoeval")), "run", "study.yaml", "--workers", "2"]
     done = subprocess.run([*ALONE, *command], cwd=tmp_path, capture_output=True, text=True, env=dict(os.environ))
     assert done.returncode == 0, done.stderr[-2000:]
-    assert (tmp_path / "reports/study/report.html").is_file()
+    assert (tmp_path / "holoeval-results/study/report.html").is_file()

@@ -159,9 +159,11 @@ class FakeBench:
         budget: int | None = None,
         learned: Any = None,
         starts: Any = (),
+        sha256: str = "",
     ) -> MeteredDisplay:
+        names = (item, repeat)
         return MeteredDisplay(
-            cast(CalibratedBench, self), label, target, (item, repeat), method, budget, learned, starts
+            cast(CalibratedBench, self), label, target, names, method, budget, learned, starts, item, sha256
         )
 
     def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
