@@ -63,7 +63,6 @@ def run(
     address: Annotated[str | None, typer.Option(help="Of a running Dask scheduler, for --executor address.")] = None,
     device: Device = "auto",
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
-    retime: Annotated[bool, typer.Option("--retime", help="Measure solving times again.")] = False,
     retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
     artifacts: Learned = Path("artifacts"),
 ) -> None:
@@ -73,7 +72,7 @@ def run(
     """
     changes = changes_of(methods, targets, limit, values)
     with _resumable():
-        if changes or retrain or retry_failed or retime or not _is_finished(config, output):
+        if changes or retrain or retry_failed or not _is_finished(config, output):
             from ..study.executors import begin
 
             begin(executor, workers, is_small(_panel(config)))
@@ -90,7 +89,7 @@ def run(
             open_displays(study)
         folder, grid = output_folder(study, output), plan(study)
         many = thread_count(threads, where.workers, study)
-        options: dict[str, Any] = {"retry_failed": retry_failed, "retime": retime, "retrain": retrain, "device": device}
+        options: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "device": device}
         drawings = sheets(study, folder)
         beside = drawings if where.workers > 1 else []
         if where.workers > 1:  # meanwhile this process only waits

@@ -1,9 +1,8 @@
 """The cost of a solution: wall time, and the peak of memory above the level before it.
 
-These are the only numbers of a table that differ from run to run. So that the same command on the same machine gives
-the same table, and a run that was killed and resumed gives the table of one that was not, the first measurement of
-every solution is kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``) ``/holobench_eval/timings/`` and later runs report it.
-``holoeval run --retime`` measures again. Where the folder cannot be written, every run reports its own measurements.
+These are the only numbers of a table that differ from run to run: a study reports what it measured itself. The last
+measurement of every solution is also kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``) ``/holobench_eval/timings/``, for
+estimates of how long a study takes.
 
 Linux keeps the largest resident set that a process ever had (``VmHWM`` in ``/proc/self/status``) and sets it back to
 the present one when 5 is written to ``/proc/self/clear_refs`` (proc(5)). Elsewhere memory is not measured.
@@ -19,6 +18,7 @@ import math
 import os
 import platform
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
@@ -203,7 +203,7 @@ def names() -> frozenset[str]:
 
 
 def recorded(name: str) -> Cost | None:
-    """The first measurement under a name, None if there is none; earlier versions recorded no memory."""
+    """The last measurement under a name, None if there is none; earlier versions recorded no memory."""
     try:
         content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
         seconds, memory = float(content["seconds"]), content.get("memory_mib")
@@ -214,14 +214,7 @@ def recorded(name: str) -> Cost | None:
     return effort if all(math.isfinite(size) and size >= 0 for size in sizes) else None
 
 
-def keep(name: str, effort: Cost, retime: bool = False) -> Cost:
-    """Record a measurement and return the one to report: the first, or with ``retime`` this one."""
-    first = None if retime else recorded(name)
-    if first is not None and (first.memory_mib is not None or effort.memory_mib is None):
-        return first
-    kept = effort if first is None else Cost(first.seconds, effort.memory_mib)
-    try:
-        write_atomically(folder() / f"{name}.json", json.dumps(asdict(kept)).encode())
-    except StorageError:  # a cache, which a run can do without
-        return kept
-    return kept
+def keep(name: str, effort: Cost) -> None:
+    """Record a measurement for estimates, in the place of an earlier one."""
+    with suppress(StorageError):  # a cache, which a run can do without
+        write_atomically(folder() / f"{name}.json", json.dumps(asdict(effort)).encode())

@@ -37,7 +37,8 @@ def describe(
 ) -> dict[str, Any]:
     """Everything about the present run that is not in its config: versions, revision, machine, displays, command.
 
-    device: as requested; gpu: its name, empty for a CPU or an unknown GPU. ``imports_s``: see ``isolation.imports``.
+    device: as requested; gpu: its name, empty for a CPU or an unknown GPU. load: processes that wanted a core in the
+    minute before, on average. ``imports_s``: see ``isolation.imports``.
     """
     imports = isolation.imports((entry.name for entry in study.methods), study.folder)
     return {
@@ -56,6 +57,7 @@ def describe(
         **({"gpu": gpu} if gpu else {}),
         "threads": threads,
         "workers": workers,
+        **({"load": round(os.getloadavg()[0], 2)} if hasattr(os, "getloadavg") else {}),  # not on Windows
         **({"imports_s": imports} if imports else {}),
         "started": now(),
         "ended": None,

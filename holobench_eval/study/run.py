@@ -87,7 +87,6 @@ def run(
     threads: int,
     artifacts: Path,
     retry_failed: bool = False,
-    retime: bool = False,
     retrain: bool = False,
     device: str = "cpu",
     drawings: Sequence[Drawing] = (),
@@ -112,8 +111,6 @@ def run(
         Folder of what methods learned.
     retry_failed
         Compute failed cells again.
-    retime
-        Measure wall times again, see ``cost``.
     retrain
         Train again, and compute the dependent cells again.
     device
@@ -160,7 +157,6 @@ def run(
             lpips_weights=study.protocol.lpips_weights,
             threads=threads,
             workers=executor.workers,
-            retime=retime,
             device=device,
             isolation=study.isolation,
             limits=study.limits,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import pandas as pd
 
 from ..data.results import Results
@@ -24,8 +27,7 @@ def _render(report: Report, _: Figures) -> Blocks:
         memory = MEMORY_COLUMN in results.table
         sentences = [
             text.cost,
-            f"Seconds {'and memory ' * memory}are the first measurement on this machine; later runs keep it, so that "
-            "the same command gives the same table.",
+            _measured(report.provenance, memory),
             timing(results, report.provenance.get("workers", 1)),
         ]
         if memory:
@@ -40,6 +42,14 @@ def _render(report: Report, _: Figures) -> Blocks:
             )
         yield " ".join(filter(None, sentences))
     yield report.by_display(_light_and_time)
+
+
+def _measured(provenance: Mapping[str, Any], memory: bool) -> str:
+    """When the seconds were measured, a sentence; earlier versions showed the first measurement of a machine."""
+    what = f"Seconds {'and memory ' * memory}"
+    if "load" not in provenance:
+        return f"{what}are the first measurement on that machine, which may be of an earlier study."
+    return f"{what}were measured in this study; the machine's load before it was {provenance['load']:g}."
 
 
 def _light_and_time(results: Results, condition: str) -> Markdown:

@@ -41,7 +41,7 @@ class Setting:
 
     output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
     what trained methods learned; metrics: names of those to compute (None: all); threads: torch threads of a worker;
-    workers: tasks computed side by side; retime: measure wall times again, see ``cost``; device: name of where a
+    workers: tasks computed side by side; device: name of where a
     worker computes, see ``device.find``; isolation, limits: see ``definition.Study``.
     """
 
@@ -53,7 +53,6 @@ class Setting:
     lpips_weights: str | None
     threads: int
     workers: int
-    retime: bool = False
     device: str = "cpu"
     isolation: Isolation = "files"
     limits: Limits = field(default_factory=Limits)

@@ -82,7 +82,8 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
     seen = _foresee(job)
     wanted, factors = match(seen.capture.image, seen.target)
     image = factors.view(-1, 1, 1) * seen.prediction
-    taken = cost.keep(job.timing, seen.taken, job.setting.retime)
+    taken = seen.taken
+    cost.keep(job.timing, taken)
     further = more(seen)
 
     def compare(cell: Cell, _: Condition) -> Record:

@@ -70,7 +70,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         taken = watch.stop()
     if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
         raise wrong_output(job, "solve", phase, f"a phase (1, {len(target)}, H, W)")
-    taken = cost.keep(job.timing, taken, job.setting.retime)
+    cost.keep(job.timing, taken)
     return Solution(phase.detach().cpu()[0], handle.captures, taken, stopped, learned)
 
 
