@@ -144,13 +144,13 @@ class RealBench(MethodHandles):
         check_phase(phase, self.spec, label)
         names, relative = (self.seed, item, repeat, "score"), self.relative_exposure(target)
         if exposure == "matched":
-            metering = Request(self.shown(phase), relative, "hologram", (*names, "metering"))
+            metering = Request(self.shown(phase), relative, "hologram", (*names, "metering"), item)
             metered = self.rectified(self.capture(self.photographer.photograph(metering)), target)
             wanted = target.mean((-2, -1))
             ratio = (wanted / metered.mean((-2, -1)).clamp_min(1e-3))[wanted > DARKEST_MEAN]
             brighter = float(ratio.min().clamp(1 / BRIGHTER, BRIGHTER)) if len(ratio) else 1.0
             relative = float(f"{relative * brighter:.3g}")
-        request = Request(self.shown(phase), relative, "hologram", names)
+        request = Request(self.shown(phase), relative, "hologram", names, item)
         self.photographer.announce([request])
         registered = self.registration
         photo = self.photographer.photograph(request)

@@ -180,6 +180,7 @@ class FolderPhotographer:
         exposure = showing.exposure if request is None else self._exposure(request)
         counted = digest([showing.role, round_, showing.copy, showing.exposure])
         key = self._key(request) if request and showing.role != REPEAT else counted
+        target = digest(request.target) if request and request.target else ""
         patterns = []
         for colour in colours:
             number = before + colour + 1
@@ -196,6 +197,7 @@ class FolderPhotographer:
                     sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
                     file=file_of(round_, number),
                     capture=capture_of(round_, number),
+                    target=target,
                 )
             )
         return patterns

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...imaging.grid_picture import grid_picture
 from ...optics.phase import blaze
 from ..real import RealBench
 from . import FolderPhotographer
-from .checks import check_order, thumbnail
+from .checks import LISTED, check_order, check_swaps, grain, thumbnail
 from .manifest import DARK, REPEAT, Pattern, inside
 
 FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol v1, point 3)
@@ -48,12 +49,15 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
             f"the camera or the picture moved by {moved:.1f} px between repeats, more than {FURTHEST_DRIFT:g}; fix the "
             "bench and photograph a new session"
         )
-    faults = misplaced(bench, photographer)
+    faults, alike = misplaced(bench, photographer)
     if faults:
         raise UserError("nothing was scored. " + " | ".join(faults))
+    if alike:
+        say(alike)
     return (
         f"geometry: {residual}, {check} at the corners",
         f"drift between the repeats of one hologram: {moved:.2f} px and {dimmed:.1%} of the light at most",
+        *([alike] if alike else []),
     )
 
 
@@ -89,21 +93,43 @@ def drift(bench: RealBench, photographer: FolderPhotographer) -> tuple[float, fl
     return moved, dimmed
 
 
-def misplaced(bench: RealBench, photographer: FolderPhotographer) -> list[str]:
-    """Photographs of another pattern than their name says, a line each."""
-    manifest, faults = photographer.manifest, list[str]()
-    carrier = blaze(bench.spec.shape, bench.carrier)
+def misplaced(bench: RealBench, photographer: FolderPhotographer) -> tuple[list[str], str]:
+    """Photographs of another pattern than their name says, a line each; and a line on those that nobody can tell."""
+    manifest, faults, alike = photographer.manifest, list[str](), list[str]()
     for number in range(1, manifest.rounds + 1):
-        patterns = manifest.of_round(number)
+        patterns = [pattern for pattern in manifest.of_round(number) if pattern.role != DARK]
         seen, wanted = {}, {}
-        for pattern in patterns:
-            if pattern.role != DARK:
-                seen[pattern.capture] = thumbnail(_rectified(bench, photographer, pattern))
-                phase = manifest.phase.phase(_levels(photographer.folder, pattern)) - carrier
-                field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
-                wanted[pattern.capture] = thumbnail(bench.spec.region.crop(field.abs().square()).numpy())
+        for (target, _), group in _by_target(patterns):
+            grains = []
+            for pattern in group:
+                light, predicted = _rectified(bench, photographer, pattern), _predicted(bench, photographer, pattern)
+                seen[pattern.capture], wanted[pattern.capture] = thumbnail(light), thumbnail(predicted)
+                grains.append((grain(light), grain(predicted)) if target else ())
+            if target and len(group) > 1:
+                swapped, unknown = check_swaps(group, *zip(*grains, strict=True))
+                faults, alike = [*faults, *swapped], [*alike, *unknown]
         faults += check_order(patterns, seen, wanted)
-    return faults
+    more = f" and {len(alike) - LISTED} more pairs" if len(alike) > LISTED else ""
+    pairs = "; ".join(alike[:LISTED]) + more
+    return faults, f"too alike to tell whether they changed places, as predicted: {pairs}" if alike else ""
+
+
+def _by_target(patterns: Sequence[Pattern]) -> Iterator[tuple[tuple[str, int], list[Pattern]]]:
+    """Patterns by target and colour; those that are not scored by colour."""
+
+    def kind(pattern: Pattern) -> tuple[str, int]:
+        return pattern.target, pattern.colour
+
+    for key, group in groupby(sorted(patterns, key=kind), kind):
+        yield key, list(group)
+
+
+def _predicted(bench: RealBench, photographer: FolderPhotographer, pattern: Pattern) -> NDArray[np.float32]:
+    """Light ``(h, w)`` of a pattern in the region by the nominal optics."""
+    levels = _levels(photographer.folder, pattern)
+    phase = photographer.manifest.phase.phase(levels) - blaze(bench.spec.shape, bench.carrier)
+    field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
+    return np.asarray(bench.spec.region.crop(field.abs().square()).numpy())
 
 
 def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:

@@ -37,7 +37,8 @@ class Pattern:
 
     number: its place in the order of its round, from 1; colour: index of the wavelength it is lit with; exposure:
     exposure time relative to the session's own; key: tells what it is needed for; sha256: of the PNG file; file,
-    capture: their names (see ``file_of`` and ``capture_of``), which are compared and not used.
+    capture: their names (see ``file_of`` and ``capture_of``), which are compared and not used; target: sha256 of the
+    name of the target that it is scored against, empty where it is not scored.
     """
 
     round: Number
@@ -49,6 +50,7 @@ class Pattern:
     sha256: Hex
     file: Annotated[str, MaxLen(100)]
     capture: Annotated[str, MaxLen(100)]
+    target: Annotated[str, MaxLen(64)] = ""
 
 
 @dataclass(frozen=True)
