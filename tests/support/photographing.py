@@ -30,13 +30,13 @@ def another_pose(seed: int) -> Relay:
 
 
 class Lab:
-    """A simulated bench behind files. gain: counts per electron."""
+    """A simulated bench behind files. gain: counts per electron; sign: -1 for a panel with another than stated."""
 
-    def __init__(self, profile: str, panel: tuple[int, int], seed: int, dark: int = 900) -> None:
+    def __init__(self, profile: str, panel: tuple[int, int], seed: int, dark: int = 900, sign: int = 1) -> None:
         description = load_profile(profile).scaled(panel)
         self.bench = SimulatedBench(replace(description, relay=another_pose(seed)))
         self.draw = torch.Generator().manual_seed(seed)
-        self.dark, self.gain = dark, None
+        self.dark, self.gain, self.sign = dark, None, sign
 
     def photograph_round(self, folder: Path, number: int) -> None:
         """Show and save what order.csv of a round says."""
@@ -63,7 +63,7 @@ class Lab:
             levels = levels[:, ::-1]
         if convention["flip_vertical"]:
             levels = levels[::-1]
-        turns = convention["sign"] * levels / convention["two_pi_level"]
+        turns = self.sign * convention["sign"] * levels.astype(np.float32) / convention["two_pi_level"]
         return torch.from_numpy((turns * math.tau + convention["origin"]).astype(np.float32))
 
     def _light(self, phase: torch.Tensor, channel: int) -> torch.Tensor:

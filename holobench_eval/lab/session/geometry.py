@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -13,14 +12,15 @@ from numpy.typing import NDArray
 from skimage.registration import phase_cross_correlation
 
 from ...core.errors import CellError, UserError
-from ...core.io import decode_levels, write_png
+from ...core.io import write_png
 from ...imaging.grid import fiducial
 from ...imaging.grid_picture import grid_picture
-from ...optics.phase import blaze
 from ..real import RealBench
 from . import FolderPhotographer
 from .checks import LISTED, check_order, check_swaps, grain, thumbnail
-from .manifest import DARK, REPEAT, Pattern, inside
+from .manifest import DARK, REPEAT, Pattern
+from .prediction import predicted
+from .sign import sign_hint
 
 FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol v1, point 3)
 FINENESS = 20  # steps a pixel of the correlation that measures drift
@@ -36,7 +36,8 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
     try:
         registration = bench.registration
     except CellError as error:
-        raise UserError(f"the camera cannot be registered, and nothing was scored: {error}") from None
+        hint = sign_hint(bench, photographer)
+        raise UserError(f"the camera cannot be registered, and nothing was scored: {error}; {hint}") from None
     residual = f"registration: {max(registration.residual):.2f} px rms"
     second = bench.disagreement
     check = "another algorithm finds none" if np.isnan(second) else f"another algorithm differs by {second:.2f} px"
@@ -102,9 +103,9 @@ def misplaced(bench: RealBench, photographer: FolderPhotographer) -> tuple[list[
         for (target, _), group in _by_target(patterns):
             grains = []
             for pattern in group:
-                light, predicted = _rectified(bench, photographer, pattern), _predicted(bench, photographer, pattern)
-                seen[pattern.capture], wanted[pattern.capture] = thumbnail(light), thumbnail(predicted)
-                grains.append((grain(light), grain(predicted)) if target else ())
+                light, wished = _rectified(bench, photographer, pattern), predicted(bench, photographer, pattern)
+                seen[pattern.capture], wanted[pattern.capture] = thumbnail(light), thumbnail(wished)
+                grains.append((grain(light), grain(wished)) if target else ())
             if target and len(group) > 1:
                 swapped, unknown = check_swaps(group, *zip(*grains, strict=True))
                 faults, alike = [*faults, *swapped], [*alike, *unknown]
@@ -122,19 +123,3 @@ def _by_target(patterns: Sequence[Pattern]) -> Iterator[tuple[tuple[str, int], l
 
     for key, group in groupby(sorted(patterns, key=kind), kind):
         yield key, list(group)
-
-
-def _predicted(bench: RealBench, photographer: FolderPhotographer, pattern: Pattern) -> NDArray[np.float32]:
-    """Light ``(h, w)`` of a pattern in the region by the nominal optics."""
-    levels = _levels(photographer.folder, pattern)
-    phase = photographer.manifest.phase.phase(levels) - blaze(bench.spec.shape, bench.carrier)
-    field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
-    return np.asarray(bench.spec.region.crop(field.abs().square()).numpy())
-
-
-def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:
-    path = inside(folder, pattern.file)
-    content = path.read_bytes() if path.is_file() else b""
-    if hashlib.sha256(content).hexdigest() != pattern.sha256:
-        raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
-    return np.asarray(decode_levels(content), dtype=np.uint8)
