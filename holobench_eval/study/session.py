@@ -13,8 +13,10 @@ from ..core.io import write_atomically
 from ..core.yaml_source import load
 from ..imaging.convention import Convention
 from ..lab.bench_file import load_bench_file
+from ..lab.live import letter
 from ..lab.real import RealBench
 from ..lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
+from ..lab.session.bench_checks import bench_checks
 from ..lab.session.geometry import look
 from ..lab.session.manifest import refuse_links_out
 from . import isolation
@@ -92,6 +94,8 @@ def export(
     write_manifest(folder, manifest)
     forget_sessions()
     session_photographer.cache_clear()
+    opened = replace(chosen, display=replace(chosen.display, session=folder))
+    session_photographer(folder).write_checks(letter(_bench(opened)).phase)
     return _advance(chosen, folder, watch, threads)
 
 
@@ -109,6 +113,11 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     photographer = session_photographer(folder)
     if not manifest.rounds:  # its export was interrupted
         return _advance(study, folder, watch, threads)
+    checks = bench_checks(photographer)
+    for check in checks:
+        say(check.line)
+    if not all(check.passed for check in checks):
+        raise UserError("nothing was scored. " + " | ".join(check.line for check in checks if not check.passed))
     read: dict[str, str] = {}
     for number in range(1, manifest.rounds + 1):
         faults, captures = photographer.check_round(number)
@@ -123,7 +132,7 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     except Pending:
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
-    notes = [study.note, *photographer.notes, *findings]
+    notes = [study.note, *photographer.notes, *(check.line for check in checks), *findings]
     advance = _advance(study, folder, watch, threads)
     return replace(advance, study=replace(advance.study, note=" ".join(_sentence(note) for note in notes if note)))
 
