@@ -76,7 +76,7 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
         notes.append("photographs have 8 bits or fewer: what is dark is rounded, which can change a ranking")
     if not all(frame.linear for _, frame in photographs):
         notes.append("photographs are JPEG, decoded as sRGB: not linear in light, so that scores are indicative only")
-    return Series(shares, tuple(notes)), _shortened(faults)
+    return Series(shares, tuple(notes)), shortened(faults)
 
 
 def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:
@@ -164,7 +164,7 @@ def check_order(
             best = int(np.where(alike, -np.inf, similarity).argmax())
             if similarity[best] > own + CLEARLY:
                 faults.append(f"wrong order: {pattern.capture} shows pattern {same[best].number:04d}")
-    return _shortened(faults)
+    return faults
 
 
 def _of_one_target(pattern: Pattern, other: Pattern) -> bool:
@@ -229,7 +229,7 @@ def _line_of(names: Sequence[str], line: str) -> list[str]:
     return [line.format(", ".join(names[:LISTED]) + more)] if names else []
 
 
-def _shortened(faults: Sequence[str]) -> list[str]:
+def shortened(faults: Sequence[str]) -> list[str]:
     """The first faults of every kind, and how many more there are."""
     kinds: dict[str, list[str]] = {}
     for fault in faults:

@@ -17,7 +17,7 @@ from ...imaging.grid import fiducial
 from ...imaging.grid_picture import grid_picture
 from ..real import RealBench
 from . import FolderPhotographer
-from .checks import LISTED, check_order, check_swaps, grain, thumbnail
+from .checks import LISTED, check_order, check_swaps, grain, shortened, thumbnail
 from .manifest import DARK, REPEAT, Pattern
 from .prediction import predicted
 from .sign import sign_hint
@@ -110,9 +110,9 @@ def misplaced(bench: RealBench, photographer: FolderPhotographer) -> tuple[list[
                 swapped, unknown = check_swaps(group, *zip(*grains, strict=True))
                 faults, alike = [*faults, *swapped], [*alike, *unknown]
         faults += check_order(patterns, seen, wanted)
-    more = f" and {len(alike) - LISTED} more pairs" if len(alike) > LISTED else ""
-    pairs = "; ".join(alike[:LISTED]) + more
-    return faults, f"too alike to tell whether they changed places, as predicted: {pairs}" if alike else ""
+    pairs = f"{len(alike)} pair(s) of photographs of one target cannot be told apart, and may have changed places"
+    named = "; ".join(alike[:LISTED]) + (" and others" if len(alike) > LISTED else "")
+    return shortened(faults), f"order: {pairs}: {named}" if alike else ""
 
 
 def _by_target(patterns: Sequence[Pattern]) -> Iterator[tuple[tuple[str, int], list[Pattern]]]:
