@@ -49,8 +49,13 @@ with chdir(folder):
 # ``order.csv`` is made for scripts: what to show, how long to expose, where to
 # save the photograph.
 
-with (session / "patterns" / "round-1" / "order.csv").open() as file:
-    order = list(csv.DictReader(file))
+
+def rows_of(name):
+    with (session / "patterns" / name / "order.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+order = rows_of("round-1")
 columns = ["show", "role", "wavelength_nm", "relative_exposure", "laser"]
 print(pd.DataFrame(order)[columns].iloc[::10].to_string(index=False))
 
@@ -99,10 +104,21 @@ def photograph(row):
     return counts.round().clamp(0, FULL).numpy().astype(np.uint16)
 
 
-for row in order:
-    path = session / row["save_photograph_as"]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(path), photograph(row))
+def photograph_all(rows):
+    global counts_per_light
+    counts_per_light = None
+    for row in rows:
+        path = session / row["save_photograph_as"]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(str(path), photograph(row))
+
+
+# %%
+# First the patterns that check the bench: a letter at five exposures, and with the
+# other sign of the phase. Then the study.
+
+photograph_all(rows_of("checks"))
+photograph_all(order)
 
 # %%
 # A hologram of circles, which registers the camera, and one of a method:
@@ -127,8 +143,9 @@ for pair, role in zip(axes, ("fiducial", "hologram"), strict=True):
 #
 # ``holoeval session import session`` checks all photographs before it scores any:
 # sizes, saturation, dark frames, frames that the camera gave twice, pictures that
-# do not match their pattern. It finds the pose of the camera from the fiducial
-# holograms.
+# do not match their pattern, methods' photographs that changed places. It says
+# whether camera and sign of the phase are right, and finds the pose of the camera
+# from the fiducial holograms.
 
 with chdir(folder):
     app(["session", "import", "session"], standalone_mode=False)

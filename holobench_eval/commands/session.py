@@ -61,4 +61,6 @@ def _finish(advance: Advance, folder: Path) -> None:
     number = advance.patterns[0].round
     print(f"{sum(record['state'] == 'done' for record in records)} of {len(records)} cells are scored")
     readme = f"{folder}/patterns/round-{number}/README.txt"
+    if number == 1:
+        print(f"to check the bench first: {folder}/patterns/checks/README.txt")
     print(f"round {number}: {len(advance.patterns)} patterns to photograph, see {readme}")

@@ -35,11 +35,17 @@ def open_live(bench: BenchFile, folder: Path, seed: int) -> RealBench:
     atexit.register(rig.close)
     print(f"panel: {slm.name}; camera: {camera.name}")
     real = RealBench(spec, rig, bench.panel.blaze, bench.residual_bound, seed)
-    target = draw_pattern(spec.region.shape).float().expand(len(spec.wavelengths), -1, -1)
-    handle = real.for_method(SOLVER, "letter", target, "letter", 0)  # names that its seed depends on
-    phase = SOLVER.solve(target[None], handle)[0]
-    rig.prepare(Request(real.shown(phase), real.relative_exposure(target), "letter", ()), print)
+    rig.prepare(letter(real), print)
     return real
+
+
+def letter(bench: RealBench) -> Request:
+    """The hologram of the test pattern, as `preflight.phase_sign` wants it."""
+    spec = bench.spec
+    target = draw_pattern(spec.region.shape).float().expand(len(spec.wavelengths), -1, -1)
+    handle = bench.for_method(SOLVER, "letter", target, "letter", 0)  # names that its seed depends on
+    phase = SOLVER.solve(target[None], handle)[0]
+    return Request(bench.shown(phase), bench.relative_exposure(target), "letter", ())
 
 
 def _devices(bench: BenchFile) -> tuple[Slm, Camera]:

@@ -37,13 +37,15 @@ class Request:
 
     phase: ``(C, H, W)`` [rad]; relative_exposure: of the bench's own exposure time, for targets whose white pixels get
     more or less light; role: what it is for, ``hologram`` or ``fiducial``; names: tell it from others with the same
-    phase, as they name the noise of a simulated bench.
+    phase, as they name the noise of a simulated bench; target: name of the target that it is scored against, empty for
+    a hologram that is not scored.
     """
 
     phase: Tensor
     relative_exposure: float
     role: str
     names: tuple[object, ...]
+    target: str = ""
 
 
 class Photographer(Protocol):

@@ -27,6 +27,7 @@ from ..display.metered import MethodHandles
 from ..imaging.cross_check import disagreement, second_warp
 from ..imaging.grid import fiducial
 from ..imaging.register import Registration, register
+from ..imaging.shared_pose import sampled
 from ..methods.fiducials import fiducial_phases
 from ..optics.phase import blaze
 from .photograph import MOST_SATURATED, Photograph, Photographer, Request
@@ -140,21 +141,21 @@ class RealBench(MethodHandles):
     def photograph(
         self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
     ) -> RectifiedCapture:
-        """See ``Display.photograph``."""
+        """See ``Display.photograph``; the image has the means over the target's pixels, as ``holoeval score`` has."""
         check_phase(phase, self.spec, label)
         names, relative = (self.seed, item, repeat, "score"), self.relative_exposure(target)
         if exposure == "matched":
-            metering = Request(self.shown(phase), relative, "hologram", (*names, "metering"))
+            metering = Request(self.shown(phase), relative, "hologram", (*names, "metering"), item)
             metered = self.rectified(self.capture(self.photographer.photograph(metering)), target)
             wanted = target.mean((-2, -1))
             ratio = (wanted / metered.mean((-2, -1)).clamp_min(1e-3))[wanted > DARKEST_MEAN]
             brighter = float(ratio.min().clamp(1 / BRIGHTER, BRIGHTER)) if len(ratio) else 1.0
             relative = float(f"{relative * brighter:.3g}")
-        request = Request(self.shown(phase), relative, "hologram", names)
+        request = Request(self.shown(phase), relative, "hologram", names, item)
         self.photographer.announce([request])
         registered = self.registration
         photo = self.photographer.photograph(request)
-        image = self.rectified(self.capture(photo), target)
+        image = self._averaged(self.capture(photo), target, registered)
         return RectifiedCapture(
             image=image,
             capture=self.capture(photo),
@@ -165,13 +166,19 @@ class RealBench(MethodHandles):
         )
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
-        """See ``Display.rectified``."""
+        """See ``Display.rectified``: samples at the target's pixels, as the nominal model of the methods gives them."""
         return in_target_frame(capture, target, self.spec, self.registration)
+
+    def _averaged(self, capture: Capture, target: Tensor, registration: Registration) -> Tensor:
+        """As ``rectified``, but with means over the area of the target's pixels where the camera's are finer."""
+        frames = zip(capture.linear().cpu().numpy(), registration.warps, strict=True)
+        light = torch.stack([torch.from_numpy(sampled(frame[None], warp)[0]) for frame, warp in frames])
+        return light.to(target.device) / white_irradiance(target, self.spec)[:, None, None]
 
     def second_image(self, shot: RectifiedCapture, target: Tensor) -> Tensor | None:
         """``RectifiedCapture.image`` by the second geometry; None where there is none."""
         second = self.second_registration
-        return None if second is None else in_target_frame(shot.capture, target, self.spec, second)
+        return None if second is None else self._averaged(shot.capture, target, second)
 
 
 @dataclass

@@ -18,7 +18,7 @@ from .displays import Condition, Preparation, changed, displays, preparation
 from .focal_stacks import VERSION as IN_FOCUS
 from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
 from .isolation import read_files
-from .versions import HARNESS, method_version
+from .versions import HARNESS, PHOTOGRAPHS, method_version
 
 REFERENCE = "reference"  # the condition of the floor cells
 Maker = tuple[str, str, Mapping[str, Any]]  # method, its version, parameters
@@ -221,6 +221,7 @@ class _Ground:
         study's; files: digests of those that the method reads."""
         study = self.study
         method, version, params = maker
+        is_real = display.real is not None and condition != REFERENCE
         holograms = study.holograms
         probe = {"name": holograms.name, "params": holograms.params, "sha256": self.probe_sha256}
         return Cell(
@@ -239,7 +240,7 @@ class _Ground:
             repeat=repeat,
             seed=study.seed,
             protocol=study.protocol.version,
-            harness_sha256=HARNESS,
+            harness_sha256=f"{HARNESS}; {PHOTOGRAPHS}" if is_real else HARNESS,
             metrics=self.metrics,
             exposure=exposure or study.display.exposure,
             measure=study.measure,

@@ -13,8 +13,10 @@ from ..core.io import write_atomically
 from ..core.yaml_source import load
 from ..imaging.convention import Convention
 from ..lab.bench_file import load_bench_file
+from ..lab.live import letter
 from ..lab.real import RealBench
 from ..lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
+from ..lab.session.bench_checks import bench_checks
 from ..lab.session.geometry import look
 from ..lab.session.manifest import refuse_links_out
 from . import isolation
@@ -28,6 +30,7 @@ from .run import Outcome, Watch, run
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
+NAMED = 5  # files of a config that one line names
 OWN = ("photographs", "dead_leaves", "charts")  # datasets that come with the package and read no folder
 
 
@@ -70,7 +73,10 @@ def export(
     named = study.display.bench
     if bench is not None:
         shutil.copyfile(bench, folder / BENCH)
-    if named and Path(named).name == named:
+    if bench is None and named and _stays_inside(named):
+        if (folder / named).exists():
+            raise UserError(f"{named}: a session has a file of this name of its own; rename the bench file")
+        (folder / named).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(study.folder / named, folder / named)
     real_display = next(iter(displays(chosen).values()))
     spec, described = real_display.spec, real_display.digest
@@ -92,6 +98,8 @@ def export(
     write_manifest(folder, manifest)
     forget_sessions()
     session_photographer.cache_clear()
+    opened = replace(chosen, display=replace(chosen.display, session=folder))
+    session_photographer(folder).write_checks(letter(_bench(opened)).phase)
     return _advance(chosen, folder, watch, threads)
 
 
@@ -109,6 +117,11 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     photographer = session_photographer(folder)
     if not manifest.rounds:  # its export was interrupted
         return _advance(study, folder, watch, threads)
+    checks = bench_checks(photographer)
+    for check in checks:
+        say(check.line)
+    if not all(check.passed for check in checks):
+        raise UserError("nothing was scored. " + " | ".join(check.line for check in checks if not check.passed))
     read: dict[str, str] = {}
     for number in range(1, manifest.rounds + 1):
         faults, captures = photographer.check_round(number)
@@ -123,7 +136,7 @@ def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], 
     except Pending:
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
-    notes = [study.note, *photographer.notes, *findings]
+    notes = [study.note, *photographer.notes, *(check.line for check in checks), *findings]
     advance = _advance(study, folder, watch, threads)
     return replace(advance, study=replace(advance.study, note=" ".join(_sentence(note) for note in notes if note)))
 
@@ -145,7 +158,7 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
     if digest(load(path).text) != manifest.study_sha256:
         raise UserError(f"{path}: is not the config that this session was exported from")
     if config is None and (reason := _reaches_out(path)):
-        raise UserError(f"{path}: {reason}; give --study with your own copy of the config")
+        raise UserError(f"{path}: {reason}; give --study with your own copy of the config, and these beside it")
     bench = folder / BENCH
     study = _on_one_display(load_study(path), bench if bench.is_file() else None, manifest.display)
     display = next(iter(displays(study).values()))
@@ -156,37 +169,46 @@ def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
     return replace(study, display=replace(study.display, session=folder))
 
 
-def _is_beside(bench: object, folder: Path) -> bool:
-    """Whether a bench file lies in the session folder; it is only read, and its devices are not opened."""
-    return isinstance(bench, str) and Path(bench).name == bench and (folder / bench).is_file()
+def _stays_inside(name: str) -> bool:
+    """Whether a relative path leads nowhere but into the folder that it starts in."""
+    return not Path(name).is_absolute() and ".." not in Path(name).parts
 
 
 def _reaches_out(path: Path) -> str:
-    """The first file or dataset of a config that is not part of the package; empty if there is none.
+    """The files and datasets of a config that are not part of the package or the session; empty if there are none.
 
-    A dataset outside ``OWN`` may read folders; code and profiles in files are recognized by their names.
+    A dataset outside ``OWN`` may read folders; code and profiles in files are recognized by their names. A bench file
+    in the session is only read, and its devices are not opened.
     """
     study = load(path).data
     display = study.get("display")
-    if isinstance(display, dict) and _is_beside(display.get("bench"), path.parent):
+    bench = display.get("bench") if isinstance(display, dict) else None
+    if (
+        isinstance(display, dict)
+        and isinstance(bench, str)
+        and _stays_inside(bench)
+        and (path.parent / bench).is_file()
+    ):
         study = {**study, "display": {key: value for key, value in display.items() if key != "bench"}}
 
-    def walk(value: object, key: str) -> str:
+    def walk(value: object, key: str) -> list[str]:
         if isinstance(value, dict):
-            return next((reason for name, item in value.items() if (reason := walk(item, str(name)))), "")
+            return [reason for name, item in value.items() for reason in walk(item, str(name))]
         if isinstance(value, list):
-            return next((reason for item in value if (reason := walk(item, key))), "")
+            return [reason for item in value for reason in walk(item, key)]
         file = isinstance(value, str) and (".py:" in value or value.endswith((".yaml", ".yml")) or "/" in value)
-        is_prose = key in ("title", "note", "label", "source")
+        is_prose = key in ("title", "note", "label", "source", "question", "would_change")
         reaches = (file and not is_prose) or key in ("path", "manifest", "lpips_weights", "weights")
-        return f"names a file ({key}: {str(value)[:60]})" if reaches else ""
+        return [f"{key}: {str(value)[:60]}"] if reaches else []
 
+    named = walk(study, "")
     for section in ("targets", "training"):
         entry = study.get(section)
         dataset = entry.get("dataset", "dead_leaves") if isinstance(entry, dict) else "dead_leaves"
-        if dataset not in OWN:
-            return f"names the dataset '{str(dataset)[:60]}', which may read any folder"
-    return walk(study, "")
+        if dataset not in OWN and f"dataset: {dataset}" not in named:
+            named.append(f"dataset: {str(dataset)[:60]}, which may read any folder")
+    more = f" and {len(named) - NAMED} more" if len(named) > NAMED else ""
+    return f"names what is not in the session ({'; '.join(named[:NAMED])}{more})" if named else ""
 
 
 def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:
@@ -243,5 +265,19 @@ def _advance(study: Study, folder: Path, watch: Watch, threads: int) -> Advance:
     _bench(study).announce_grid()
     photographer = session_photographer(folder)
     outcome = run(study, plan(study), folder / REPORT, Serial(), watch, threads, folder / ARTIFACTS, retry_failed=True)
+    if photographer.wanted and photographer.manifest.rounds and not _takes_rounds(study):
+        raise UserError(
+            f"{folder}: other holograms are computed here than were photographed, and {REPORT}/solutions lacks those; "
+            "bring the whole folder of the session from where it was exported, or import it there"
+        )
     patterns = photographer.write_round() if photographer.wanted else []
     return Advance(study, tuple(patterns), outcome)
+
+
+def _takes_rounds(study: Study) -> bool:
+    """Whether a hologram of the study may depend on photographs of others."""
+    methods = [isolation.find(entry.name, study.folder) for entry in study.methods]
+    exposures = {study.display.exposure, *(entry.exposure for entry in study.methods)}
+    return "matched" in exposures or any(
+        getattr(method, name, False) for method in methods for name in ("trains", "camera", "follows")
+    )

@@ -17,6 +17,8 @@ from ..core.hashing import digest
 # Everything between a phase and its score: optics, simulated bench, registration, metrics. A new version is any new
 # text; every cell is then computed again.
 HARNESS = "4: scattered light taken off before registration"
+# How photographs of a display that exists are scored, beside HARNESS: one new text for a real display's cells alone.
+PHOTOGRAPHS = "means over the target's pixels"
 # The alignment of a photograph with its target without fiducials (``holoeval score``).
 ALIGNMENT = "bf6ba199e08d4095b8e39ad30dae6362d6e0fc515bce398ded0ee8949f3d5df6"
 

@@ -5,6 +5,7 @@ import io
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -18,6 +19,8 @@ from typer.testing import CliRunner
 from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.hashing import digest
+from holobench_eval.display import CalibratedBench
+from holobench_eval.lab.real import RealBench
 from holobench_eval.lab.session import read_manifest
 from tests.support.photographing import Lab
 
@@ -52,7 +55,19 @@ def exported(tmp_path_factory):
     return folder, said
 
 
-def test_photographs_through_files_score_as_the_direct_run_does(exported):
+@pytest.fixture
+def averaged(monkeypatch):
+    """Captures of a direct run are scored by means over the target's pixels, as photographs are."""
+    plain = CalibratedBench.photograph
+
+    def photograph(self, phase, target, **more):
+        shot = plain(self, phase, target, **more)
+        return replace(shot, image=RealBench._averaged(self, shot.capture, target, self.registration))
+
+    monkeypatch.setattr(CalibratedBench, "photograph", photograph)
+
+
+def test_photographs_through_files_score_as_the_direct_run_does(exported, averaged):
     folder, said = exported
     assert "round 1" in said
     run("session", "import", folder / "bench")
@@ -233,7 +248,7 @@ methods:
 """
 
 
-def test_methods_that_learn_and_methods_with_a_camera_go_round_by_round_to_the_direct_scores(tmp_path):
+def test_methods_that_learn_and_methods_with_a_camera_go_round_by_round_to_the_direct_scores(tmp_path, averaged):
     config, folder = tmp_path / "study.yaml", tmp_path / "bench"
     config.write_text(ROUNDS)
     run("session", "export", config, folder)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from holobench_eval.commands.calibrate import calibrate
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.study.calibration import Calibration, Prediction, load_calibration, names
@@ -153,3 +154,29 @@ def test_a_calibration_belongs_to_the_profile_of_its_name_and_to_others_of_its_k
     for other in (load_profile("mine.yaml", tmp_path), load_profile("leto-sled")):
         with pytest.raises(UserError, match=f"'{other.name}' is not fitted to anything"):
             load_calibration(other)
+
+
+def test_a_display_that_no_figures_were_published_for_is_refused_in_one_line_that_says_what_is_right(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "wide.yaml").write_text("like: leto-2020\nname: leto-2020-wide\npanel: {pitch: 8.0e-6}\n")
+    (tmp_path / "same.yaml").write_text(
+        "name: leto-2020\nversion: 1\nseed: 1\ndescription: ours\npanel: {shape: [128, 128], pitch: 6.4e-6, "
+        "wavelengths: [5.2e-7], distance: 0.012, bits: 8}\n"
+    )
+    (tmp_path / "bench.yaml").write_text("name: ours\nversion: 1\nslm: {driver: monitor}\n")
+    for file, said in (
+        (
+            "wide.yaml",
+            "panel.pitch is 8e-06, and the figures that calibrate fits are of 'leto-2020', where it is 6.4e-06",
+        ),
+        ("same.yaml", "profile 'leto-2020': panel.shape"),
+        ("bench.yaml", "bench.yaml: describes a real bench"),
+    ):
+        with pytest.raises(UserError) as refused:
+            calibrate(str(tmp_path / file))
+        line = str(refused.value)
+        assert said in line
+        assert "calibrate takes leto-2020 or leto-aged" in line
+        assert "parametric_model" in line
+        assert "\n" not in line

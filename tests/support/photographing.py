@@ -30,18 +30,27 @@ def another_pose(seed: int) -> Relay:
 
 
 class Lab:
-    """A simulated bench behind files. gain: counts per electron."""
+    """A simulated bench behind files. gain: counts per electron; sign: -1 for a panel with another than stated."""
 
-    def __init__(self, profile: str, panel: tuple[int, int], seed: int, dark: int = 900) -> None:
+    def __init__(self, profile: str, panel: tuple[int, int], seed: int, dark: int = 900, sign: int = 1) -> None:
         description = load_profile(profile).scaled(panel)
         self.bench = SimulatedBench(replace(description, relay=another_pose(seed)))
         self.draw = torch.Generator().manual_seed(seed)
-        self.dark, self.gain = dark, None
+        self.dark, self.gain, self.sign, self.gamma = dark, None, sign, 1.0
 
     def photograph_round(self, folder: Path, number: int) -> None:
         """Show and save what order.csv of a round says."""
+        self._photograph(folder, f"round-{number}")
+
+    def photograph_checks(self, folder: Path, gamma: float = 1.0) -> None:
+        """The patterns that check the bench, with an exposure of their own; gamma: not 1 for a camera that encodes."""
+        session, self.gain, self.gamma = self.gain, None, gamma
+        self._photograph(folder, "checks")
+        self.gain, self.gamma = session, 1.0
+
+    def _photograph(self, folder: Path, name: str) -> None:
         convention = json.loads((folder / "manifest.json").read_text())["phase"]
-        with (folder / "patterns" / f"round-{number}" / "order.csv").open() as file:
+        with (folder / "patterns" / name / "order.csv").open() as file:
             rows = list(csv.DictReader(file))
         wavelengths = sorted({float(row["wavelength_nm"]) for row in rows}, reverse=True)
         for row in rows:
@@ -52,7 +61,7 @@ class Lab:
                 light = self._light(self._phase(levels, convention), channel) * float(row["relative_exposure"])
             if self.gain is None and row["laser"] == "on":
                 self.gain = ROOM * 65535 / float(light.max()) / 2
-            counts = light * (self.gain or 0) + self.dark
+            counts = (light * (self.gain or 0) / 65535) ** self.gamma * 65535 + self.dark
             counts = counts + 20 * torch.randn(counts.shape, generator=self.draw)
             path = folder / row["save_photograph_as"]
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -63,7 +72,7 @@ class Lab:
             levels = levels[:, ::-1]
         if convention["flip_vertical"]:
             levels = levels[::-1]
-        turns = convention["sign"] * levels / convention["two_pi_level"]
+        turns = self.sign * convention["sign"] * levels.astype(np.float32) / convention["two_pi_level"]
         return torch.from_numpy((turns * math.tau + convention["origin"]).astype(np.float32))
 
     def _light(self, phase: torch.Tensor, channel: int) -> torch.Tensor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from ..photograph import MOST_SATURATED
 from .frames import Facts
@@ -20,7 +22,10 @@ DIM = 0.4  # of the camera's range: a series whose brightest sample stays below 
 BRIGHTEST_DARK = 0.2  # of the mean of the other photographs: a dark frame as bright as this had the laser on
 LISTED = 5  # faults of one kind that are named
 THUMBNAIL = 96  # pixels of the longer side of the small pictures that tell which hologram a photograph shows
+SURROUNDINGS = 0.04  # of its longer side: what is smoother there is illumination, in which all photographs are alike
 CLEARLY = 0.1  # by how much another pattern's picture is more like a photograph than its own, in correlation
+GRAIN = 1.0  # region pixels: structure finer than this differs between holograms of one target
+TOLD, SPREAD = 0.02, 4.0  # least correlation of differences that tells two holograms apart; in units of chance
 
 Numbered = Sequence[tuple[Pattern, Facts]]  # the photographs of a round, each with the pattern that it should show
 
@@ -71,7 +76,7 @@ def check_series(patterns: Sequence[Pattern], facts: Mapping[str, Facts]) -> tup
         notes.append("photographs have 8 bits or fewer: what is dark is rounded, which can change a ranking")
     if not all(frame.linear for _, frame in photographs):
         notes.append("photographs are JPEG, decoded as sRGB: not linear in light, so that scores are indicative only")
-    return Series(shares, tuple(notes)), _shortened(faults)
+    return Series(shares, tuple(notes)), shortened(faults)
 
 
 def _white(frames: Sequence[Facts]) -> tuple[float, list[str]]:
@@ -145,7 +150,7 @@ def check_order(
 
     seen, wanted: ``thumbnail`` of the registered photograph, and of what the nominal optics predict, by capture name.
     Holograms of one picture look alike whoever made them, and so do all of the fiducial grid: this finds photographs of
-    another *picture*.
+    another *picture*, and `check_swaps` the others.
     """
     known = [pattern for pattern in patterns if pattern.capture in seen]
     faults = []
@@ -154,18 +159,66 @@ def check_order(
         expected, photographed = (np.stack([rows[pattern.capture] for pattern in same]) for rows in (wanted, seen))
         grids = np.array([pattern.role != HOLOGRAM for pattern in same])
         for index, (pattern, similarity) in enumerate(zip(same, photographed @ expected.T, strict=True)):
+            alike = grids if grids[index] else np.array([_of_one_target(pattern, other) for other in same])
             own = similarity[grids].max() if grids[index] else similarity[index]
-            best = int(np.where(grids, -np.inf, similarity).argmax()) if grids[index] else int(similarity.argmax())
+            best = int(np.where(alike, -np.inf, similarity).argmax())
             if similarity[best] > own + CLEARLY:
                 faults.append(f"wrong order: {pattern.capture} shows pattern {same[best].number:04d}")
-    return _shortened(faults)
+    return faults
+
+
+def _of_one_target(pattern: Pattern, other: Pattern) -> bool:
+    return other is pattern or (pattern.target == other.target != "")
+
+
+def check_swaps(
+    patterns: Sequence[Pattern], seen: Sequence[NDArray[np.float32]], wanted: Sequence[NDArray[np.float32]]
+) -> tuple[list[str], list[str]]:
+    """Faults: photographs of one target and colour that changed places; and the pairs that cannot be told apart.
+
+    seen, wanted: ``grain`` of the registered photograph, and of what the nominal optics predict, by pattern. What all
+    photographs have in common, the target and most faults of the bench, is not in their differences. The difference of
+    two photographs correlates with the difference of their predictions: positively where each is where it belongs,
+    negatively where they changed places, and by chance alone where the predictions are too alike or too wrong.
+    """
+    rows, columns = np.stack(seen), np.stack(wanted)
+    own, least = rows @ columns.T, max(TOLD, SPREAD / rows.shape[1] ** 0.5)
+    changed, alike = set[tuple[int, int]](), list[str]()
+    for first, second in itertools.combinations(range(len(patterns)), 2):
+        if patterns[first].sha256 == patterns[second].sha256:
+            continue
+        moved = own[first, first] + own[second, second] - own[first, second] - own[second, first]
+        scale = np.linalg.norm(rows[first] - rows[second]) * np.linalg.norm(columns[first] - columns[second])
+        correlation = float(moved / max(scale, 1e-12))
+        if correlation < -least:
+            changed |= {(first, second), (second, first)}
+        elif correlation < least:
+            alike.append(f"{patterns[first].capture} and {patterns[second].capture}")
+    shown = [int(best) for best in linear_sum_assignment(-own)[1]]
+    faults = []
+    for index, best in enumerate(shown):
+        here, there = patterns[index].capture, patterns[best]
+        if (index, best) in changed and shown[best] != index:
+            faults.append(f"wrong order: {here} shows pattern {there.number:04d}, of the same target")
+        elif (index, best) in changed and index < best:
+            faults.append(f"wrong order: {here} and {there.capture}, of one target, changed places")
+    return faults, alike
+
+
+def grain(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The finest structure of a picture in linear light, as a row of zero mean and length one."""
+    light = picture / np.float32(max(float(picture.mean()), 1e-12))
+    row = (light - np.asarray(cv2.GaussianBlur(light, (0, 0), GRAIN))).ravel()
+    row -= row.mean()
+    return np.asarray(row / np.float32(max(float(np.linalg.norm(row)), 1e-12)))
 
 
 def thumbnail(picture: NDArray[np.float32]) -> NDArray[np.float64]:
-    """A small picture of square-root light as a row of zero mean and length one."""
+    """A small picture of square-root light, without its surroundings, as a row of zero mean and length one."""
     shrink = max(1.0, max(picture.shape) / THUMBNAIL)
     size = (max(1, round(picture.shape[1] / shrink)), max(1, round(picture.shape[0] / shrink)))
-    small = cv2.resize(np.sqrt(np.maximum(picture, 0)), size, interpolation=cv2.INTER_AREA)
+    small = np.asarray(cv2.resize(np.sqrt(np.maximum(picture, 0)), size, interpolation=cv2.INTER_AREA))
+    small = small - np.asarray(cv2.GaussianBlur(small, (0, 0), SURROUNDINGS * max(size)))
     row = np.asarray(small, dtype=np.float64).ravel() - float(small.mean())
     return np.asarray(row / max(float(np.linalg.norm(row)), 1e-12))
 
@@ -176,7 +229,7 @@ def _line_of(names: Sequence[str], line: str) -> list[str]:
     return [line.format(", ".join(names[:LISTED]) + more)] if names else []
 
 
-def _shortened(faults: Sequence[str]) -> list[str]:
+def shortened(faults: Sequence[str]) -> list[str]:
     """The first faults of every kind, and how many more there are."""
     kinds: dict[str, list[str]] = {}
     for fault in faults:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from ...core.errors import CellError, Pending, UserError
 from ...core.hashing import digest
@@ -22,10 +23,13 @@ from .checks import Series, check_present, check_series
 from .frames import Frame, Plane, facts, find, read_frame
 from .manifest import (
     CAPTURES,
+    CHECKS,
     DARK,
     FIDUCIAL,
+    LETTER,
     PATTERNS,
     REPEAT,
+    REVERSED,
     Manifest,
     Pattern,
     capture_of,
@@ -34,7 +38,7 @@ from .manifest import (
     read_manifest,
     write_manifest,
 )
-from .order import Showing, ordered
+from .order import Showing, check_showings, ordered
 
 
 class FolderPhotographer:
@@ -79,24 +83,25 @@ class FolderPhotographer:
 
     def light(self, pattern: Pattern) -> Plane:
         """A photograph ``(Hs, Ws)`` with the dark level taken off, in counts per relative exposure, float32."""
-        bias, rate = self._dark_of(pattern.round, pattern.colour)
+        bias, rate = self.dark_of(pattern.round, pattern.colour)
         dark = bias + rate * np.float32(pattern.exposure)
-        return np.asarray((self._frame(pattern) - dark) / np.float32(pattern.exposure))
+        return np.asarray((self.counts(pattern) - dark) / np.float32(pattern.exposure))
 
-    def _dark_of(self, round_: int, colour: int) -> tuple[Plane, Plane]:
+    def dark_of(self, round_: int, colour: int) -> tuple[Plane, Plane]:
         """Counts without light, and by how much they grow with the relative exposure, sample by sample."""
         if (round_, colour) not in self._dark:
             frames: dict[float, list[Plane]] = {}
             for pattern in self.manifest.of_round(round_):
                 if pattern.role == DARK and pattern.colour == colour:
-                    frames.setdefault(pattern.exposure, []).append(self._frame(pattern))
+                    frames.setdefault(pattern.exposure, []).append(self.counts(pattern))
             short, long = min(frames), max(frames)
             low, high = (np.asarray(np.mean(frames[exposure], axis=0), dtype=np.float32) for exposure in (short, long))
             rate = np.asarray((high - low) / np.float32(max(long - short, 1e-9)), dtype=np.float32)
             self._dark[round_, colour] = np.asarray(low - rate * np.float32(short), dtype=np.float32), rate
         return self._dark[round_, colour]
 
-    def _frame(self, pattern: Pattern) -> Plane:
+    def counts(self, pattern: Pattern) -> Plane:
+        """A photograph ``(Hs, Ws)`` as the camera counted it. CellError for one that is gone or has changed."""
         path = find(self.folder, pattern.capture)
         if path is None:
             raise CellError(f"{pattern.capture}: the photograph is gone")
@@ -147,7 +152,8 @@ class FolderPhotographer:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader of the scores should know of the photographs, a line each."""
-        return tuple(dict.fromkeys(note for series in self._series.values() for note in series.notes))
+        scored = (series for number, series in self._series.items() if number != CHECKS)
+        return tuple(dict.fromkeys(note for series in scored for note in series.notes))
 
     def write_round(self) -> list[Pattern]:
         """Write the patterns of everything that is wanted, and ``order.csv``; those of the new round."""
@@ -159,46 +165,66 @@ class FolderPhotographer:
         patterns: list[Pattern] = []
         for showing in showings:
             patterns += self._written(showing, number, len(patterns))
-        folder = self.folder / Path(patterns[0].file).parent
-        _write_order(folder / "order.csv", patterns, self.manifest.wavelengths)
-        write_atomically(folder / "README.txt", _readme(number, len(patterns)).encode())
-        (inside(self.folder, patterns[0].capture).parent).mkdir(parents=True, exist_ok=True)
-        # last, so that a round that the manifest has is whole
-        self.manifest = replace(self.manifest, patterns=(*self.manifest.patterns, *patterns))
-        write_manifest(self.folder, self.manifest)
+        self._finish(patterns, _readme(number, len(patterns)))
         self._known |= {(pattern.key, pattern.colour): pattern for pattern in patterns}
         self.wanted.clear()
         return patterns
 
     def _written(self, showing: Showing, round_: int, before: int) -> list[Pattern]:
-        colours = range(len(self.manifest.wavelengths))
-        request, manifest = showing.request, self.manifest
-        if request is None:
-            levels: Levels = np.zeros((len(colours), *manifest.panel), dtype=np.uint8)
-        else:
-            levels = manifest.phase.levels(request.phase)
+        request, phase = showing.request, self.manifest.phase
         exposure = showing.exposure if request is None else self._exposure(request)
         counted = digest([showing.role, round_, showing.copy, showing.exposure])
         key = self._key(request) if request and showing.role != REPEAT else counted
+        target = digest(request.target) if request and request.target else ""
+        levels = None if request is None else phase.levels(request.phase)
+        return self._shown(showing.role, levels, exposure, key, target, (round_, before))
+
+    def _shown(
+        self, role: str, levels: Levels | None, exposure: float, key: str, target: str, place: tuple[int, int]
+    ) -> list[Pattern]:
+        """Write levels ``(C, H, W)``, or all zero, and describe them; place: round, and patterns before in it."""
+        round_, before = place
         patterns = []
-        for colour in colours:
+        for colour in range(len(self.manifest.wavelengths)):
             number = before + colour + 1
+            plane = np.zeros(self.manifest.panel, dtype=np.uint8) if levels is None else levels[colour]
             path = inside(self.folder, file_of(round_, number))
-            write_png(path, torch.from_numpy(levels[colour][None]), bits=8)
+            write_png(path, torch.from_numpy(plane[None]), bits=8)
             patterns.append(
                 Pattern(
                     round=round_,
                     number=number,
-                    role=showing.role,  # type: ignore[arg-type]
+                    role=role,  # type: ignore[arg-type]
                     colour=colour,
                     exposure=exposure,
                     key=key,
                     sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
                     file=file_of(round_, number),
                     capture=capture_of(round_, number),
+                    target=target,
                 )
             )
         return patterns
+
+    def write_checks(self, letter: Tensor) -> None:
+        """Write the patterns that check the bench; letter: phase ``(C, H, W)`` [rad] of `preflight.phase_sign`."""
+        phase, patterns = self.manifest.phase, list[Pattern]()
+        as_set, other = phase.levels(letter), replace(phase, sign=-phase.sign).levels(letter)
+        for index, (role, exposure) in enumerate(check_showings(self.manifest.fixed_exposure)):
+            levels = {LETTER: as_set, REVERSED: other}.get(role)
+            key = digest([role, index])
+            patterns += self._shown(role, levels, exposure, key, "", (CHECKS, len(patterns)))
+        self._finish(patterns, _checks_readme(len(patterns)))
+
+    def _finish(self, patterns: Sequence[Pattern], readme: str) -> None:
+        """What a person or a script needs beside the patterns of a round, and the round in the manifest."""
+        folder = self.folder / Path(patterns[0].file).parent
+        _write_order(folder / "order.csv", patterns, self.manifest.wavelengths)
+        write_atomically(folder / "README.txt", readme.encode())
+        (inside(self.folder, patterns[0].capture).parent).mkdir(parents=True, exist_ok=True)
+        # last, so that a round that the manifest has is whole
+        self.manifest = replace(self.manifest, patterns=(*self.manifest.patterns, *patterns))
+        write_manifest(self.folder, self.manifest)
 
     def _exposure(self, request: Request) -> float:
         return 1.0 if self.manifest.fixed_exposure else request.relative_exposure
@@ -246,4 +272,15 @@ def _readme(number: int, patterns: int) -> str:
 3. Save each under the name in 'save_photograph_as' ({CAPTURES}/round-{number}/NNNN.png; 8- or 16-bit PNG or TIFF, or
    the camera's RAW; the same kind for all).
 4. holoeval session import with the folder of manifest.json
+"""
+
+
+def _checks_readme(patterns: int) -> str:
+    """What to do with the patterns that check the bench, in words."""
+    return f"""Checks of the bench: {patterns} patterns. Photograph them before anything else, or leave them out.
+
+1. Show them as README.txt of {PATTERNS}/round-1 says. Choose an exposure time for these patterns alone, with which the
+   first with the laser on is bright and does not saturate, and multiply it by relative_exposure.
+2. Save each under the name in 'save_photograph_as'.
+3. holoeval session import says whether camera and panel are as they should be, a line each.
 """

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from skimage.registration import phase_cross_correlation
 
 from ...core.errors import CellError, UserError
-from ...core.io import decode_levels, write_png
+from ...core.io import write_png
 from ...imaging.grid import fiducial
 from ...imaging.grid_picture import grid_picture
-from ...optics.phase import blaze
 from ..real import RealBench
 from . import FolderPhotographer
-from .checks import check_order, thumbnail
-from .manifest import DARK, REPEAT, Pattern, inside
+from .checks import LISTED, check_order, check_swaps, grain, shortened, thumbnail
+from .manifest import DARK, REPEAT, Pattern
+from .prediction import predicted
+from .sign import sign_hint
 
 FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol v1, point 3)
 FINENESS = 20  # steps a pixel of the correlation that measures drift
@@ -35,7 +36,8 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
     try:
         registration = bench.registration
     except CellError as error:
-        raise UserError(f"the camera cannot be registered, and nothing was scored: {error}") from None
+        hint = sign_hint(bench, photographer)
+        raise UserError(f"the camera cannot be registered, and nothing was scored: {error}; {hint}") from None
     residual = f"registration: {max(registration.residual):.2f} px rms"
     second = bench.disagreement
     check = "another algorithm finds none" if np.isnan(second) else f"another algorithm differs by {second:.2f} px"
@@ -48,12 +50,15 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
             f"the camera or the picture moved by {moved:.1f} px between repeats, more than {FURTHEST_DRIFT:g}; fix the "
             "bench and photograph a new session"
         )
-    faults = misplaced(bench, photographer)
+    faults, alike = misplaced(bench, photographer)
     if faults:
         raise UserError("nothing was scored. " + " | ".join(faults))
+    if alike:
+        say(alike)
     return (
         f"geometry: {residual}, {check} at the corners",
         f"drift between the repeats of one hologram: {moved:.2f} px and {dimmed:.1%} of the light at most",
+        *([alike] if alike else []),
     )
 
 
@@ -89,26 +94,32 @@ def drift(bench: RealBench, photographer: FolderPhotographer) -> tuple[float, fl
     return moved, dimmed
 
 
-def misplaced(bench: RealBench, photographer: FolderPhotographer) -> list[str]:
-    """Photographs of another pattern than their name says, a line each."""
-    manifest, faults = photographer.manifest, list[str]()
-    carrier = blaze(bench.spec.shape, bench.carrier)
+def misplaced(bench: RealBench, photographer: FolderPhotographer) -> tuple[list[str], str]:
+    """Photographs of another pattern than their name says, a line each; and a line on those that nobody can tell."""
+    manifest, faults, alike = photographer.manifest, list[str](), list[str]()
     for number in range(1, manifest.rounds + 1):
-        patterns = manifest.of_round(number)
+        patterns = [pattern for pattern in manifest.of_round(number) if pattern.role != DARK]
         seen, wanted = {}, {}
-        for pattern in patterns:
-            if pattern.role != DARK:
-                seen[pattern.capture] = thumbnail(_rectified(bench, photographer, pattern))
-                phase = manifest.phase.phase(_levels(photographer.folder, pattern)) - carrier
-                field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
-                wanted[pattern.capture] = thumbnail(bench.spec.region.crop(field.abs().square()).numpy())
+        for (target, _), group in _by_target(patterns):
+            grains = []
+            for pattern in group:
+                light, wished = _rectified(bench, photographer, pattern), predicted(bench, photographer, pattern)
+                seen[pattern.capture], wanted[pattern.capture] = thumbnail(light), thumbnail(wished)
+                grains.append((grain(light), grain(wished)) if target else ())
+            if target and len(group) > 1:
+                swapped, unknown = check_swaps(group, *zip(*grains, strict=True))
+                faults, alike = [*faults, *swapped], [*alike, *unknown]
         faults += check_order(patterns, seen, wanted)
-    return faults
+    pairs = f"{len(alike)} pair(s) of photographs of one target cannot be told apart, and may have changed places"
+    named = "; ".join(alike[:LISTED]) + (" and others" if len(alike) > LISTED else "")
+    return shortened(faults), f"order: {pairs}: {named}" if alike else ""
 
 
-def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:
-    path = inside(folder, pattern.file)
-    content = path.read_bytes() if path.is_file() else b""
-    if hashlib.sha256(content).hexdigest() != pattern.sha256:
-        raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
-    return np.asarray(decode_levels(content), dtype=np.uint8)
+def _by_target(patterns: Sequence[Pattern]) -> Iterator[tuple[tuple[str, int], list[Pattern]]]:
+    """Patterns by target and colour; those that are not scored by colour."""
+
+    def kind(pattern: Pattern) -> tuple[str, int]:
+        return pattern.target, pattern.colour
+
+    for key, group in groupby(sorted(patterns, key=kind), kind):
+        yield key, list(group)

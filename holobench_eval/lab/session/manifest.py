@@ -25,8 +25,10 @@ FORMAT = 1
 LARGEST_MANIFEST = 64 * 2**20  # bytes, about 200,000 patterns
 SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 DARK, FIDUCIAL, HOLOGRAM, REPEAT = "dark", "fiducial", "hologram", "repeat"
+LETTER, REVERSED = "letter", "reversed"
+CHECKS = 0  # the round of the patterns that check the bench, which may be left out
 
-Role = Literal["dark", "fiducial", "hologram", "repeat"]
+Role = Literal["dark", "fiducial", "hologram", "repeat", "letter", "reversed"]
 Hex = Annotated[str, Len(64, 64)]
 Number = Annotated[int, Interval(ge=1, le=1_000_000)]
 
@@ -35,12 +37,15 @@ Number = Annotated[int, Interval(ge=1, le=1_000_000)]
 class Pattern:
     """One gray picture for the panel.
 
-    number: its place in the order of its round, from 1; colour: index of the wavelength it is lit with; exposure:
-    exposure time relative to the session's own; key: tells what it is needed for; sha256: of the PNG file; file,
-    capture: their names (see ``file_of`` and ``capture_of``), which are compared and not used.
+    round: from 1, `CHECKS` for the patterns that check the bench; number: its place in the order of its round, from 1;
+    role: ``letter`` and ``reversed`` are the test pattern with the sign of the phase as stated and with the other one;
+    colour: index of the wavelength it is lit with; exposure: exposure time relative to the session's own; key: tells
+    what it is needed for; sha256: of the PNG file; file, capture: their names (see ``file_of`` and ``capture_of``),
+    which are compared and not used; target: sha256 of the name of the target that it is scored against, empty where it
+    is not scored.
     """
 
-    round: Number
+    round: Annotated[int, Interval(ge=0, le=1_000_000)]
     number: Number
     role: Role
     colour: Annotated[int, Interval(ge=0, le=2)]
@@ -49,6 +54,7 @@ class Pattern:
     sha256: Hex
     file: Annotated[str, MaxLen(100)]
     capture: Annotated[str, MaxLen(100)]
+    target: Annotated[str, MaxLen(64)] = ""
 
 
 @dataclass(frozen=True)
@@ -84,12 +90,16 @@ class Manifest:
 
 def file_of(round_: int, number: int) -> str:
     """Where the PNG of a pattern is, in the session's folder."""
-    return f"{PATTERNS}/round-{round_}/{number:04d}.png"
+    return f"{PATTERNS}/{_folder_of(round_)}/{number:04d}.png"
 
 
 def capture_of(round_: int, number: int) -> str:
     """Where the photograph of a pattern belongs, without the ending of its kind."""
-    return f"{CAPTURES}/round-{round_}/{number:04d}"
+    return f"{CAPTURES}/{_folder_of(round_)}/{number:04d}"
+
+
+def _folder_of(round_: int) -> str:
+    return "checks" if round_ == CHECKS else f"round-{round_}"
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
@@ -129,7 +139,7 @@ def _json(path: Path) -> Any:
 
 def _check_names(path: Path, patterns: Sequence[Pattern]) -> None:
     """Refuse numbers that are not 1, 2, 3, ... and names that do not follow from them."""
-    last = (1, 0)
+    last = (0, 0)
     for pattern in patterns:
         here = (pattern.round, pattern.number)
         if here not in ((last[0], last[1] + 1), (last[0] + 1, 1)):

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ..photograph import Request
-from .manifest import DARK, FIDUCIAL, HOLOGRAM, REPEAT
+from ..preflight import EXPOSURES
+from .manifest import DARK, FIDUCIAL, HOLOGRAM, LETTER, REPEAT, REVERSED
 
 BETWEEN_REPEATS = 24  # holograms between two showings of the repeated pattern
 
@@ -42,3 +43,15 @@ def ordered(requests: Sequence[Request], repeated: Request, seed: str, exposures
         yield Showing(HOLOGRAM, request)
     yield Showing(REPEAT, repeated, next(copies))
     yield from (Showing(DARK, None, 1, exposure) for exposure in spread)
+
+
+def check_showings(fixed_exposure: bool) -> list[tuple[str, float]]:
+    """Role and relative exposure of what checks the bench, in the order of showing.
+
+    Dark frames at the ends of the exposures; the letter at the longest, which chooses the samples that linearity is
+    measured on; the letter at all; the letter with the other sign. A camera with one exposure cannot show linearity.
+    """
+    if fixed_exposure:
+        return [(DARK, 1.0), (LETTER, 1.0), (REVERSED, 1.0)]
+    ends = [(DARK, exposure) for exposure in (min(EXPOSURES), max(EXPOSURES))]
+    return [*ends, (LETTER, 1.0), *((LETTER, exposure) for exposure in EXPOSURES), (REVERSED, 1.0)]

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ...core.device import moved
 from ...core.errors import BudgetError, CellError
+from ...core.hashing import digest
 from ...core.io import write_atomically
 from ...display import MeteredDisplay
 from ...display.api import is_plain
@@ -20,10 +21,12 @@ from ..artifacts import Artifact, read_tensors
 from ..cost import Cost
 from ..displays import Condition
 from ..isolation.read_files import digests
+from ..plan import Cell
 from . import starts
 from .job import Job
 
 FOLDER = "solutions"
+PATHS = ("path", "manifest")  # parameters of data sets that say where images lie; a cell has the digest of its image
 
 Solve = Callable[[Any, MeteredDisplay], Any]  # calls a method with its handle of the display
 
@@ -96,8 +99,8 @@ def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[A
 
 
 def kept(job: Job, make: Callable[[], Solution]) -> Solution:
-    """The solution of a task, computed once and kept in the output folder under the id of the task's first cell."""
-    path = job.setting.output / FOLDER / f"{job.task.cells[0].id}.pt"
+    """The solution of a task, computed once and kept in the output folder under what it depends on."""
+    path = job.setting.output / FOLDER / f"{_identity(job.task.cells[0])}.pt"
     if path.is_file():
         content = read_tensors(path)
         learned = job.learned(job.task.preparation)
@@ -107,3 +110,15 @@ def kept(job: Job, make: Callable[[], Solution]) -> Solution:
     torch.save({"phase": fresh.phase, **account}, buffer)
     write_atomically(path, buffer.getvalue())
     return fresh
+
+
+def _identity(cell: Cell) -> str:
+    """The name of a cell's solution: the same wherever its images lie, and whatever can be measured there and how.
+
+    A session is imported where another version of the harness, other metrics or other folders may be.
+    """
+    description = cell.description()
+    for measured in ("harness_sha256", "metrics", "protocol"):
+        del description[measured]
+    params = description["dataset_params"]
+    return digest({**description, "dataset_params": {name: params[name] for name in params if name not in PATHS}})

@@ -1,0 +1,121 @@
+"""A session folder is exported in one place and imported in another, with nothing left where it came from."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from holobench_eval.commands import app
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.session import read_manifest
+from tests.support.photographing import Lab
+
+# leto-mild on this panel
+BENCH = """\
+name: ours
+version: 1
+panel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [6.36e-7, 5.17e-7, 4.46e-7], distance: 0.0118518518, bits: 8, \
+pupil: 0.8, region: 0.8}
+"""
+STUDY = """\
+title: Moved
+display: {bench: benches/ours.yaml}
+targets: {dataset: photographs, params: {count: 1}}
+methods: [double_phase]
+protocol: {metrics: [psnr]}
+"""
+OWN = STUDY.replace("photographs, params: {count: 1}", "folder, params: {path: images}").replace(
+    "double_phase", "own.py:Elsewhere"
+)
+METHOD = """\
+from dataclasses import dataclass
+
+import torch
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    def solve(self, target, bench):
+        torch.seed()  # as on another machine: no two solutions are the same
+        return 6.2831 * torch.rand(*target.shape[:2], *bench.spec.shape)
+"""
+
+
+def lay_out(folder: Path, study: str) -> None:
+    (folder / "benches").mkdir(parents=True)
+    (folder / "images").mkdir()
+    (folder / "benches" / "ours.yaml").write_text(BENCH)
+    (folder / "study.yaml").write_text(study)
+    (folder / "own.py").write_text(METHOD)
+    draw = np.random.default_rng(0)
+    smooth = cv2.resize(draw.uniform(0, 255, (6, 6, 3)).astype(np.uint8), (160, 160), interpolation=cv2.INTER_CUBIC)
+    assert cv2.imwrite(str(folder / "images" / "one.png"), smooth)
+
+
+def run(*arguments: object) -> tuple[str, str]:
+    done = CliRunner().invoke(app, list(map(str, arguments)))
+    assert done.exit_code == 0 or isinstance(done.exception, UserError), (done.output, done.exception)
+    return done.output, str(done.exception or "")
+
+
+def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, study: str) -> Path:
+    """The folder of a photographed session in its new place; the old one is gone."""
+    old, new = tmp_path / "old", tmp_path / "new" / "place"
+    lay_out(old, study)
+    monkeypatch.chdir(old)
+    assert not run("session", "export", "study.yaml", "session")[1]
+    Lab("leto-mild", (128, 128), seed=6).photograph_round(old / "session", 1)
+    new.mkdir(parents=True)
+    monkeypatch.chdir(new)
+    shutil.move(old / "session", new / "session")
+    shutil.rmtree(old)
+    return new / "session"
+
+
+def test_a_session_with_its_bench_file_imports_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = moved(tmp_path, monkeypatch, STUDY)
+    said, failure = run("session", "import", session)
+    assert not failure
+    assert "table.csv" in said
+
+
+def test_what_the_study_needs_and_the_session_does_not_hold_is_named_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = moved(tmp_path, monkeypatch, OWN)
+    _, failure = run("session", "import", session)
+    for missing in ("path: images", "own.py:Elsewhere", "dataset: folder", "give --study"):
+        assert missing in failure
+    assert "benches" not in failure
+    assert "\n" not in failure
+
+
+def test_holograms_are_those_of_the_export_even_where_version_metrics_and_folders_are_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = moved(tmp_path, monkeypatch, OWN)
+    lay_out(tmp_path / "mine", OWN)
+    monkeypatch.chdir(tmp_path / "mine")
+    monkeypatch.setattr("holobench_eval.study.plan.HARNESS", "another version")
+    said, failure = run("session", "import", session, "--study", "study.yaml")
+    assert not failure
+    assert "table.csv" in said
+    assert read_manifest(session).rounds == 1
+
+
+def test_a_session_without_its_solutions_says_so_and_asks_for_no_new_photographs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = moved(tmp_path, monkeypatch, OWN)
+    lay_out(tmp_path / "mine", OWN)
+    monkeypatch.chdir(tmp_path / "mine")
+    shutil.rmtree(session / "report")
+    _, failure = run("session", "import", session, "--study", "study.yaml")
+    assert "report/solutions lacks those" in failure
+    assert "\n" not in failure
+    assert read_manifest(session).rounds == 1

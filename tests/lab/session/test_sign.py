@@ -1,0 +1,49 @@
+"""A panel whose phase has the other sign than stated is named where no fiducial grid is found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from holobench_eval.commands import app
+from holobench_eval.core.errors import UserError
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from tests.support.photographing import Lab
+
+STUDY = """\
+title: Wrong way round
+display: {{profiles: [{profile}], panel: [144, 144]}}
+targets: {{dataset: photographs, params: {{count: 1}}}}
+methods: [double_phase]
+protocol: {{metrics: [psnr]}}
+"""
+
+
+def refused(folder: Path, profile: str, lab: Lab) -> str:
+    """The one line with which the import of photographs from a lab ends."""
+    (folder / "study.yaml").write_text(STUDY.format(profile=profile))
+    session = folder / "bench"
+    assert CliRunner().invoke(app, ["session", "export", str(folder / "study.yaml"), str(session)]).exit_code == 0
+    lab.photograph_round(session, 1)
+    done = CliRunner().invoke(app, ["session", "import", str(session)])
+    assert isinstance(done.exception, UserError), done.output
+    assert "\n" not in str(done.exception)
+    return str(done.exception)
+
+
+@pytest.mark.parametrize("profile", ["leto-mild", "leto-aged"])
+def test_photographs_of_the_conjugate_pattern_name_the_sign(tmp_path: Path, profile: str) -> None:
+    line = refused(tmp_path, profile, Lab(profile, (144, 144), seed=3, sign=-1))
+    assert "the likely cause is the sign of the phase" in line
+    assert "set phase.sign: -1 in the bench file" in line
+
+
+def test_a_picture_that_is_out_of_focus_for_another_reason_does_not_name_the_sign(tmp_path: Path) -> None:
+    lab = Lab("leto-mild", (144, 144), seed=3)
+    panel = replace(lab.bench.profile.panel, distance=1.5 * lab.bench.profile.panel.distance)
+    lab.bench = SimulatedBench(replace(lab.bench.profile, panel=panel))
+    line = refused(tmp_path, "leto-mild", lab)
+    assert "the photographs do not tell whether phase.sign: 1 is right" in line
