@@ -38,6 +38,13 @@ def test_names_are_unique_and_available_without_weights() -> None:
     assert all(metric.available() is None for metric in catalogue() if not metric.name.startswith("lpips"))
 
 
+def test_tables_find_a_title_a_unit_and_a_direction() -> None:
+    for metric in catalogue():
+        assert metric.direction in ("higher", "lower")
+        assert metric.name.startswith(metric.title.split()[0].casefold().replace("-", "_"))
+        assert (metric.unit, metric.digits) == (("dB", 2) if metric.name == "psnr" else ("", 3))
+
+
 def test_equal_images_get_the_best_value_and_others_a_worse(metric: Metric, pair: tuple[Tensor, Tensor]) -> None:
     image, target = pair
     assert float(metric.function(target, target)) == pytest.approx(metric.best, abs=1e-9)
