@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from holobench_eval.imaging.similarity import (
-    FAINTEST,
     SIDE,
     evened,
     reduced,
@@ -72,6 +71,12 @@ def test_what_lies_outside_has_no_part_in_an_evened_picture():
     assert not evened(TARGET, inside)[:, 90:].any()
 
 
+def test_even_light_that_is_added_changes_nothing_not_even_at_the_border_of_the_capture():
+    inside = np.ones(TARGET.shape, bool)
+    inside[:, 90:] = inside[:20] = False
+    assert np.abs(evened(TARGET + 1, inside) - evened(TARGET, inside)).max() < 1e-3
+
+
 def test_a_picture_is_wholly_like_itself_and_no_part_is_displaced():
     alike = similarity(TARGET, TARGET, warp())
     assert alike.overall == pytest.approx(1.0, abs=1e-3)
@@ -100,7 +105,7 @@ def test_half_a_target_that_is_covered_can_be_compared_and_less_cannot():
 def test_parts_are_ninths_and_hold_structure_above_a_level_of_eight_bits():
     flat = np.full((90, 60), 0.5, np.float32)
     draw = np.random.default_rng(0)
-    flat[30:60, :20] += 1.5 * FAINTEST * draw.choice([-1, 1], (30, 20)).astype(np.float32)
-    flat[:30, 40:] += 0.5 * FAINTEST * draw.choice([-1, 1], (30, 20)).astype(np.float32)
+    flat[30:60, :20] += 0.006 * draw.choice([-1, 1], (30, 20)).astype(np.float32)
+    flat[:30, 40:] += 0.002 * draw.choice([-1, 1], (30, 20)).astype(np.float32)
     assert structured(flat) == [(slice(30, 60), slice(0, 20))]
     assert structured(np.full((90, 60), 0.5, np.float32)) == []
