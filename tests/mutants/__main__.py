@@ -51,18 +51,16 @@ def main() -> int:
     os.chdir(ROOT)
     preload()
     known: dict[str, Any] = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    asked = [module for module in modules() if module in (given.module or modules())]
-    for room, names in groupby(asked, key=lambda module: module.split("/")[1]):
-        drawn: list[tuple[str, Mutant]] = []
-        for name in names:
-            drawn += [(name, mutant) for mutant in _drawn(name, given, known)]
+    asked = [name for name in modules() if name in (given.module or modules()) and (name in known or not given.again)]
+    for room, names in groupby(asked, key=lambda name: name.split("/")[1]):
+        drawn = [(name, mutant) for name in names for mutant in _drawn(name, given, known)]
         for (name, mutant), verdict in zip(drawn, _verdicts(room, drawn, given.seconds), strict=True):
             if verdict == "survived":
                 known[name]["survivors"].append(mutant.name)
             else:
                 known[name][verdict] += 1
-        for name in {name for name, _ in drawn} if not given.again else ():
-            known[name]["at first"] = len(known[name]["survivors"])
+        for row in known.values():
+            row.setdefault("at first", len(row["survivors"]))
         RESULTS.write_text(json.dumps(known, indent=1, sort_keys=True, ensure_ascii=False) + "\n")
     (FOLDER / "report.md").write_text(text(known, yaml.safe_load((FOLDER / "reasons.yaml").read_text()) or {}))
     return 0
@@ -70,8 +68,8 @@ def main() -> int:
 
 def _drawn(name: str, given: argparse.Namespace, known: dict[str, Any]) -> list[Mutant]:
     """The mutants of a module that are put to the tests; their row of results is begun anew."""
-    before = known.get(name, {"survivors": []})
-    most, seed = (before["most"], before["seed"]) if given.again and name in known else (given.most, given.seed)
+    before = known[name] if given.again else {"most": given.most, "seed": given.seed}
+    most, seed = before["most"], before["seed"]
 
     def sample(count: int) -> list[int]:
         return sorted(random.Random(f"{seed}:{name}").sample(range(count), min(most, count)))
@@ -79,7 +77,7 @@ def _drawn(name: str, given: argparse.Namespace, known: dict[str, Any]) -> list[
     count, made = mutants((ROOT / name).read_text(), str(ROOT / name), sample)
     drawn = [mutant for mutant in made if not given.again or mutant.name in before["survivors"]]
     fresh = {"mutants": count, "tested": len(drawn), "seed": seed, "most": most, "killed": 0, "timed out": 0}
-    known[name] = {**(before if given.again and name in known else fresh), "survivors": []}
+    known[name] = {**(before if given.again else fresh), "survivors": []}
     return drawn
 
 
