@@ -141,8 +141,9 @@ def test_gradient_is_finite_for_equal_and_for_black_images(metric: Metric, pair:
     if not metric.differentiable:
         pytest.skip("not differentiable by its own statement")
     _, target = pair
-    for start in (target, torch.zeros_like(target)):
+    black = torch.zeros_like(target)
+    for start, other in ((target, target), (black, target), (black, black)):
         variable = start.clone().requires_grad_()
-        metric.function(variable, target).backward()
+        metric.function(variable, other).backward()
         assert variable.grad is not None
         assert bool(variable.grad.isfinite().all())

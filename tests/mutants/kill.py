@@ -2,7 +2,8 @@
 
 A mutant in the body of a function takes the function's place in a fork of a process that has collected the tests; any
 other, and one whose function runs while the package is imported, needs a process that imports the package anew. Tests
-that reach the statement come first, the quickest before others, then those that reach its file.
+that reach the statement come first, then those that reach its file and, for what is executed on import, all others; of
+each the quickest come first.
 """
 
 from __future__ import annotations
@@ -139,7 +140,8 @@ class _Campaign:
             near = {test for line in mutant.lines for test in lines.get(line, ())}
             # A shared fixture or a cache is filled in one test, and others that depend on it do not reach the line.
             reaching = {test for tests in lines.values() for test in tests}
-            tests = sorted(reaching, key=lambda test: (test not in near, seconds[test]))
+            order = {test: (test not in near, test not in reaching, seconds[test]) for test in seconds}
+            tests = sorted(seconds if imported else reaching, key=order.__getitem__)
             taken = accumulate(seconds[test] for test in tests)
             kept = {test: seconds[test] for test, sum_ in zip(tests, taken, strict=True) if sum_ <= self.most}
             code = None if imported else _code_of(mutant.code, mutant.function)
