@@ -62,7 +62,7 @@ def tail_error(size: int, spread_pixels: float, padded: int) -> float:
     return math.sqrt(2 * float(np.sum((1 - offset / size) * response**2)) / kept)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=256, typed=True)  # True is refused, though it equals 1
 def padded_size(
     size: int, spread_pixels: float, soft_edge: int | None, padding: Padding, error: float = DEFAULT_ERROR
 ) -> int:

@@ -10,8 +10,9 @@ import pytest
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.imaging import align as aligning
-from holobench_eval.imaging.align import Alignment, align, confirmed
+from holobench_eval.imaging.align import Alignment, accepted, align, confirmed, gray
 from holobench_eval.imaging.shared_pose import sampled, shared
+from holobench_eval.imaging.similarity import Similarity
 from holobench_eval.imaging.warp import Warp
 from tests.support import photographed
 from tests.support.photographed import Array, Picture, captured, corners, mapped, photograph, pose
@@ -98,6 +99,76 @@ def test_a_target_that_is_cut_off_is_refused():
     left = round(float(mapped(homography, corners(SHAPE))[:, 0].min()))
     with pytest.raises(CellError, match=r"beyond the capture|not found"):
         align(np.ascontiguousarray(capture[:, :, left + 25 :]), target)
+
+
+@pytest.mark.parametrize(
+    ("alike", "enough"),
+    [
+        (Similarity(0.6, (0.3,) * 6), True),
+        (Similarity(0.59, (0.9,) * 9), False),
+        (Similarity(0.9, (0.9,) * 4), True),
+        (Similarity(0.9, (0.9,) * 3), False),
+        (Similarity(0.9, (0.9,) * 4 + (0.2,)), False),
+        (Similarity(0.9, (0.9,) * 5 + (0.2,)), True),
+        (Similarity(0.9, (0.9,) * 7 + (0.2,), 1), False),
+        (Similarity(0.9, (0.9,) * 8, 1), True),
+        (Similarity(0.9, (0.9,) * 8, 2), False),
+    ],
+)
+def test_pictures_are_alike_overall_and_in_all_parts_but_one_in_six(alike, enough):
+    assert accepted(alike) == enough
+
+
+def test_gray_is_the_mean_of_the_channels():
+    picture = np.random.default_rng(0).random((3, 4, 5))
+    assert gray(picture) == pytest.approx(picture.sum(0) / 3)
+    assert gray(picture).dtype == np.float32
+
+
+def test_the_symmetries_are_seven_and_keep_a_square_in_its_place():
+    warps = list(aligning._symmetries((50, 50)))
+    places = {tuple(map(tuple, np.round(warp.corners(), 6))) for warp in warps}
+    assert len(warps) == len(places) == 7
+    assert all({*place} == {(0, 0), (49, 0), (0, 49), (49, 49)} for place in places)
+    assert tuple(map(tuple, corners((50, 50)))) not in places
+    wide = np.array([warp.corners().mean(axis=0) for warp in aligning._symmetries((50, 80))])
+    assert np.allclose(wide, [39.5, 24.5])
+
+
+def test_a_camera_sees_no_fold_no_steep_perspective_and_no_extreme_scale_or_place():
+    frame, inside = (400, 500), np.array([[1, 0, 100], [0, 1, 100], [0, 0, 1.0]])
+
+    def sane(*rows, slack=1.0):
+        return aligning._sane(plane(rows), frame, slack)
+
+    assert sane(*inside)
+    assert sane([-1, 0, 400], [0, 1, 100], [0, 0, 1])  # mirrored
+    for scale, fits in ((0.19, False), (0.21, True), (7.9, True), (8.1, False)):
+        assert aligning._sane(plane([[scale, 0, 0], [0, scale, 0], [0, 0, 1]]), (2000, 2500)) == fits
+    room = 2.0 + 0.05 * 500  # two pixels and a twentieth of the frame
+    for beyond, fits in ((room - 0.5, True), (room + 0.5, False)):
+        for across, down in ((-beyond, 0), (0, -beyond), (500 - 249 + beyond, 0), (0, 400 - 199 + beyond)):
+            assert sane([1, 0, across], [0, 1, down], [0, 0, 1]) == fits
+    assert sane([1, 0, -10 * room + 5], [0, 1, 0], [0, 0, 1], slack=10.0)
+    assert not sane([1, 0, 100], [0, 1, 100], [-1 / 240, 0, 1])  # folded
+    assert not sane([np.nan, 0, 100], [0, 1, 100], [0, 0, 1])
+    for steepness, fits in ((2.4, True), (2.6, False)):  # between the scales at two corners
+        tilt = (steepness ** (2 / 3) - 1) / 249
+        assert sane([1, 0, 50], [0, 1, 50], [tilt, 0, 1]) == fits
+
+
+@pytest.mark.parametrize(("across", "down"), [(1, 0), (-1, 0), (0, 1), (0, -1)])
+def test_two_pixels_of_a_target_may_lie_beyond_the_capture(across, down):
+    frame = (2 * SHAPE[0], 2 * SHAPE[1])
+
+    def refuse(beyond):
+        middle = np.array([0.5, 0.5])  # two capture pixels a target pixel, borders on borders
+        x, y = middle + 2 * beyond * np.array([across, down])
+        aligning._refuse_overhang(plane([[2, 0, x], [0, 2, y], [0, 0, 1]]), frame)
+
+    refuse(1.9)
+    with pytest.raises(CellError, match="3 of its pixels beyond the capture"):
+        refuse(2.8)
 
 
 def test_a_given_warp_is_confirmed_only_where_it_fits():

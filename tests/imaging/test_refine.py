@@ -54,6 +54,26 @@ def test_a_known_move_is_recovered_to_a_twentieth_of_a_pixel(name, move):
     assert (found.image - target)[inner].square().mean() < 0.1 * (moved - target)[inner].square().mean()
 
 
+@pytest.mark.parametrize("rows", [slice(30, -30), slice(0, None)])
+def test_a_turn_is_about_the_centre_of_a_target_of_any_shape(rows):
+    target, moved = (
+        seen(PICTURES["coffee"])[:, rows, 20:-20],
+        seen(PICTURES["coffee"], 0.7, -0.4, 0.09)[:, rows, 20:-20],
+    )
+    found = refine(moved, target)
+    assert (found.dx, found.dy) == pytest.approx((0.7, -0.4), abs=0.05)
+    assert found.theta == pytest.approx(0.09, abs=0.02)
+    inner = np.s_[:, 6:-6, 6:-6]
+    assert (found.image - target)[inner].square().mean() < 0.1 * (moved - target)[inner].square().mean()
+
+
+@pytest.mark.parametrize("move", [(1.9, 0.0, 0.0), (1.3, -1.3, 0.0), (0.0, 0.0, -0.09)])
+def test_a_move_just_within_the_bounds_is_found(move):
+    found = refine(seen(PICTURES["astronaut"], *move), seen(PICTURES["astronaut"]))
+    assert (found.dx, found.dy) == pytest.approx(move[:2], abs=0.05)
+    assert found.theta == pytest.approx(move[2], abs=0.02)
+
+
 @pytest.mark.parametrize("name", PICTURES)
 def test_an_aligned_pair_stays(name):
     target = seen(PICTURES[name])
@@ -121,3 +141,7 @@ def test_one_move_serves_all_channels():
 def test_shapes_that_differ_are_refused():
     with pytest.raises(ValueError, match="must both be"):
         refine(torch.zeros(3, 64, 64), torch.zeros(3, 64, 65))
+    for small in ((3, 16, 64), (3, 64, 16), (64, 64)):
+        with pytest.raises(ValueError, match="above 16 px"):
+            refine(torch.zeros(small), torch.zeros(small))
+    assert refine(torch.zeros(1, 17, 17), torch.zeros(1, 17, 17)).image.shape == (1, 17, 17)

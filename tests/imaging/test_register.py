@@ -87,6 +87,16 @@ def test_a_distortion_is_fitted_where_there_is_one_and_left_out_where_there_is_n
         assert corner_error(found, where) < 0.06
 
 
+def test_a_distortion_is_fitted_in_speckle_too(grid):
+    bend = random("bend").normal(size=(6, 2)) * 0.8
+    bend[:3] = 0
+    draw = random("distortion in speckle")
+    where = pose(draw, SHAPE, SENSOR, bend=bend)
+    found = registered(grid, where, SENSOR, draw, contrast=0.7)
+    assert found.warps[0].quadratic.any()
+    assert corner_error(found, where) < 0.5
+
+
 @pytest.mark.parametrize("index", [26, 31])
 def test_uneven_light_is_not_taken_for_a_distortion(index):
     """Two of forty draws in which the F-test alone, at one in a thousand, sees a distortion in speckle and fringes."""

@@ -5,11 +5,21 @@ from __future__ import annotations
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
 import torch
 from torch import Tensor
 
 from holobench_eval.imaging.shifts import correlate
-from holobench_eval.metrics.base import gaussian_taps, gaussian_valid, remembered
+from holobench_eval.metrics.base import (
+    block_means,
+    gaussian_blur,
+    gaussian_taps,
+    gaussian_valid,
+    gradient_magnitude,
+    halved,
+    remembered,
+    safe_sqrt,
+)
 
 
 def test_a_result_is_kept_by_what_the_image_shows_and_the_oldest_goes_first() -> None:
@@ -82,3 +92,49 @@ def test_a_gaussian_filter_is_the_sum_of_shifted_images_and_so_is_its_gradient()
     assert torch.allclose(filtered, expected, rtol=1e-12)
     gradients = [torch.autograd.grad((weights * each).sum(), image)[0] for each in (filtered, expected)]
     assert torch.allclose(*gradients, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("height", "width"), [(4, 6), (4, 5), (5, 4), (5, 7)])
+def test_halving_averages_four_pixels_and_pads_an_odd_side_with_zeros(height: int, width: int) -> None:
+    image = torch.rand(2, 3, height, width, generator=torch.Generator().manual_seed(0))
+    padded = torch.zeros(2, 3, height + height % 2, width + width % 2)
+    padded[..., :height, :width] = image
+    four = (padded[..., i::2, j::2] for i in (0, 1) for j in (0, 1))
+    assert torch.allclose(halved(image), sum(four, torch.zeros(())) / 4)
+
+
+def test_block_means_leave_out_what_fills_no_block() -> None:
+    image = torch.rand(1, 2, 7, 6, generator=torch.Generator().manual_seed(0))
+    expected = image[..., :6, :6].reshape(1, 2, 2, 3, 2, 3).mean((3, 5))
+    assert torch.allclose(block_means(image, 3), expected)
+    assert torch.equal(block_means(image, 1), image)
+
+
+def test_a_gradient_has_the_weights_of_its_operator() -> None:
+    edge = torch.zeros(1, 1, 5, 6)
+    edge[..., 3:] = 1
+    ramp = torch.arange(5.0)[:, None].expand(1, 1, 5, 6)
+    for kernel in ("prewitt", "scharr"):
+        assert gradient_magnitude(edge, kernel)[0, 0, 2].tolist() == pytest.approx([0, 0, 1, 1, 0, 1], abs=1e-6)
+        assert torch.allclose(gradient_magnitude(ramp, kernel)[..., 1:-1, 1:-1], torch.tensor(2.0))
+
+
+def test_a_root_has_no_infinite_slope() -> None:
+    x = torch.tensor([0.0, 4.0], requires_grad=True)
+    root = safe_sqrt(x)
+    root.sum().backward()
+    assert root.tolist() == [0, 2]
+    assert x.grad is not None
+    assert x.grad.tolist() == [0, 0.25]
+
+
+def test_a_blur_keeps_even_light_and_spreads_a_point_by_its_width() -> None:
+    assert torch.allclose(gaussian_blur(torch.full((1, 1, 20, 30), 0.7), 2.0), torch.tensor(0.7))
+    point = torch.zeros(1, 1, 41, 41, dtype=torch.float64)
+    point[..., 20, 20] = 1
+    soft = gaussian_blur(point, 1.5)[0, 0]
+    distance = torch.arange(41) - 20
+    assert float(soft.sum()) == pytest.approx(1)
+    assert float((soft.sum(0) * distance**2).sum()) == pytest.approx(1.5**2, rel=0.01)
+    assert float(soft[20, 26]) > 0
+    assert float(soft[20, 27]) == 0  # cut off at 4 sigma

@@ -38,6 +38,13 @@ def test_names_are_unique_and_available_without_weights() -> None:
     assert all(metric.available() is None for metric in catalogue() if not metric.name.startswith("lpips"))
 
 
+def test_tables_find_a_title_a_unit_and_a_direction() -> None:
+    for metric in catalogue():
+        assert metric.direction in ("higher", "lower")
+        assert metric.name.startswith(metric.title.split()[0].casefold().replace("-", "_"))
+        assert (metric.unit, metric.digits) == (("dB", 2) if metric.name == "psnr" else ("", 3))
+
+
 def test_equal_images_get_the_best_value_and_others_a_worse(metric: Metric, pair: tuple[Tensor, Tensor]) -> None:
     image, target = pair
     assert float(metric.function(target, target)) == pytest.approx(metric.best, abs=1e-9)
@@ -134,8 +141,9 @@ def test_gradient_is_finite_for_equal_and_for_black_images(metric: Metric, pair:
     if not metric.differentiable:
         pytest.skip("not differentiable by its own statement")
     _, target = pair
-    for start in (target, torch.zeros_like(target)):
+    black = torch.zeros_like(target)
+    for start, other in ((target, target), (black, target), (black, black)):
         variable = start.clone().requires_grad_()
-        metric.function(variable, target).backward()
+        metric.function(variable, other).backward()
         assert variable.grad is not None
         assert bool(variable.grad.isfinite().all())

@@ -186,6 +186,13 @@ def test_a_small_region_has_fewer_columns_and_does_not_crash(capture: Tensor, ta
     assert not any(column.startswith(("ms_ssim", "mofd")) for column in scores)
 
 
+def test_the_smallest_region_and_the_widest_blur_are_scored(capture: Tensor, target: Tensor) -> None:
+    scores = score(capture[:, :16, :16], target[:, :16, :16], metrics=("psnr",), refine=False, blur=(3.7,))
+    assert math.isfinite(scores["psnr_linear_blur3.7"])
+    with pytest.raises(ValueError, match="less than a quarter"):
+        score(capture[:, :16, :16], target[:, :16, :16], metrics=("psnr",), refine=False, blur=(3.75,))
+
+
 @pytest.mark.parametrize("spoil", [math.nan, math.inf])
 def test_values_that_are_not_finite_are_errors(capture: Tensor, target: Tensor, spoil: float) -> None:
     broken = capture.clone()

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holobench_eval.optics import AngularSpectrum
-from holobench_eval.optics.angular_spectrum import angular_spectrum_phase
+from holobench_eval.optics.angular_spectrum import angular_spectrum_phase, band_limit
 from holobench_eval.optics.convolution import frequencies
 from holobench_eval.optics.padding import padded_size, tail_error
-from holobench_eval.testing.propagation_reference import direct_sum, gaussian_beam
+from holobench_eval.testing.propagation_reference import Setting, direct_sum, gaussian_beam
 
 PITCH, WAVELENGTH = 6.4e-6, 517e-9
 
@@ -155,6 +155,33 @@ def test_gradients_of_gradients_pass():
 def test_transfer_functions_are_cached():
     first = AngularSpectrum((50, 50), PITCH, WAVELENGTH, 0.01)
     assert AngularSpectrum((50, 50), PITCH, WAVELENGTH, 0.01).transfer is first.transfer
+
+
+@pytest.mark.parametrize("shape", [(24, 24), (60, 200)])  # the kernel is cut off along both axes, or one
+@pytest.mark.parametrize("pupil", [None, 0.6])
+def test_rows_and_columns_are_treated_alike(shape, pupil):
+    field = white(shape)
+    model = AngularSpectrum(shape, PITCH, WAVELENGTH, 5e-3, pupil=pupil, dtype=torch.complex128)
+    turned = AngularSpectrum(shape[::-1], PITCH, WAVELENGTH, 5e-3, pupil=pupil, dtype=torch.complex128)
+    assert turned.padded_shape == model.padded_shape[::-1]
+    assert relative(turned.forward(field.T).T, model.forward(field)) < 1e-12
+
+
+@pytest.mark.parametrize(("size", "padded"), [(100, 130), (100, 200), (100, 500)])
+def test_light_of_the_highest_frequency_reaches_half_the_window_or_up_to_the_next_picture(size, padded):
+    reach = max(padded / 2, padded - size)
+    limit = band_limit(size, padded, PITCH, WAVELENGTH, 0.03)
+    assert Setting((size, size), 0.03).travel(limit) == pytest.approx(reach)
+
+
+def test_padding_that_is_asked_for_is_kept_however_far_light_spreads():
+    assert AngularSpectrum((16, 16), PITCH, WAVELENGTH, 0.1, padding=200).padded_shape == (225, 225)
+
+
+def test_an_iris_of_twice_the_band_is_the_largest():
+    AngularSpectrum((16, 16), PITCH, WAVELENGTH, 0.01, pupil=2.0)
+    with pytest.raises(ValueError, match="0 to 2"):
+        AngularSpectrum((16, 16), PITCH, WAVELENGTH, 0.01, pupil=2.01)
 
 
 def test_padding_price_falls_with_what_is_asked():

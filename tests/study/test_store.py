@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.core.hashing import digest
 from holobench_eval.core.io import file_name, write_atomically
+from holobench_eval.study import store as store_module
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Plan, plan
-from holobench_eval.study.store import Record, Store
+from holobench_eval.study.store import Record, Store, appears
 from tests.support.fake_study import write_config
 
 
@@ -183,3 +184,66 @@ def test_a_failure_never_replaces_a_score(tmp_path: Path, grid: Plan) -> None:
     store.write(done)
     store.write(failed)
     assert store.read(done.id) == done
+
+
+def test_a_record_goes_under_the_name_that_its_plan_gives_to_the_method(tmp_path: Path, grid: Plan) -> None:
+    store = Store(tmp_path / "out")
+    store.write(Record(grid.cells[-1].description(), "done", "a name of an earlier config"))
+    assert [record["label"] for record in store.load(grid)] == [label for label, _ in grid.labelled()]
+
+
+def test_failed_cells_are_computed_again_where_that_is_asked_and_others_are_not(tmp_path: Path, grid: Plan) -> None:
+    store, (first, second, third, *rest) = Store(tmp_path / "out"), grid.cells
+    store.write(Record(first.description(), "failed", "Toy", "ZeroDivisionError"))
+    store.write(Record(second.description(), "done", "Toy", alone=False))
+    store.write(Record(third.description(), "skipped", "Toy", "no camera"))
+    assert store.missing(grid.cells) == rest
+    assert store.missing(grid.cells, retry_failed=True) == [first, *rest]
+    assert store.missing(grid.cells, timed=frozenset({second.id, third.id})) == [second, *rest]
+    store.write(Record(second.description(), "done", "Toy", alone=True))
+    assert store.missing(grid.cells, timed=frozenset({second.id, third.id})) == rest
+
+
+def test_only_named_records_are_removed(tmp_path: Path, grid: Plan) -> None:
+    store = Store(tmp_path / "out")
+    for cell in grid.cells:
+        store.write(Record(cell.description(), "done", "Toy"))
+    store.remove([grid.cells[0].id, "0" * 64])
+    assert store.missing(grid.cells) == [grid.cells[0]]
+
+
+def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(tmp_path: Path, grid: Plan) -> None:
+    store = Store(tmp_path / "out")
+    store.write(record_of(grid, reason=""))
+    room = 1_000_000 - store.path(grid.cells[-1].id).stat().st_size
+    largest = record_of(grid, reason="x" * room)
+    store.write(largest)
+    assert store.path(largest.id).stat().st_size == 1_000_000
+    assert store.read(largest.id) == largest
+    with pytest.raises(UserError, match="not a record"):
+        store.write(record_of(grid, reason="x" * (room + 1)))
+
+
+def test_a_run_makes_its_folder_and_those_above_it(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a" / "b")
+    for _ in range(2):
+        with store.locked():
+            assert store.folder.is_dir()
+
+
+def test_what_belongs_to_a_cell_lies_beside_its_record_in_files_of_their_own(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    files = [store.path("ab"), store.log("ab"), store.thumbnail("ab"), store.target_thumbnail("ab")]
+    assert [file.name for file in files] == ["ab.json", "ab.log", "ab.png", "target-ab.png"]
+    assert {file.parent for file in files} == {store.folder}
+
+
+def test_a_file_is_waited_for_until_it_is_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, file = iter(range(100)), tmp_path / "file"
+    monkeypatch.setattr(store_module.time, "monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr(store_module.time, "sleep", lambda seconds: None)
+    assert store_module.late() == store_module.LATE
+    assert not appears(file, until=3.0)
+    assert next(clock) == 5  # asked at 1, 2 and 3, and for the last time at 4
+    file.touch()
+    assert appears(file, until=0.0)

@@ -1,0 +1,85 @@
+"""How many samples are added, and what for: the estimates that they come from are near what is measured."""
+
+import math
+
+import pytest
+import torch
+
+from holobench_eval.optics.angular_spectrum import angular_spectrum_phase
+from holobench_eval.optics.kernel.sizes import fast_size
+from holobench_eval.optics.padding import (
+    DEFAULT_ERROR,
+    IRIS_EDGE,
+    REFERENCE_ERROR,
+    padded_shape,
+    padded_size,
+    spread,
+    tail_error,
+)
+from holobench_eval.testing.propagation_reference import PITCH, WAVELENGTH, Setting
+
+
+def propagated(lines, distance, samples):
+    """Lines of pixels by an angular spectrum of so many samples, double precision, without a band limit."""
+    f = torch.fft.fftfreq(samples, PITCH, dtype=torch.float64)
+    transfer = torch.polar(torch.ones_like(f), angular_spectrum_phase(f**2, WAVELENGTH, distance))
+    return torch.fft.ifft(torch.fft.fft(lines, n=samples) * transfer)[..., : lines.shape[-1]]
+
+
+@pytest.mark.parametrize(("size", "distance"), [(128, 0.005), (256, 0.02), (512, 0.02)])
+def test_the_estimated_error_is_above_the_measured_one_and_at_most_two_and_a_half_times(size, distance):
+    lines = torch.randn(16, size, dtype=torch.complex128, generator=torch.Generator().manual_seed(0))
+    reach = spread(PITCH, WAVELENGTH, distance)
+    right = propagated(lines, distance, 16 * size + 8 * round(reach))
+    for room in (1.3, 2.0):
+        samples = 2 * (round(size + room * reach) // 2) + 20  # even, as fast sizes are
+        measured = float((propagated(lines, distance, samples) - right).norm() / right.norm())
+        assert measured < tail_error(size, reach, samples) < 2.5 * measured
+
+
+@pytest.mark.parametrize("pupil", [None, 0.1, 0.5, 0.9, 0.97, 2.0])
+def test_light_spreads_as_far_as_its_highest_frequency_goes(pupil):
+    highest = min(1.0, 1.0 if pupil is None else pupil * 1.05) / (2 * PITCH)
+    assert spread(PITCH, WAVELENGTH, -0.02, pupil) == pytest.approx(Setting((8, 8), 0.02).travel(highest))
+    assert IRIS_EDGE == 0.05
+
+
+def test_the_spread_of_pixels_below_half_a_wavelength_is_finite():
+    assert spread(0.2 * WAVELENGTH, WAVELENGTH, 1e-3) == pytest.approx(7 * 1e-3 / (0.2 * WAVELENGTH), rel=0.01)
+
+
+@pytest.mark.parametrize(("size", "reach"), [(64, 3.0), (256, 20.5), (256, 100.0), (600, 300.0)])
+def test_the_default_is_the_smallest_size_that_keeps_the_error_in_both_axes(size, reach):
+    enough = size + math.ceil(reach) + 16
+    while tail_error(size, reach, enough) > DEFAULT_ERROR / math.sqrt(2):
+        enough += 1
+    assert fast_size(enough) <= padded_size(size, reach, None, None) <= fast_size(enough + 1 + enough // 256)
+
+
+def test_a_soft_iris_needs_room_for_the_spread_and_its_own_tails():
+    assert padded_size(256, 99.5, 40, None) == fast_size(256 + 100 + 40)
+    rows, columns = padded_shape((100, 200), PITCH, WAVELENGTH, 0.01, 0.5, None)
+    reach = math.ceil(spread(PITCH, WAVELENGTH, 0.01, 0.5))
+    assert (rows, columns) == (fast_size(100 + reach + 52), fast_size(200 + reach + 52))
+
+
+@pytest.mark.parametrize("pupil", [0.96, 1.5])
+def test_an_iris_as_wide_as_the_band_pads_as_none_does(pupil):
+    assert padded_shape((100, 200), PITCH, WAVELENGTH, 0.01, pupil, None) == padded_shape(
+        (100, 200), PITCH, WAVELENGTH, 0.01, None, None
+    )
+
+
+@pytest.mark.parametrize(("size", "reach"), [(64, 64.0), (64, 65.0), (64, 150.0), (64, 300.0), (100, 300.0)])
+def test_the_reference_is_four_times_the_size_and_larger_where_light_spreads_further(size, reach):
+    samples = padded_size(size, reach, None, "reference")
+    wanted = REFERENCE_ERROR / math.sqrt(2)
+    enough = next((n for n in range(4 * size, 10**4) if tail_error(size, reach, n) <= wanted), 0) if reach > size else 0
+    assert max(4 * size, enough) <= samples <= max(4 * size, fast_size(enough + size // 2))
+
+
+def test_so_many_samples_are_added_as_are_asked_for():
+    assert [padded_size(256, 100.0, None, added) for added in (0, 1, 64)] == [256, fast_size(257), fast_size(320)]
+    for wrong in (-1, True, 2.5):
+        with pytest.raises(ValueError, match="padding must be"):
+            padded_size(256, 100.0, None, wrong)
