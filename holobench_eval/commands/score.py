@@ -77,9 +77,11 @@ def score_folders(
     folders = read_folders(captures, targets)
     if baseline is not None and baseline not in folders.methods:
         raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
-    lossy = next((picture.path for picture in folders.captures.values() if picture.is_jpeg), None)
-    if values == "linear" and lossy is not None:
-        raise UserError(f"{lossy}: a JPEG holds no linear light; expected --values stored or srgb")
+    for picture in folders.captures.values():
+        if values == "linear" and picture.is_lossy:
+            raise UserError(f"{picture.path}: compressed with loss, no linear light; expected --values stored or srgb")
+        if values != "linear" and picture.is_raw:
+            raise UserError(f"{picture.path}: a RAW file holds linear light; expected --values linear")
     for note in folders.notes:
         console.print(note, markup=False, highlight=False, soft_wrap=True)
     scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment)

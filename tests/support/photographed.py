@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from skimage import data
 
 Array = NDArray[np.float64]
@@ -18,6 +20,13 @@ def photograph(name: str, size: tuple[int, int] = (320, 400)) -> Picture:
     picture = np.asarray(getattr(data, name)(), dtype=np.float32) / 255
     colour = picture[..., :3] if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
     return np.ascontiguousarray(cv2.resize(colour, size[::-1], interpolation=cv2.INTER_AREA).transpose(2, 0, 1))
+
+
+def save(path: Path, picture: Picture) -> None:
+    """Write ``(1 or 3, h, w)`` in [0, 1] as levels of 8 bits; the name's ending chooses the format."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    levels = np.round(picture * 255).astype(np.uint8)
+    Image.fromarray(levels[0] if len(levels) == 1 else levels.transpose(1, 2, 0)).save(path)
 
 
 def pose(

@@ -32,11 +32,11 @@ from ..scoring.pictures import write_thumbnail
 from ..store import Record, Store
 from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
-from .files import Folders, Picture, Values
+from .files import Folders, Key
+from .pictures import Values
 
 CONDITION = "photographed display"
 
-Key = tuple[str, str]  # method and name of the target
 Alignments = dict[Key, Alignment | str]  # or the reason of a refusal
 Step = Callable[[str], None]  # called with the name of each step
 Draw = Callable[[Path, Values, Warp, Values, Values], None]  # file, capture, warp, matched capture, target
@@ -112,28 +112,38 @@ class Scoring:
         own: Alignments = {}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
-            target = self.folders.targets[key[1]]
-            identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT])
+            pairing, target = self.folders.pairings[key], self.folders.targets[key[1]]
+            if pairing.refused:
+                own[key] = pairing.refused
+                continue
+            chosen = [pairing.channel] if pairing.channel else []
+            identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT, *chosen])
             path = self.store.folder / f"alignment-{identity}.json"
             plain = _read(path)
             if plain is None:
-                plain = self.aligned(picture, target)
+                plain = self.aligned(key)
                 write_atomically(path, f"{json.dumps(plain, sort_keys=True, allow_nan=False)}\n".encode())
             own[key] = str(plain["refused"]) if "refused" in plain else Alignment.from_dict(plain)
         return own
 
-    def aligned(self, picture: Picture, target: Picture) -> dict[str, Any]:
+    def aligned(self, key: Key) -> dict[str, Any]:
         """The alignment of a capture by itself, or why it is refused, as plain values."""
-        if picture.shape[0] != target.shape[0]:
-            kinds = {1: "gray", 3: "in colour"}
-            return {
-                "refused": f"the capture is {kinds[picture.shape[0]]} and the target {kinds[target.shape[0]]}; "
-                "both have to be of one kind"
-            }
+        capture, target = self.loaded(key)
         try:
-            return align(self.viewable(picture.load()), target.load()).to_dict()
+            return align(self.viewable(capture), target).to_dict()
         except CellError as error:
             return {"refused": str(error)}
+
+    def loaded(self, key: Key) -> tuple[Values, Values]:
+        """A capture and its target, in the channels that are compared."""
+        capture, target = self.folders.captures[key].load(), self.folders.targets[key[1]].load()
+        index = self.folders.pairings[key].index
+        return (capture, target) if index is None else (capture[index : index + 1], target[:1])
+
+    def floor_channels(self, name: str) -> int:
+        """How many channels of a target its floor has: one where a capture of it is scored on one."""
+        single = any(pairing.channel for (_, target), pairing in self.folders.pairings.items() if target == name)
+        return 1 if single else self.folders.targets[name].shape[0]
 
     def viewable(self, values: Values) -> Values:
         """Display-encoded values of a capture, in which it can be compared with its target by eye and by features."""
@@ -147,7 +157,8 @@ class Scoring:
         captures, targets = self.folders.captures, self.folders.targets
         groups: dict[tuple[int, ...], list[Key]] = {}
         for key, picture in captures.items():
-            groups.setdefault((*picture.shape, *targets[key[1]].shape), []).append(key)
+            if not self.folders.pairings[key].refused:
+                groups.setdefault((*picture.shape[1:], *targets[key[1]].shape[1:]), []).append(key)
         placements: Alignments = {}
         for keys in groups.values():
             common = shared({key: alignment for key in keys if isinstance(alignment := own[key], Alignment)})
@@ -156,7 +167,8 @@ class Scoring:
             warp, agreeing = common
             for key in keys:
                 if key in agreeing or isinstance(own[key], str):
-                    fit = confirmed(self.viewable(captures[key].load()), targets[key[1]].load(), warp)
+                    capture, target = self.loaded(key)
+                    fit = confirmed(self.viewable(capture), target, warp)
                     placements |= {key: fit} if fit is not None else {}
         return placements
 
@@ -174,7 +186,7 @@ class Scoring:
         kept = self.store.read(digest(cell))
         if kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file():
             return kept
-        capture, target = self.folders.captures[key].load(), self.folders.targets[name].load()
+        capture, target = self.loaded(key)
         image = torch.from_numpy(sampled(self.capture_values(capture), alignment.warp))
         reference = torch.from_numpy(self.target_values(target))
         scores = self.scores(image, reference) | self.second(capture, target, alignment.warp)
@@ -204,15 +216,16 @@ class Scoring:
         """The records of floor images."""
         names = list(self.folders.targets)
         after = names[names.index(name) + 1 :] + names[: names.index(name)]
-        shape = self.folders.targets[name].shape
-        wrong = [other for other in after if self.folders.targets[other].shape == shape][:1]
+        targets, channels = self.folders.targets, self.floor_channels(name)
+        fitting = [other for other in after if targets[other].shape[1:] == targets[name].shape[1:]]
+        wrong = [other for other in fitting if self.floor_channels(other) == channels][:1]
         rows = [row for row in FLOORS if wrong or row != "floor_wrong_target"]
         cells = {row: self.cell(row, name, None, "reference", wrong[0] if "wrong" in row else "") for row in rows}
         kept = [record for cell in cells.values() if (record := self.store.read(digest(cell))) is not None]
         thumbnail = self.store.target_thumbnail(name)
         if len(kept) == len(rows) and thumbnail.is_file():
             return kept
-        pair = (self.folders.targets[target].load() for target in (name, *wrong))
+        pair = (targets[target].load()[:channels] for target in (name, *wrong))
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
         pictures = floor_captures(reference, others, name)
@@ -248,6 +261,9 @@ class Scoring:
     ) -> dict[str, Any]:
         """The plain description of a number."""
         capture = self.folders.captures.get((method, name))
+        channel = self.folders.pairings[method, name].channel if capture else ""
+        if kind == "reference" and self.floor_channels(name) < self.folders.targets[name].shape[0]:
+            channel = "gray"
         geometry: dict[str, Any] = {"kind": kind}
         if kind != "reference":
             geometry = {"kind": kind, **alignment.to_dict()} if isinstance(alignment, Alignment) else {"kind": "none"}
@@ -264,6 +280,7 @@ class Scoring:
             "repeat": 0,
             "values": self.values,
             "geometry": geometry,
+            **({"channel": channel} if channel else {}),
             "protocol": VERSION,
             "metrics": self.metrics,
             "harness_sha256": HARNESS,
