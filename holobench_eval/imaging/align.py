@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from ..core.errors import CellError
 from .features import by_features, by_templates
-from .similarity import PARTS, SIDE, Similarity, reduced, similarity, structured, view
+from .similarity import PARTS, SIDE, Similarity, is_displaced, reduced, similarity, structured, view
 from .warp import Array, Frame, Warp
 
 ALIKE = 0.6  # least correlation of target and capture; pairs of other pictures stay below 0.45
+ALIKE_IN_POSE = 0.25  # the same where the pose is known: other pictures stay below 0.15
 PART_ALIKE = 0.3  # least correlation of a part
+PART_ALIKE_IN_POSE = 0.1
 CLEARLY = 0.02  # in correlation, by which a turned or mirrored target has to fit better or worse
 SAME = 0.98  # correlation of a target with itself turned or mirrored from which on this makes no difference
 STRIPES = 0.02  # of the mean squared slope along one direction: less along the other is none
@@ -171,11 +173,19 @@ def _symmetries(shape: tuple[int, int]) -> Iterator[Warp]:
 def confirmed(
     capture: NDArray[np.floating], target: NDArray[np.floating], warp: Warp, partly: bool = False
 ) -> Alignment | None:
-    """The alignment by a given warp, where capture and target are as alike under it as `align` asks for; else None."""
+    """The alignment by the pose of other captures of a session, where capture and target are alike under it; else None.
+
+    Less likeness than `align` asks for is enough, as nothing is searched: no other picture comes near `ALIKE_IN_POSE`
+    in one given pose, and speckle hides a picture long before that. A capture that fits better a little elsewhere was
+    taken in another pose.
+    """
     frame, reference = gray(capture), gray(target)
     alike = similarity(frame, reference, warp)
-    enough = len(structured(reference)) >= FEWEST_PARTS and accepted(alike)
-    return Alignment(warp, alike.overall) if enough and not _fault(warp, frame.shape, partly) else None
+    odd = sum(part < PART_ALIKE_IN_POSE for part in alike.parts)
+    enough = alike.overall >= ALIKE_IN_POSE and len(alike.parts) >= FEWEST_PARTS and odd <= len(alike.parts) // 6
+    if not enough or is_displaced(frame, reference, warp) or _fault(warp, frame.shape, partly):
+        return None
+    return Alignment(warp, alike.overall)
 
 
 def gray(picture: NDArray[np.floating]) -> Frame:

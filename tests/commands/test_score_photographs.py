@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.metrics import score
 from holobench_eval.study.folders import scoring as scored_pictures
 from tests.support.bayer import bayer_dng
-from tests.support.photographed import Picture, captured, photograph, pose, save
+from tests.support.photographed import Picture, captured, drowned, photograph, pose, save
 from tests.support.reports import whole
 
 SHAPE = (160, 200)
@@ -92,3 +94,112 @@ def test_raw_files_are_scored_as_linear_light_alone(tmp_path):
         run(tmp_path)
     _, _, records = run(tmp_path, values="linear")
     assert records.loc[("m", "astronaut"), "psnr_linear_db"] > 18
+
+
+def cut_off(root: Path, **lacking: int) -> Path:
+    """Captures of a target, each without so many pixels of it on the left."""
+    target = photograph("astronaut", SHAPE)
+    save(root / "targets" / "astronaut.png", target)
+    for method, pixels in lacking.items():
+        where = np.array([[1.5, 0, 30 - 1.5 * pixels], [0, 1.5, 25], [0, 0, 1]])
+        capture = captured(target, where, (300, 400), np.random.default_rng(3), contrast=0.3)
+        save(root / "captures" / method / "astronaut.png", capture[:, :, 30 * (pixels > 0) :])
+    return root
+
+
+def test_a_cut_capture_names_the_side_and_with_visible_its_part_is_scored_and_its_share_is_told(tmp_path):
+    root = cut_off(tmp_path, whole=0, cut=40)
+    text, _, records = run(root)
+    assert records["state"].droplevel("target").to_dict() == {"cut": "failed", "whole": "done"}
+    assert "40 of its pixels on the left side" in text
+    entire = records.loc[("whole", "astronaut"), KEY]
+    text, terminal, records = run(root, visible=True)
+    assert (records["state"] == "done").all()
+    shares = records.droplevel("target")[["share_seen", "share_scored"]]
+    assert shares.loc["whole", "share_seen"] == 1
+    assert shares.loc["cut", "share_seen"] == pytest.approx(0.8, abs=0.01)
+    assert shares["share_scored"].to_list() == pytest.approx([0.8] * 2, abs=0.01)
+    assert "Seen of it: cut 79." in terminal
+    assert "seen [%]" in text
+    assert "--visible" in text
+    # Both are scored on the same pixels, and the same photograph with the same speckle has nearly the same score.
+    found = records[KEY].droplevel("target")
+    assert found["cut"] == pytest.approx(found["whole"], abs=1.0)
+    assert found["whole"] != entire
+
+
+def test_visible_changes_no_score_of_captures_that_show_all(tmp_path):
+    root = cut_off(tmp_path, a=0, b=0)
+    _, _, before = run(root)
+    _, _, after = run(root, visible=True)
+    assert after[KEY].to_dict() == before[KEY].to_dict()
+    assert (after["share_scored"] == 1).all()
+
+
+def test_captures_that_have_little_of_their_target_in_common_are_refused_with_the_share_of_each(tmp_path):
+    target = photograph("astronaut", SHAPE)
+    save(tmp_path / "targets" / "astronaut.png", target)
+    capture = captured(target, np.diag([1.5, 1.5, 1]), (240, 300), np.random.default_rng(3), contrast=0.2)
+    save(tmp_path / "captures" / "left" / "astronaut.png", capture[:, :, :205])
+    save(tmp_path / "captures" / "right" / "astronaut.png", capture[:, :, 95:])
+    text, _, records = run(tmp_path, visible=True)
+    assert (records["state"] == "failed").all()
+    assert re.search(
+        r"have 3\d% of it in common \(left 6\d%, right 6\d%\), and 50% is needed", records["reason"].iloc[0]
+    )
+    assert "in common" in text
+
+
+def test_aligned_captures_are_scored_as_they_are_however_speckled(tmp_path):
+    target = photograph("astronaut", SHAPE)
+    save(tmp_path / "targets" / "astronaut.png", target)
+    capture = captured(target, np.eye(3), SHAPE, np.random.default_rng(3), contrast=1.0, grain=12.0)
+    save(tmp_path / "captures" / "speckled" / "astronaut.png", capture)
+    save(tmp_path / "captures" / "larger" / "astronaut.png", np.pad(capture, ((0, 0), (1, 1), (0, 0))))
+    text, _, records = run(tmp_path)
+    assert (records["state"] == "failed").all()
+    text, _, records = run(tmp_path, aligned=True)
+    assert records["state"].droplevel("target").to_dict() == {"larger": "failed", "speckled": "done"}
+    assert "200 x 162 pixels and the target 200 x 160; aligned captures have the size of their target" in text
+    assert "The geometry is given" in text
+    assert "--aligned" in text
+    levels = np.round(capture * 255).astype(np.float32) / 255
+    expected = score(levels, np.round(target * 255) / 255, metrics=("psnr",), stored=True, refine=False, blur=())
+    assert records.loc[("speckled", "astronaut"), KEY] == pytest.approx(expected["psnr_stored"], abs=1e-3)
+
+
+def test_aligned_and_visible_exclude_each_other(tmp_path):
+    with pytest.raises(UserError, match="expected one of the two"):
+        run(cut_off(tmp_path, a=0), visible=True, aligned=True)
+
+
+def test_a_baseline_that_is_not_found_by_itself_is_scored_in_the_pose_of_its_session(tmp_path):
+    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
+    for name in ("astronaut", "coffee"):
+        target = photograph(name, SHAPE)
+        save(tmp_path / "targets" / f"{name}.png", target)
+        draw = np.random.default_rng(5)
+        save(tmp_path / "captures" / "good" / f"{name}.png", captured(target, where, size, draw, contrast=0.2))
+        save(tmp_path / "captures" / "baseline" / f"{name}.png", drowned(target, where, size, draw))
+    text, _, records = run(tmp_path)
+    assert (records["state"] == "done").all()
+    assert "for one that is not found by itself" in text
+    assert (records.loc["good", KEY] > records.loc["baseline", KEY] + 2).all()
+    shutil.rmtree(tmp_path / "captures" / "good")
+    _, _, alone = run(tmp_path)
+    assert (alone["state"] == "failed").all()
+
+
+def test_a_target_that_no_capture_shows_has_no_floor_and_alone_it_makes_a_report_of_reasons(tmp_path):
+    for name, seen in (("astronaut", "astronaut"), ("coffee", "rocket")):
+        save(tmp_path / "targets" / f"{name}.png", photograph(name, SHAPE))
+        save(tmp_path / "captures" / "m" / f"{name}.png", np.pad(photograph(seen, SHAPE), ((0, 0), (20, 20), (20, 20))))
+    text, _, records = run(tmp_path)
+    assert records["state"].to_dict() == {("m", "astronaut"): "done", ("m", "coffee"): "failed"}
+    everything = pd.read_csv(tmp_path / "out" / "records.csv")
+    assert set(everything.loc[everything["category"] == "floor", "target"]) == {"astronaut"}
+    for place in ("targets", "captures/m"):
+        (tmp_path / place / "astronaut.png").unlink()
+    text, _, records = run(tmp_path)
+    assert "the target is not found in the capture" in text
+    assert list(pd.read_csv(tmp_path / "out" / "records.csv")["category"]) == ["given"]

@@ -109,19 +109,57 @@ def test_a_given_warp_is_confirmed_only_where_it_fits():
     assert confirmed(capture, target, plane(moved @ homography)) is None
 
 
+@pytest.mark.parametrize("name", ["astronaut", "coffee"])
+def test_a_baseline_in_speckle_and_haze_is_confirmed_in_a_known_pose_and_nowhere_else(name):
+    draw = np.random.default_rng(4)
+    target = photograph(name, SHAPE)
+    homography, size = pose(draw, SHAPE, scale=1.2)
+    capture = photographed.drowned(target, homography, size, draw)
+    with pytest.raises(CellError, match="not found"):
+        align(capture, target)
+    assert confirmed(capture, target, plane(homography)) is not None
+    for moved in (8.0, -8.0):
+        there = plane(np.array([[1, 0, moved], [0, 1, 0], [0, 0, 1.0]]) @ homography)
+        assert confirmed(capture, target, there) is None
+    for other in ("astronaut", "coffee", "camera", "rocket"):
+        assert (other == name) == (confirmed(capture, photograph(other, SHAPE), plane(homography)) is not None)
+
+
+@pytest.mark.parametrize("change", [half_replaced, shuffled, lambda t: 1 - t])
+def test_an_altered_target_is_not_confirmed_in_a_known_pose(change):
+    capture, target, homography = made("astronaut", 7, 0.3, scale=1.2)
+    assert confirmed(capture, np.ascontiguousarray(change(target)), plane(homography)) is None
+
+
 def test_alignments_that_agree_become_one_and_others_stay_alone():
     base = np.array([[1.2, 0, 40], [0, 1.2, 30], [0, 0, 1.0]])
 
     def shifted(by: float, correlation: float) -> Alignment:
         return Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1]]) @ base), correlation)
 
-    found = {"a": shifted(-0.4, 0.9), "b": shifted(0.4, 0.9), "far": shifted(9.0, 0.99)}
+    found = {"a": shifted(-0.2, 0.9), "b": shifted(0.2, 0.9), "far": shifted(9.0, 0.99)}
     common = shared(found)
     assert common is not None
     assert common[1] == {"a", "b"}
     assert np.abs(common[0].corners() - plane(base).corners()).max() < 0.01
-    assert shared({"a": shifted(0, 0.9), "far": shifted(9.0, 0.9)}) is None
-    assert shared({"a": shifted(0, 0.9)}) is None
+
+
+def test_a_shared_alignment_stands_only_for_those_within_a_quarter_of_a_capture_pixel():
+    still, moved = Alignment(plane(np.diag([3.0, 3.0, 1.0])), 0.99), np.diag([3.0, 3.0, 1.0])
+    for apart, stands in ((0.2, {"still", "moved"}), (0.3, {"still"})):
+        moved[0, 2] = apart
+        common = shared({"still": still, "moved": Alignment(plane(moved), 0.6)})
+        assert common is not None
+        assert common[1] == stands
+
+
+def test_where_no_two_agree_the_best_correlated_alignment_is_there_for_those_that_are_not_found():
+    near, far = (Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1.0]])), c) for by, c in ((0, 0.9), (9, 0.8)))
+    for found in ({"near": near, "far": far}, {"near": near}):
+        common = shared(found)
+        assert common is not None
+        assert common == (near.warp, frozenset())
+    assert shared({}) is None
 
 
 def test_the_better_correlated_alignment_counts_more():

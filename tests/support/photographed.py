@@ -89,6 +89,20 @@ def captured(
     return np.round(np.clip(noisy, 0, 1) ** (1 / 2.2) * 255).astype(np.float32) / 255
 
 
+def drowned(
+    picture: Picture, homography: Array, size: tuple[int, int], draw: np.random.Generator, haze: float = 0.7
+) -> Picture:
+    """A baseline as a camera stores it: full speckle, alike in all colours, on unmodulated light beside the picture.
+
+    haze: mean of the unmodulated light over that of the picture.
+    """
+    light = np.clip(picture, 0, 1).mean(axis=0) ** 2.2
+    light = (light + haze * light.mean()).astype(np.float32)
+    seen = cv2.warpPerspective(light, homography, size[::-1]) * _speckle(draw, (1, *size), 1.0, 2.0)[0]
+    levels = np.clip(seen / np.percentile(seen, 99), 0, 1) ** (1 / 2.2)
+    return np.repeat(np.round(levels * 255)[None] / 255, 3, axis=0).astype(np.float32)
+
+
 def _speckle(draw: np.random.Generator, shape: tuple[int, ...], contrast: float, grain: float) -> Array:
     if contrast == 0:
         return np.ones(shape)

@@ -22,6 +22,7 @@ from ...core.io import now, write_atomically
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared
+from ...imaging.similarity import similarity
 from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
@@ -34,6 +35,7 @@ from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
 from .files import Folders, Key
 from .pictures import Values
+from .visible import LEAST, Part, cropped, largest_part, share, shown
 
 CONDITION = "photographed display"
 
@@ -64,7 +66,8 @@ class Scoring:
     """Captures from folders, and how they are scored.
 
     store: of records, alignments and pictures; values: how files are read, ``stored`` (as they are), ``srgb``, or
-    ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values.
+    ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values; visible: score the part
+    of a target that all its captures show, if that is half of it; aligned: captures lie on their targets already.
     """
 
     folders: Folders
@@ -72,6 +75,8 @@ class Scoring:
     values: str
     lpips_weights: str | None
     draw: Draw
+    visible: bool = False
+    aligned: bool = False
 
     @property
     def domain(self) -> str:
@@ -85,22 +90,27 @@ class Scoring:
         return [f"{metric.name} {metric.version}" for metric in catalogue(weights) if metric.available() is None]
 
     def records(self, step: Step) -> list[Record]:
-        """A record for every method and target, and for the floor; old pictures of alignments go."""
+        """A record for every method and target, and for the floor of targets that are found in some capture.
+
+        Old pictures of alignments go.
+        """
         own = self.alignments(step)
-        placements = {**own, **self.common(own)}
+        placements = own if self.aligned else {**own, **self.common(own)}
+        parts = self.parts(placements) if self.visible else {}
         records = []
+        found = {key[1] for key, alignment in placements.items() if isinstance(alignment, Alignment)}
         for name in self.folders.targets:
             step(f"floor of {name}")
-            records += self.floor(name)
+            records += self.floor(name, parts.get(name)) if name in found else []
         kept = set()
         for method in self.folders.methods:
             for name in self.folders.targets:
                 key = (method, name)
                 if key in self.folders.captures:
                     step(f"scoring {method}, {name}")
-                records.append(
-                    self.scored(key, placements.get(key), shared=key in placements and placements[key] != own[key])
-                )
+                shared = key in placements and placements[key] != own[key]
+                kind = "given" if self.aligned else "shared" if shared else "own"
+                records.append(self.scored(key, placements.get(key), kind, parts.get(name)))
                 kept.add(alignment_name(*key))
         for old in (self.store.output / "figures").glob("alignment-*.jpg"):
             if old.name not in kept:
@@ -113,24 +123,36 @@ class Scoring:
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
             pairing, target = self.folders.pairings[key], self.folders.targets[key[1]]
-            if pairing.refused:
-                own[key] = pairing.refused
+            if pairing.refused or self.aligned:
+                own[key] = pairing.refused or self.given(key)
                 continue
-            chosen = [pairing.channel] if pairing.channel else []
+            chosen = [*filter(None, [pairing.channel, "visible" if self.visible else ""])]
             identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT, *chosen])
             path = self.store.folder / f"alignment-{identity}.json"
             plain = _read(path)
             if plain is None:
-                plain = self.aligned(key)
+                plain = self.found(key)
                 write_atomically(path, f"{json.dumps(plain, sort_keys=True, allow_nan=False)}\n".encode())
             own[key] = str(plain["refused"]) if "refused" in plain else Alignment.from_dict(plain)
         return own
 
-    def aligned(self, key: Key) -> dict[str, Any]:
+    def given(self, key: Key) -> Alignment | str:
+        """Pixel to pixel, how alike a capture is to its target; or why it is refused."""
+        picture, target = self.folders.captures[key].shape[1:], self.folders.targets[key[1]].shape[1:]
+        if picture != target:
+            return (
+                f"the capture has {picture[1]} x {picture[0]} pixels and the target {target[1]} x {target[0]}; aligned "
+                "captures have the size of their target"
+            )
+        warp = Warp(target, np.eye(3), np.zeros((6, 2)))
+        frame, reference = (gray(values) for values in self.loaded(key))
+        return Alignment(warp, similarity(frame, reference, warp).overall)
+
+    def found(self, key: Key) -> dict[str, Any]:
         """The alignment of a capture by itself, or why it is refused, as plain values."""
         capture, target = self.loaded(key)
         try:
-            return align(self.viewable(capture), target).to_dict()
+            return align(self.viewable(capture), target, self.visible).to_dict()
         except CellError as error:
             return {"refused": str(error)}
 
@@ -168,14 +190,37 @@ class Scoring:
             for key in keys:
                 if key in agreeing or isinstance(own[key], str):
                     capture, target = self.loaded(key)
-                    fit = confirmed(self.viewable(capture), target, warp)
+                    fit = confirmed(self.viewable(capture), target, warp, self.visible)
                     placements |= {key: fit} if fit is not None else {}
         return placements
 
-    def scored(self, key: Key, alignment: Alignment | str | None, shared: bool) -> Record:
+    def parts(self, placements: Alignments) -> dict[str, Part]:
+        """The part of each target that all its captures show, where it is not all of it.
+
+        Where that is less than `LEAST` of the target, ``placements`` gets a refusal for each of them.
+        """
+        parts = {}
+        for name, target in self.folders.targets.items():
+            found = {key: warp.warp for key, warp in placements.items() if key[1] == name and not isinstance(warp, str)}
+            masks = [shown(warp, self.folders.captures[key].shape[1:]) for key, warp in found.items()]
+            if not masks or all(mask.all() for mask in masks):
+                continue
+            part = largest_part(np.logical_and.reduce(masks))
+            if share(part, target.shape[1:]) >= LEAST:
+                parts[name] = part
+                continue
+            seen = ", ".join(f"{key[0]} {mask.mean():.0%}" for key, mask in zip(found, masks, strict=True))
+            placements |= dict.fromkeys(
+                found,
+                f"the captures of this target have {share(part, target.shape[1:]):.0%} of it in common ({seen}), and "
+                f"{LEAST:.0%} is needed; score those that show least apart",
+            )
+        return parts
+
+    def scored(self, key: Key, alignment: Alignment | str | None, kind: str, part: Part | None) -> Record:
         """The record of a capture: kept, or computed."""
         method, name = key
-        cell = self.cell(method, name, alignment, "shared" if shared else "own")
+        cell = self.cell(method, name, alignment, kind, part=part)
         if alignment is None:
             return Record(cell, "missing", method, f"no capture of '{name}' in the folder of {method}")
         if isinstance(alignment, str):
@@ -187,14 +232,19 @@ class Scoring:
         if kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file():
             return kept
         capture, target = self.loaded(key)
-        image = torch.from_numpy(sampled(self.capture_values(capture), alignment.warp))
+        warp = alignment.warp if part is None else cropped(alignment.warp, part)
+        target = _of(target, part)
+        image = torch.from_numpy(sampled(self.capture_values(capture), warp))
         reference = torch.from_numpy(self.target_values(target))
-        scores = self.scores(image, reference) | self.second(capture, target, alignment.warp)
-        full = sampled((capture >= 1).astype(np.float32), alignment.warp)
+        scores = self.scores(image, reference) | self.second(capture, target, warp)
+        if self.visible:
+            scores["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
+            scores["share_scored"] = 1.0 if part is None else share(part, alignment.warp.shape)
+        full = sampled((capture >= 1).astype(np.float32), warp)
         record = Record(cell, "done", method, scores=scores, saturated=float((full > 0.5).mean()))
         matched, _ = match(image, reference)
         write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
-        self.draw(figure, self.viewable(capture), alignment.warp, self.encoded(matched), target)
+        self.draw(figure, self.viewable(capture), warp, self.encoded(matched), target)
         self.store.write(record)
         return record
 
@@ -212,7 +262,7 @@ class Scoring:
         scores = {f"{name}_{self.domain}_second": other_scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return scores | {"second_aligner_px": disagreement(first, other)}
 
-    def floor(self, name: str) -> list[Record]:
+    def floor(self, name: str, part: Part | None) -> list[Record]:
         """The records of floor images."""
         names = list(self.folders.targets)
         after = names[names.index(name) + 1 :] + names[: names.index(name)]
@@ -220,12 +270,13 @@ class Scoring:
         fitting = [other for other in after if targets[other].shape[1:] == targets[name].shape[1:]]
         wrong = [other for other in fitting if self.floor_channels(other) == channels][:1]
         rows = [row for row in FLOORS if wrong or row != "floor_wrong_target"]
-        cells = {row: self.cell(row, name, None, "reference", wrong[0] if "wrong" in row else "") for row in rows}
+        given = {row: wrong[0] if "wrong" in row else "" for row in rows}
+        cells = {row: self.cell(row, name, None, "reference", given[row], part) for row in rows}
         kept = [record for cell in cells.values() if (record := self.store.read(digest(cell))) is not None]
         thumbnail = self.store.target_thumbnail(name)
         if len(kept) == len(rows) and thumbnail.is_file():
             return kept
-        pair = (targets[target].load()[:channels] for target in (name, *wrong))
+        pair = (_of(targets[target].load()[:channels], part) for target in (name, *wrong))
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
         pictures = floor_captures(reference, others, name)
@@ -257,7 +308,13 @@ class Scoring:
         return values.float().numpy()
 
     def cell(
-        self, method: str, name: str, alignment: Alignment | str | None, kind: str, wrong: str = ""
+        self,
+        method: str,
+        name: str,
+        alignment: Alignment | str | None,
+        kind: str,
+        wrong: str = "",
+        part: Part | None = None,
     ) -> dict[str, Any]:
         """The plain description of a number."""
         capture = self.folders.captures.get((method, name))
@@ -281,11 +338,18 @@ class Scoring:
             "values": self.values,
             "geometry": geometry,
             **({"channel": channel} if channel else {}),
+            **({"part": list(part)} if part else {}),
+            **({"visible": True} if self.visible and kind != "reference" else {}),
             "protocol": VERSION,
             "metrics": self.metrics,
             "harness_sha256": HARNESS,
             "code_sha256": ALIGNMENT,
         }
+
+
+def _of(picture: Values, part: Part | None) -> Values:
+    """A part of ``(C, h, w)``, or all of it."""
+    return picture if part is None else np.ascontiguousarray(picture[:, part[0] : part[1], part[2] : part[3]])
 
 
 def _read(path: Path) -> dict[str, Any] | None:
