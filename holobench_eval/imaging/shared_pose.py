@@ -26,8 +26,8 @@ def shared(alignments: Mapping[Key, Alignment]) -> tuple[Warp, frozenset[Key]] |
 
     For captures of one size and targets of one shape. Alignments agree whose corners lie within `AGREE` of their
     median. Each has an error of its own, by the speckle of its capture; the common corners are their mean, weighted by
-    the inverse of the variance that a correlation leaves unexplained. It stands for those that it is `CLOSE` to. Where
-    no two agree, it is the best correlated one, which stands for no other.
+    the inverse of the variance that a correlation leaves unexplained. It stands for those that it is `CLOSE` to, if
+    these are two or more. Where no two agree, it is the best correlated one, which stands for no other.
     """
     if not alignments:
         return None
@@ -44,7 +44,8 @@ def shared(alignments: Mapping[Key, Alignment]) -> tuple[Warp, frozenset[Key]] |
     ends = np.array([[0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]], dtype=np.float32)
     homography = cv2.getPerspectiveTransform(ends, common.astype(np.float32))
     warp = replace(best, homography=np.asarray(homography, dtype=np.float64))
-    return warp, frozenset(key for key in near if _apart(warp, alignments[key].warp) <= CLOSE)
+    close = frozenset(key for key in near if _apart(warp, alignments[key].warp) <= CLOSE)
+    return warp, close if len(close) > 1 else frozenset()
 
 
 def _apart(first: Warp, second: Warp) -> float:
@@ -69,5 +70,8 @@ def sampled(capture: NDArray[np.float32], warp: Warp) -> NDArray[np.float32]:
         for x in steps:
             offset = np.array([[1, 0, x], [0, 1, y], [0, 0, 1]])
             across, down = replace(warp, homography=warp.homography @ offset).coordinates()
-            total += [cv2.remap(plane, across + reach, down + reach, cv2.INTER_LINEAR) for plane in padded]
-    return np.asarray(total / fineness**2, dtype=np.float32)
+            across, down = across + reach, down + reach
+            for plane, seen in zip(padded, total, strict=True):
+                seen += cv2.remap(plane, across, down, cv2.INTER_LINEAR)
+    total /= fineness**2
+    return total.astype(np.float32)

@@ -37,6 +37,8 @@ from .files import Folders, Key
 from .pictures import Values
 from .visible import LEAST, Part, cropped, largest_part, share, shown
 
+LARGE = 2**21  # pixels of a target: above, its floor has no score by metrics that take ten seconds or more
+SLOW = ("flip", "mofd", "lpips")  # how their names begin
 CONDITION = "photographed display"
 
 Alignments = dict[Key, Alignment | str]  # or the reason of a refusal
@@ -280,14 +282,22 @@ class Scoring:
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
         pictures = floor_captures(reference, others, name)
-        records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], reference)) for row in rows]
+        quick = self.quick if reference[0].numel() > LARGE else None
+        records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], reference, quick)) for row in rows]
         for record in records:
             self.store.write(record)
         return records
 
-    def scores(self, image: Tensor, reference: Tensor) -> dict[str, float]:
-        """All of the protocol, in the domains that the values have."""
-        scores = score(image, reference, lpips_weights=self.lpips_weights, stored=self.values == "stored")
+    @cached_property
+    def quick(self) -> tuple[str, ...]:
+        """Names of the metrics without the `SLOW` ones."""
+        names = (name.partition(" ")[0] for name in self.metrics)
+        return (*(name for name in names if not name.startswith(SLOW)), "speckle_contrast")
+
+    def scores(self, image: Tensor, reference: Tensor, metrics: tuple[str, ...] | None = None) -> dict[str, float]:
+        """All of the protocol, or some metrics of it, in the domains that the values have."""
+        weights, stored = self.lpips_weights, self.values == "stored"
+        scores = score(image, reference, lpips_weights=weights, stored=stored, metrics=metrics)
         return scores if len(image) > 1 else {"match_factor" if k == "scale_0" else k: v for k, v in scores.items()}
 
     def target_values(self, target: Values) -> Values:
