@@ -153,7 +153,7 @@ def test_captures_that_have_little_of_their_target_in_common_are_refused_with_th
 def test_aligned_captures_are_scored_as_they_are_however_speckled(tmp_path):
     target = photograph("astronaut", SHAPE)
     save(tmp_path / "targets" / "astronaut.png", target)
-    capture = captured(target, np.eye(3), SHAPE, np.random.default_rng(3), contrast=1.0, grain=12.0)
+    capture = drowned(target, np.eye(3), SHAPE, np.random.default_rng(3))
     save(tmp_path / "captures" / "speckled" / "astronaut.png", capture)
     save(tmp_path / "captures" / "larger" / "astronaut.png", np.pad(capture, ((0, 0), (1, 1), (0, 0))))
     text, _, records = run(tmp_path)

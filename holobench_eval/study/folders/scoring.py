@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from ...core.io import now, write_atomically
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared
-from ...imaging.similarity import similarity
+from ...imaging.similarity import reduced, similarity
 from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
@@ -37,8 +37,9 @@ from .files import Folders, Key
 from .pictures import Values
 from .visible import LEAST, Part, cropped, largest_part, share, shown
 
-LARGE = 2**21  # pixels of a target: above, its floor has no score by metrics that take ten seconds or more
-SLOW = ("flip", "mofd", "lpips")  # how their names begin
+LARGE = 2**21  # pixels of a target: above, its floor has no score by metrics that take long
+WIDE = 2048  # pixels of a target's longer side to which the second aligner, of which 0.1 px is asked, reduces it
+SLOW = ("flip", "mofd", "lpips", "haarpsi")  # how their names begin
 CONDITION = "photographed display"
 
 Alignments = dict[Key, Alignment | str]  # or the reason of a refusal
@@ -254,9 +255,13 @@ class Scoring:
         """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""
         frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
         light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(compared)
-        other = second_warp(gray(light.numpy()), gray(reference.numpy()), first)
-        if other is None:
+        small, to_target = reduced(gray(reference.numpy()), WIDE)
+        shrunk, to_frame = reduced(gray(light.numpy()), round(max(frame.shape) * max(small.shape) / max(first.shape)))
+        homography = np.linalg.inv(to_frame) @ first.homography @ to_target
+        found = second_warp(shrunk, small, Warp((small.shape[0], small.shape[1]), homography, np.zeros((6, 2))))
+        if found is None:
             return {}
+        other = replace(first, homography=to_frame @ found.homography @ np.linalg.inv(to_target))
         image = torch.from_numpy(sampled(frame, other))
         other_scores = score(
             image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored"
