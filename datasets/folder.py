@@ -14,9 +14,11 @@ from torch import Tensor
 
 from ..core.errors import UserError, suggest
 from .base import fit, with_channels
-from .images import SUFFIXES, SixteenBit, decode, read
+from .images import RIGHT, SUFFIXES, GrayImageError, SixteenBit, decode, read
 
 LARGEST_MANIFEST = 10_000_000  # bytes; a hundred thousand lines
+
+NAMED = 5  # gray images that a message names
 
 _MANIFEST_LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](.+)")
 
@@ -53,8 +55,18 @@ class Folder:
     def items(self) -> list[str]:
         """Paths within the folder, in order; UserError for an image that is missing, changed, damaged or not RGB."""
         names = sorted(self._sums() or self._listed())[: self.count]
+        gray = []
         for name in names:
-            self.digest(name)
+            try:
+                self.digest(name)
+            except GrayImageError:
+                gray.append(name)
+        if gray:
+            some = f"{', '.join(gray[:NAMED])}{f' and {len(gray) - NAMED} more' if len(gray) > NAMED else ''}"
+            raise UserError(
+                f"{self.path}: {len(gray)} of {len(names)} images have one channel ({some}); {RIGHT}, or gray: true in "
+                "params, which takes gray images too, replicated to three channels"
+            )
         return names
 
     def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:

@@ -54,7 +54,13 @@ _MODES = {
 _BITS_PER_SAMPLE = 258  # TIFF 6.0, section 8
 _ORIENTATION = 274  # Exif 2.32, section 4.6.4
 
+_ONE_CHANNEL = "a one-channel image (gray: true would replicate it to three)"
+
 PNG_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"  # the last chunk of every PNG (PNG specification, section 11.2.4)
+
+
+class GrayImageError(UserError):
+    """An image that has one channel, where that was not allowed."""
 
 
 def read(path: Path) -> bytes:
@@ -76,8 +82,8 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
 
     content: the file; name: used in errors. gray: take one-channel images too, replicated to three channels.
     sixteen_bit: take 16-bit PNG and TIFF too, as sRGB levels or as linear light; they must be stored upright.
-    UserError, one line, for an image that is damaged, of another kind, larger than 33 million pixels, or of another
-    colour space by its ICC profile.
+    UserError, one line, for an image that is damaged, of another kind (`GrayImageError`: of one channel), larger than
+    33 million pixels, or of another colour space by its ICC profile.
     """
     image = opened(content, name)
     if image.format == "PNG":
@@ -89,7 +95,7 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     if fault is None and bits not in (8, 16):
         fault = f"a {bits}-bit image"
     if fault is not None:
-        raise UserError(f"{name}: {fault}; {RIGHT}")
+        raise (GrayImageError if fault == _ONE_CHANNEL else UserError)(f"{name}: {fault}; {RIGHT}")
     _refuse_other_colours(image, name)
     turned, stored_upright = _load(image, name)
     if bits == 8:
@@ -156,7 +162,7 @@ def _fault(image: Image.Image, gray: bool) -> str | None:
     if image.mode not in _MODES and "transparency" in image.info:
         return "an image with a transparent colour"
     if image.mode == "L" or image.mode.startswith("I;16"):
-        return None if gray else "a one-channel image (gray: true would replicate it to three)"
+        return None if gray else _ONE_CHANNEL
     return None if image.mode == "RGB" else _MODES.get(image.mode, f"an image of mode {image.mode}")
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -33,12 +33,18 @@ def score(
     output: Annotated[Path, typer.Option(help="Where to write the report.")],
     values: Annotated[str, typer.Option(help="Values in the files: stored (as they are), srgb or linear.")] = "stored",
     baseline: Annotated[str | None, typer.Option(help="The method that others are tested against.")] = None,
+    visible: Annotated[
+        bool, typer.Option("--visible", help="Score the part of a target that all its captures show.")
+    ] = False,
+    aligned: Annotated[
+        bool, typer.Option("--aligned", help="The captures lie on their targets already, pixel to pixel.")
+    ] = False,
     lpips_weights: Annotated[Path | None, typer.Option(help="File or folder of the LPIPS trunk.")] = None,
 ) -> None:
     """Score pictures that were taken long ago: align each with its target by what it shows, and write a report."""
     weights = None if lpips_weights is None else str(lpips_weights)
     console = open_console()
-    report, results = score_folders(captures, targets, output, values, baseline, weights, console)
+    report, results = score_folders(captures, targets, output, values, baseline, weights, console, visible, aligned)
     print_headline(console, results)
     for hole in results.holes.to_dict("records"):
         text = f"{hole['state']}: {hole['method']} · {hole['target']}: {hole['reason']}"
@@ -55,8 +61,12 @@ def score_folders(
     baseline: str | None,
     lpips_weights: str | None,
     console: Console,
+    visible: bool = False,
+    aligned: bool = False,
 ) -> tuple[Path, Results]:
     """Score ``captures/<method>/<target>.png`` against ``targets/<target>.png``: path and numbers of the report.
+
+    visible, aligned: as in `Scoring`.
 
     What was computed before in ``output`` for the same files by the same code is taken from there. UserError for input
     that cannot be used, in one line; a capture that cannot be aligned is a hole in the report, with its reason.
@@ -74,28 +84,33 @@ def score_folders(
         if output.resolve().is_relative_to(source.resolve()):
             mixed = f"lies in {source}, whose files it would mix with"
             raise UserError(f"--output {output}: {mixed}; expected another folder")
+    if visible and aligned:
+        raise UserError("--visible --aligned: an aligned capture shows all of its target; expected one of the two")
     folders = read_folders(captures, targets)
     if baseline is not None and baseline not in folders.methods:
         raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
-    lossy = next((picture.path for picture in folders.captures.values() if picture.is_jpeg), None)
-    if values == "linear" and lossy is not None:
-        raise UserError(f"{lossy}: a JPEG holds no linear light; expected --values stored or srgb")
-    for note in folders.notes:
-        console.print(note, markup=False, highlight=False, soft_wrap=True)
-    scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment)
+    for picture in folders.captures.values():
+        if values == "linear" and picture.is_lossy:
+            raise UserError(f"{picture.path}: compressed with loss, no linear light; expected --values stored or srgb")
+        if values != "linear" and picture.is_raw:
+            raise UserError(f"{picture.path}: a RAW file holds linear light; expected --values linear")
+    scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned)
     with scoring.store.locked():
         known = provenance.begin(output, described(folders, values), resumed=True)
         with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
             records = [asdict(record) for record in scoring.records(step)]
+        notes = [*folders.notes, *_in_part(records)]
+        for note in notes:
+            console.print(note, markup=False, highlight=False, soft_wrap=True)
         known = provenance.end(output, known)
         words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
-        words += ["--baseline", baseline] if baseline else []
+        words += ["--visible"] * visible + ["--aligned"] * aligned + (["--baseline", baseline] if baseline else [])
         description = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
-        layout = _layout(folders, scoring.domain, values, baseline, output.resolve().name)
+        layout = _layout(folders, scoring.domain, values, baseline, output.resolve().name, " ".join(notes))
         return write_report(layout, records, output, known, description)
 
 
-def _layout(folders: Folders, domain: str, values: str, baseline: str | None, study: str) -> Layout:
+def _layout(folders: Folders, domain: str, values: str, baseline: str | None, study: str, note: str) -> Layout:
     from ..report.data.layout import Layout
     from ..study.folders import FILES
     from ..study.folders.scoring import CONDITION
@@ -106,11 +121,23 @@ def _layout(folders: Folders, domain: str, values: str, baseline: str | None, st
         targets=tuple(folders.targets),
         headline=f"psnr_{domain}",
         baseline=baseline,
-        note=" ".join(folders.notes),
+        note=note,
         measure=FILES,
         values=values,
         study=study,
     )
+
+
+def _in_part(records: list[dict[str, Any]]) -> Iterator[str]:
+    """A sentence for each target of which a part is scored: how large it is, and what each capture shows."""
+    parts: dict[str, list[tuple[str, dict[str, float]]]] = {}
+    for record in records:
+        if record["scores"].get("share_scored", 1.0) < 1:
+            parts.setdefault(record["cell"]["target"], []).append((record["label"], record["scores"]))
+    for target, captures in parts.items():
+        seen = ", ".join(f"{label} {scores['share_seen']:.1%}" for label, scores in captures)
+        share = captures[0][1]["share_scored"]
+        yield f"Of {target}, {share:.1%} is scored, which all its captures show. Seen of it: {seen}."
 
 
 @contextmanager

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from ..core.errors import CellError
 from .features import by_features, by_templates
-from .similarity import PARTS, SIDE, Similarity, reduced, similarity, structured, view
+from .similarity import PARTS, SIDE, Similarity, is_displaced, reduced, similarity, structured, view
 from .warp import Array, Frame, Warp
 
 ALIKE = 0.6  # least correlation of target and capture; pairs of other pictures stay below 0.45
+ALIKE_IN_POSE = 0.25  # the same where the pose is known: other pictures stay below 0.15
 PART_ALIKE = 0.3  # least correlation of a part
+PART_ALIKE_IN_POSE = 0.1
 CLEARLY = 0.02  # in correlation, by which a turned or mirrored target has to fit better or worse
 SAME = 0.98  # correlation of a target with itself turned or mirrored from which on this makes no difference
 STRIPES = 0.02  # of the mean squared slope along one direction: less along the other is none
@@ -37,6 +39,7 @@ FURTHEST_REFINED = 0.15  # of the target's longer side in the capture: how far a
 STEEPEST = 2.5  # between the scales at two corners
 OVERHANG = 2.0  # target pixels that may lie beyond the capture's border
 SCALES = (0.2, 8.0)  # capture pixels a target pixel
+IMPOSSIBLE = "folded"  # no camera sees a display so
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +69,13 @@ class Alignment:
         return cls(_planar((height, width), np.array(plain["homography"])), float(plain["correlation"]))
 
 
-def align(capture: NDArray[np.floating], target: NDArray[np.floating]) -> Alignment:
+def align(capture: NDArray[np.floating], target: NDArray[np.floating], partly: bool = False) -> Alignment:
     """Find a target in its capture, from the two alone.
 
     Enhanced correlation coefficient from coarse to fine (Evangelidis & Psarakis, IEEE Trans. Pattern Anal. Mach.
     Intell. 30, 1858, 2008), from where features or templates propose. The target may be mirrored, turned by quarters
-    and by some degrees more, seen in perspective, scaled by 0.3 to 5, and fill a part of the capture; all of it must be
-    there.
+    and by some degrees more, seen in perspective, scaled by 0.2 to 8, and fill a part of the capture; all of it must be
+    there, or half of it where ``partly``.
 
     Parameters
     ----------
@@ -80,11 +83,13 @@ def align(capture: NDArray[np.floating], target: NDArray[np.floating]) -> Alignm
         ``(C', Hs, Ws)`` in [0, 1], values as displays are given them, or square roots of light.
     target
         ``(C, h, w)``, as the capture.
+    partly
+        Whether up to half of the target may lie beyond the capture's border.
 
     Raises
     ------
     CellError
-        The target has too little structure, or it is not found.
+        The target has too little structure, it is not found, or it is found where it cannot be scored.
 
     Examples
     --------
@@ -96,9 +101,12 @@ def align(capture: NDArray[np.floating], target: NDArray[np.floating]) -> Alignm
     """
     frame, reference = gray(capture), gray(target)
     _refuse_plain(reference)
-    best = -1.0
-    for start in _proposals(frame, reference):
-        if not _sane(start, frame.shape, slack=10.0) or similarity(frame, reference, start).overall < HOPEFUL:
+    best, closest = -1.0, (ALIKE - NEARLY, "")  # the second: the most alike of the starts that are not tried, and why
+    for start in _proposals(frame, reference, partly):
+        fault = _fault(start, frame.shape, partly, around=0.6)
+        alike = similarity(frame, reference, start) if fault != IMPOSSIBLE else Similarity(-1.0)
+        if fault or alike.overall < HOPEFUL:
+            closest = max(closest, (alike.overall, fault))
             continue
         near = refined(frame, reference, start, COARSE)
         alike = similarity(frame, reference, near)
@@ -106,17 +114,31 @@ def align(capture: NDArray[np.floating], target: NDArray[np.floating]) -> Alignm
         if alike.overall < ALIKE - NEARLY:
             continue
         warp = refined(frame, reference, near, FINE)
-        if accepted(similarity(frame, reference, warp)) and _sane(warp, frame.shape):
+        if accepted(similarity(frame, reference, warp)) and _fault(warp, frame.shape, partly) != IMPOSSIBLE:
             warp = _settled(frame, reference, warp)
             alike = similarity(frame, reference, warp)
-            if accepted(alike) and _sane(warp, frame.shape):
-                _refuse_overhang(warp, frame.shape)
+            fault = _fault(warp, frame.shape, partly)
+            if accepted(alike) and fault != IMPOSSIBLE:
+                if fault:
+                    raise CellError(_found(alike.overall, fault))
                 return Alignment(warp, alike.overall)
-    seen = f"the best correlation is {best:.2f}" if best > 0 else "nothing is alike"
+    if closest[1]:
+        raise CellError(_found(*closest))
+    if best >= ALIKE:
+        raise CellError(
+            f"the target is not found in the capture as a whole: the two are alike (correlation {best:.2f}), but parts "
+            "of the target are missing, displaced or replaced there"
+        )
+    seen = f"the best correlation is {best:.2f}, and {ALIKE} is needed" if best > 0 else "nothing is alike"
+    cut = "less than half of it is on the capture" if partly else "cut off"
     raise CellError(
-        f"the target is not found in the capture ({seen}; {ALIKE} and no displaced parts are needed): it shows another "
-        "picture, or is too faint, too speckled or cut off"
+        f"the target is not found in the capture ({seen}): it shows another picture, or is too faint, too speckled or "
+        f"{cut}"
     )
+
+
+def _found(correlation: float, fault: str) -> str:
+    return f"the target is found in the capture (correlation {correlation:.2f}), but {fault}"
 
 
 def _settled(frame: Frame, reference: Frame, warp: Warp) -> Warp:
@@ -148,12 +170,22 @@ def _symmetries(shape: tuple[int, int]) -> Iterator[Warp]:
             yield _planar(shape, centre @ turn @ np.linalg.inv(centre))
 
 
-def confirmed(capture: NDArray[np.floating], target: NDArray[np.floating], warp: Warp) -> Alignment | None:
-    """The alignment by a given warp, where capture and target are as alike under it as `align` asks for; else None."""
+def confirmed(
+    capture: NDArray[np.floating], target: NDArray[np.floating], warp: Warp, partly: bool = False
+) -> Alignment | None:
+    """The alignment by the pose of other captures of a session, where capture and target are alike under it; else None.
+
+    Less likeness than `align` asks for is enough, as nothing is searched: no other picture comes near `ALIKE_IN_POSE`
+    in one given pose, and speckle hides a picture long before that. A capture that fits better a little elsewhere was
+    taken in another pose.
+    """
     frame, reference = gray(capture), gray(target)
     alike = similarity(frame, reference, warp)
-    enough = len(structured(reference)) >= FEWEST_PARTS and accepted(alike)
-    return Alignment(warp, alike.overall) if enough and _sane(warp, frame.shape) else None
+    odd = sum(part < PART_ALIKE_IN_POSE for part in alike.parts)
+    enough = alike.overall >= ALIKE_IN_POSE and len(alike.parts) >= FEWEST_PARTS and odd <= len(alike.parts) // 6
+    if not enough or is_displaced(frame, reference, warp) or _fault(warp, frame.shape, partly):
+        return None
+    return Alignment(warp, alike.overall)
 
 
 def gray(picture: NDArray[np.floating]) -> Frame:
@@ -206,29 +238,36 @@ def _blurred_correlation(target: Frame, capture: Frame, inside: NDArray[np.bool_
     return float(np.corrcoef(a, b)[0, 1]) if min(a.std(), b.std()) > 0 else -1.0
 
 
-def _proposals(frame: Frame, reference: Frame) -> Iterator[Warp]:
+def _proposals(frame: Frame, reference: Frame, partly: bool) -> Iterator[Warp]:
     """Where the target may lie, likely places first."""
     shape = (reference.shape[0], reference.shape[1])
     yield from (_planar(shape, homography) for homography in by_features(frame, reference))
-    yield from (_planar(shape, homography) for homography in by_templates(frame, reference))
+    yield from (_planar(shape, homography) for homography in by_templates(frame, reference, partly))
 
 
 def _planar(shape: tuple[int, int], homography: Array) -> Warp:
     return Warp(shape, homography / homography[2, 2], np.zeros((6, 2)))
 
 
-def _sane(warp: Warp, frame: tuple[int, ...], slack: float = 1.0) -> bool:
-    """Whether a camera may have seen a display so: no fold, no extreme perspective, scale or place."""
+def _fault(warp: Warp, frame: tuple[int, ...], partly: bool, around: float = 0.0) -> str:
+    """Why a target that lies so cannot be scored: its scale, its place, or `IMPOSSIBLE`; empty where it can.
+
+    partly: a part may lie beyond the border; around: of the capture's longer side, how far it may lie there anyway.
+    """
     shape, homography = warp.shape, warp.homography
     ends = np.array(list(itertools.product((0.0, shape[1] - 1.0), (0.0, shape[0] - 1.0))))
     depth = np.column_stack([ends, np.ones(4)]) @ homography[2]
     if not np.isfinite(homography).all() or depth.min() <= 0:
-        return False
+        return IMPOSSIBLE
     scales = (np.abs(np.linalg.det(homography)) / depth**3) ** 0.5
-    corners = warp.corners()
-    room = OVERHANG * slack * scales.max() + 0.05 * slack * max(frame)
-    within = np.all(corners > -room) and np.all(corners < np.array(frame[::-1]) + room)
-    return bool(within and scales.max() <= STEEPEST * scales.min() and SCALES[0] <= scales.min() <= SCALES[1])
+    if not scales.max() <= STEEPEST * scales.min():
+        return IMPOSSIBLE
+    if not SCALES[0] <= scales.min() <= SCALES[1]:
+        return (
+            f"it takes {scales.min():.3g} capture pixels for each of its own; {SCALES[0]:g} to {SCALES[1]:g} are "
+            "allowed: resize the target"
+        )
+    return "" if partly else _overhang(warp, frame, around)
 
 
 def _refuse_plain(reference: Frame) -> None:
@@ -244,8 +283,15 @@ def _refuse_plain(reference: Frame) -> None:
         raise CellError("the target has structure in one direction only, along which its place cannot be found")
 
 
-def _refuse_overhang(warp: Warp, frame: tuple[int, ...]) -> None:
-    corners = warp.corners()
-    beyond = max(float(-corners.min()), float((corners - np.array(frame[::-1]) + 1).max())) / warp.scale()
-    if beyond > OVERHANG:
-        raise CellError(f"the target reaches {beyond:.0f} of its pixels beyond the capture; all of it must be on it")
+def _overhang(warp: Warp, frame: tuple[int, ...], around: float) -> str:
+    """How far a target reaches beyond which sides of the capture; empty where it is all on it."""
+    low, high = warp.corners().min(axis=0), warp.corners().max(axis=0)
+    beyond = {"left": -low[0], "upper": -low[1], "right": high[0] - frame[1] + 1, "lower": high[1] - frame[0] + 1}
+    allowed = OVERHANG * warp.scale() + around * max(frame)
+    sides = [f"{by / warp.scale():.0f} of its pixels on the {side} side" for side, by in beyond.items() if by > allowed]
+    if not sides:
+        return ""
+    return (
+        f"it reaches beyond the capture, {' and '.join(sides)}; all of it must be on the capture, unless "
+        "--visible scores the part that is"
+    )

@@ -89,9 +89,10 @@ def _margin(shape: tuple[int, int]) -> int:
 def _with_margin(frame: Frame, warp: Warp, border: int) -> Frame:
     """The region and ``border`` pixels around it as ``warp`` sees them; the edge of the frame repeats outside it."""
     height, width = warp.shape
-    x, y = np.meshgrid(np.arange(-border, width + border), np.arange(-border, height + border))
-    points = warp.to_sensor(np.stack([x, y], axis=-1).reshape(-1, 2).astype(np.float64))
-    where = points.astype(np.float32).reshape(*x.shape, 2)
+    where = np.empty((height + 2 * border, width + 2 * border, 2), dtype=np.float32)
+    for row in range(len(where)):  # at once, the points of a large region would fill the memory
+        x = np.arange(-border, width + border, dtype=np.float64)
+        where[row] = warp.to_sensor(np.column_stack([x, np.full(len(x), row - float(border))]))
     smooth = np.asarray(cv2.GaussianBlur(frame, (0, 0), 0.4 * warp.scale()))
     return np.asarray(
         cv2.remap(smooth, where[..., 0], where[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

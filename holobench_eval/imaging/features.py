@@ -24,6 +24,7 @@ FEWEST = 12  # matches on one homography
 
 TEMPLATE_SIDE = 48  # pixels
 FILLED = tuple(1.04 / 1.12**step for step in range(15))  # of the capture's extent, in the template's direction
+BEYOND = tuple(1.04 * 1.12**step for step in range(6, 0, -1))  # of a target that is there in part
 TILTS = (-8.0, -4.0, 0.0, 4.0, 8.0)  # degrees
 KEPT = 6
 
@@ -80,23 +81,23 @@ def _matched(source: Features, target: Features) -> tuple[int, Array | None]:
     return min(len(places), len(targets)), np.asarray(homography, dtype=np.float64)
 
 
-def by_templates(frame: Frame, reference: Frame) -> list[Array]:
+def by_templates(frame: Frame, reference: Frame, partly: bool = False) -> list[Array]:
     """The similarities ``(3, 3)`` from a target to its capture that correlate best, of many scales, turns and mirrors.
 
     For pictures whose features drown in speckle: it averages over the whole target. Rotations are within 10 degrees
-    of a quarter turn.
+    of a quarter turn. partly: up to half of the target may lie beyond the capture's border.
     """
     small, to_reference = reduced(reference, TEMPLATE_SIDE)
     template = evened(small, np.ones(small.shape, dtype=bool))
     matches: list[tuple[float, Array]] = []
-    for filled, turns in itertools.product(FILLED, (0, 1)):
+    for filled, turns in itertools.product((*BEYOND, *FILLED) if partly else FILLED, (0, 1)):
         height, width = small.shape if turns == 0 else small.shape[::-1]
         wanted = max(height / frame.shape[0], width / frame.shape[1]) / filled  # template pixels a capture pixel
         if wanted >= 1:
             continue
         shrunk, to_frame = reduced(frame, round(max(frame.shape) * wanted))
         scene = evened(shrunk, np.ones(shrunk.shape, dtype=bool))
-        border = TEMPLATE_SIDE // 4
+        border = TEMPLATE_SIDE // (2 if partly else 4)
         scene = np.asarray(cv2.copyMakeBorder(scene, border, border, border, border, cv2.BORDER_CONSTANT, value=0.0))
         for half, mirrored, tilt in itertools.product((0, 2), (False, True), TILTS):
             turned, to_turned = _turned(template, math.radians(90 * (turns + half) + tilt), mirrored)

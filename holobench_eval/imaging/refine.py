@@ -135,8 +135,12 @@ def _derivatives(wanted: Frame) -> Array:
     slope_y, slope_x = np.gradient(wide)
     x, y = np.arange(width) - (width - 1) / 2, np.arange(height)[:, None] - (height - 1) / 2
     turning = slope_x * y - slope_y * x
-    columns = (wide, np.ones_like(wide), np.negative(slope_x), np.negative(slope_y), turning)
-    return np.stack([_inner(column).ravel() for column in columns], axis=1)
+    columns = (wide, np.float64(1), np.negative(slope_x), np.negative(slope_y), turning)
+    inner = _inner(wide).shape
+    model = np.empty((*inner, len(columns)))
+    for index, column in enumerate(columns):
+        model[..., index] = _inner(column) if column.ndim else column
+    return model.reshape(-1, len(columns))
 
 
 def _within(move: Array, slack: float) -> bool:

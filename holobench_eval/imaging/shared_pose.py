@@ -15,32 +15,44 @@ from .align import OVERHANG, Alignment
 from .warp import Warp
 
 AGREE = 1.0  # capture pixels, or target pixels where those are larger: corners further apart are another pose
+CLOSE = 0.25  # capture pixels, rms over the target: where a capture's own pose is further away, the camera has moved
+GRID = 9  # points a side at which that is measured
 
 Key = TypeVar("Key", bound=Hashable)
 
 
 def shared(alignments: Mapping[Key, Alignment]) -> tuple[Warp, frozenset[Key]] | None:
-    """One warp for those of several alignments that agree, and which these are; None where no two agree.
+    """One warp for captures in one pose, and for which of several alignments it may stand; None where there is none.
 
     For captures of one size and targets of one shape. Alignments agree whose corners lie within `AGREE` of their
     median. Each has an error of its own, by the speckle of its capture; the common corners are their mean, weighted by
-    the inverse of the variance that a correlation leaves unexplained.
+    the inverse of the variance that a correlation leaves unexplained. It stands for those that it is `CLOSE` to, if
+    these are two or more. Where no two agree, it is the best correlated one, which stands for no other.
     """
-    if len(alignments) < 2:
+    if not alignments:
         return None
     corners = {key: alignment.warp.corners() for key, alignment in alignments.items()}
     middle = np.median(list(corners.values()), axis=0)
-    first = next(iter(alignments.values())).warp
-    allowed = AGREE * max(1.0, first.scale())
+    best = max(alignments.values(), key=lambda alignment: alignment.correlation).warp
+    allowed = AGREE * max(1.0, best.scale())
     near = [key for key in alignments if np.linalg.norm(corners[key] - middle, axis=1).max() <= allowed]
     if len(near) < 2:
-        return None
+        return best, frozenset()
     weights = [1 / max(1 - alignments[key].correlation ** 2, 1e-6) for key in near]
     common = np.average([corners[key] for key in near], axis=0, weights=weights)
-    height, width = first.shape
+    height, width = best.shape
     ends = np.array([[0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]], dtype=np.float32)
     homography = cv2.getPerspectiveTransform(ends, common.astype(np.float32))
-    return replace(first, homography=np.asarray(homography, dtype=np.float64)), frozenset(near)
+    warp = replace(best, homography=np.asarray(homography, dtype=np.float64))
+    close = frozenset(key for key in near if _apart(warp, alignments[key].warp) <= CLOSE)
+    return warp, close if len(close) > 1 else frozenset()
+
+
+def _apart(first: Warp, second: Warp) -> float:
+    """Root mean square over the target of the distance [capture px] between where two warps put a pixel."""
+    rows, columns = (np.linspace(0, side - 1, GRID) for side in first.shape)
+    points = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    return float(np.sqrt(np.square(first.to_sensor(points) - second.to_sensor(points)).sum(axis=1).mean()))
 
 
 def sampled(capture: NDArray[np.float32], warp: Warp) -> NDArray[np.float32]:
@@ -58,5 +70,8 @@ def sampled(capture: NDArray[np.float32], warp: Warp) -> NDArray[np.float32]:
         for x in steps:
             offset = np.array([[1, 0, x], [0, 1, y], [0, 0, 1]])
             across, down = replace(warp, homography=warp.homography @ offset).coordinates()
-            total += [cv2.remap(plane, across + reach, down + reach, cv2.INTER_LINEAR) for plane in padded]
-    return np.asarray(total / fineness**2, dtype=np.float32)
+            across, down = across + reach, down + reach
+            for plane, seen in zip(padded, total, strict=True):
+                seen += cv2.remap(plane, across, down, cv2.INTER_LINEAR)
+    total /= fineness**2
+    return total.astype(np.float32)

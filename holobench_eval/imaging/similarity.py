@@ -105,6 +105,13 @@ def similarity(frame: Frame, reference: Frame, warp: Warp) -> Similarity:
     return Similarity(_masked_correlation(target, capture, seen.inside), tuple(alike), displaced)
 
 
+def is_displaced(frame: Frame, reference: Frame, warp: Warp) -> bool:
+    """Whether a capture ``(Hs, Ws)`` as a whole fits its target ``(h, w)`` clearly better a little elsewhere."""
+    seen = view(frame, reference, warp)
+    height, width = seen.inside.shape
+    return _displaced(*seen.even(), (slice(0, height), slice(0, width)))
+
+
 def _displaced(target: Frame, capture: Frame, part: tuple[slice, slice]) -> bool:
     """Whether a part of the capture fits the target clearly better some pixels away."""
     wide = cv2.copyMakeBorder(target, REACH, REACH, REACH, REACH, cv2.BORDER_CONSTANT, value=0.0)

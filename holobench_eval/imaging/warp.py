@@ -48,7 +48,7 @@ class Warp:
 
     def to_sensor(self, points: Array) -> Array:
         """Sensor coordinates ``(N, 2)`` of region coordinates ``(N, 2)``."""
-        bent = points + quadratic_terms(points, self.shape) @ self.quadratic
+        bent = points + quadratic_terms(points, self.shape) @ self.quadratic if self.quadratic.any() else points
         mapped = np.column_stack([bent, np.ones(len(bent))]) @ self.homography.T
         return np.asarray(mapped[:, :2] / mapped[:, 2:])
 

@@ -20,11 +20,13 @@ class RawFrame:
     """What a sensor with a Bayer mosaic counted.
 
     counts: ``(Hs, Ws, 3)`` uint16 red, green, blue at half the sensor's rows and columns, black level not subtracted,
-    as the sensor lies (a camera's notion of upright is not followed); white: counts from which a sample is saturated.
+    as the sensor lies (a camera's notion of upright is not followed); white: counts from which a sample is saturated;
+    black: counts of red, green and blue without light, as the file has them.
     """
 
     counts: NDArray[np.uint16]
     white: float
+    black: tuple[float, float, float]
 
 
 def read_raw(source: Path | bytes, name: str = "") -> RawFrame:
@@ -81,4 +83,14 @@ def _frame(raw: Any, where: str) -> RawFrame:
     first, second = (plane.astype(np.float64) for plane in planes["G"])
     green = np.where(np.maximum(first, second) >= white, np.maximum(first, second), np.rint((first + second) / 2))
     counts = np.stack([planes["R"][0], green.astype(np.uint16), planes["B"][0]], axis=-1)
-    return RawFrame(counts, white)
+    return RawFrame(counts, white, _black(raw, letters))
+
+
+def _black(raw: Any, letters: str) -> tuple[float, float, float]:
+    """Black levels of red, green (the mean of its two) and blue."""
+    levels = list(raw.black_level_per_channel)
+    red, green, blue = (
+        float(np.mean([level for level, letter in zip(levels, letters, strict=False) if letter == wanted]))
+        for wanted in "RGB"
+    )
+    return red, green, blue

@@ -29,6 +29,9 @@ POOLING_SIGMA = 2.0
 CONTRAST_THRESHOLD = 0.02
 COLOUR_THRESHOLD = 0.1
 SMALLEST_MOFD = 72
+LARGEST_AT_ONCE = 2**21  # pixels, those of 1080 x 1920; larger images are compared in strips, which take less memory
+STRIP = 2**18  # pixels
+REACH = RADIUS + math.ceil(4 * POOLING_SIGMA)  # rows on which the distance at a pixel depends, each way
 
 # Luma and two opponent colours, for which the eye has half the acuity.
 OPPONENT = ((0.299, 0.587, 0.114), (0.5, -0.5, 0.0), (0.25, 0.25, -0.5))
@@ -97,8 +100,14 @@ class _Scale:
     negative: Tensor
     energy: Tensor
 
+    @classmethod
+    def of(cls, opponent: Tensor) -> _Scale:
+        """That of a target's (B, K, H, W)."""
+        responses = oriented_responses(opponent)
+        return cls(-responses, gaussian_blur(responses.square().sum(1)[None], POOLING_SIGMA)[0])
+
     def distance(self, opponent: Tensor) -> Tensor:
-        """Feature difference over feature energy, both pooled over a neighbourhood, and its mean: to (B,).
+        """Feature difference over feature energy, both pooled over a neighbourhood: (B, K, H, W) to (B, H, W).
 
         Features are the responses' positive and negative parts; where two responses r and s have opposite signs the
         squared difference is r^2 + s^2, else (r - s)^2.
@@ -108,8 +117,7 @@ class _Scale:
         difference = (responses + self.negative).square().sum(1) - 2 * opposed
         pooled = gaussian_blur(torch.stack([difference, responses.square().sum(1)]), POOLING_SIGMA)
         floor = 2 * ORIENTATIONS * CONTRAST_THRESHOLD**2
-        local: Tensor = pooled[0] / (pooled[1] + self.energy + floor)
-        return local.mean(dim=(1, 2))
+        return pooled[0] / (pooled[1] + self.energy + floor)
 
 
 class FixedMofd:
@@ -120,9 +128,7 @@ class FixedMofd:
         _, side = paired(target, target, smallest=SMALLEST_MOFD)
         self._scales = []
         for scale in range(SCALES):
-            responses = oriented_responses(opponent_channels(side, scale))
-            energy = gaussian_blur(responses.square().sum(1)[None], POOLING_SIGMA)[0]
-            self._scales.append(_Scale(-responses, energy))
+            self._scales.append(_Scale.of(opponent_channels(side, scale)))
             side = _halved(side)
         self._low_pass = side
 
@@ -131,14 +137,33 @@ class FixedMofd:
         x, _ = paired(image, self.target, smallest=SMALLEST_MOFD)
         parts = []
         for scale, fixed in enumerate(self._scales):
-            parts.append(fixed.distance(opponent_channels(x, scale)))
+            parts.append(fixed.distance(opponent_channels(x, scale)).mean(dim=(1, 2)))
             x = _halved(x)
-        colour = (x - self._low_pass).square().mean(1)
-        parts.append((colour / (colour + COLOUR_THRESHOLD**2)).mean(dim=(1, 2)))
+        parts.append(_colour_distance(x, self._low_pass))
         return torch.stack(parts).mean(0).reshape(image.shape[:-3])
 
 
 _fixed = remembered(FixedMofd, most=8)
+
+
+def _colour_distance(image: Tensor, target: Tensor) -> Tensor:
+    colour = (image - target).square().mean(1)
+    return (colour / (colour + COLOUR_THRESHOLD**2)).mean(dim=(1, 2))
+
+
+def _in_strips(x: Tensor, y: Tensor) -> Tensor:
+    """The same for two large images (B, C, H, W), to (B,): equal but for rounding."""
+    parts = []
+    for scale in range(SCALES):
+        height, width = x.shape[-2:]
+        total, step = x.new_zeros(len(x)), max(1, STRIP // width)
+        for top in range(0, height, step):
+            first, bottom = max(0, top - REACH), min(height, top + step)
+            a, b = (opponent_channels(side[:, :, first : bottom + REACH], scale) for side in (x, y))
+            total = total + _Scale.of(b).distance(a)[:, top - first : bottom - first].sum(dim=(1, 2))
+        parts.append(total / (height * width))
+        x, y = _halved(x), _halved(y)
+    return torch.stack([*parts, _colour_distance(x, y)]).mean(0)
 
 
 def _halved(image: Tensor) -> Tensor:
@@ -169,7 +194,9 @@ def mofd(image: Tensor, target: Tensor) -> Tensor:
     ValueError
         Wrong shapes, types or values; see ``base.paired``.
     """
-    paired(image, target, smallest=SMALLEST_MOFD)
+    x, y = paired(image, target, smallest=SMALLEST_MOFD)
+    if image.shape[-2] * image.shape[-1] > LARGEST_AT_ONCE:
+        return _in_strips(x, y).reshape(image.shape[:-3])
     return _fixed(target)(image)
 
 

@@ -15,6 +15,7 @@ from .base import Metric, halved, mix, paired, similarity
 YIQ = ((0.299, 0.587, 0.114), (0.5959, -0.2746, -0.3213), (0.2115, -0.5227, 0.3112))
 C = 30.0
 ALPHA = 4.2
+STRIP = 2**20  # pixels
 
 
 def _haar(luma: Tensor, size: int) -> Tensor:
@@ -22,8 +23,11 @@ def _haar(luma: Tensor, size: int) -> Tensor:
     kernel = luma.new_full((size, size), 1 / size)
     kernel[size // 2 :] *= -1
     before, after = size // 2 - 1, size // 2
-    padded = functional.pad(luma, (before, after, before, after))
-    return functional.conv2d(padded, torch.stack([kernel, kernel.T])[:, None]).abs()
+    padded, both = functional.pad(luma, (before, after, before, after)), torch.stack([kernel, kernel.T])[:, None]
+    # In strips, as the convolution copies every pixel for each weight of the filter.
+    rows = max(1, STRIP // luma.shape[-1])
+    strips = (padded[:, :, top : top + rows + size - 1] for top in range(0, luma.shape[-2], rows))
+    return torch.cat([functional.conv2d(strip, both).abs() for strip in strips], dim=2)
 
 
 def haarpsi(image: Tensor, target: Tensor) -> Tensor:

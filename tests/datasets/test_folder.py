@@ -102,6 +102,14 @@ def test_gray_images_are_taken_only_when_asked_for(pictures):
     assert "0003.png" in Folder(str(pictures), gray=True).items()
 
 
+def test_a_message_names_the_gray_images_and_says_how_to_take_them(pictures):
+    for number in range(3, 10):
+        save(pictures / f"000{number}.png", mode="L")
+    line = refusal(Folder(str(pictures)))
+    assert "7 of 9 images have one channel (0003.png, 0004.png, 0005.png, 0006.png, 0007.png and 2 more)" in line
+    assert "gray: true in params" in line
+
+
 def test_a_manifest_chooses_and_pins_the_images(pictures):
     lines = [f"{sha256(pictures / name)}  {name}" for name in ("sub/deep.png", "0002.png")]
     dataset = pinned(pictures, *lines)

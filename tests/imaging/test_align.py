@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import cv2
@@ -179,19 +180,57 @@ def test_a_given_warp_is_confirmed_only_where_it_fits():
     assert confirmed(capture, target, plane(moved @ homography)) is None
 
 
+@pytest.mark.parametrize("name", ["astronaut", "coffee"])
+def test_a_baseline_in_speckle_and_haze_is_confirmed_in_a_known_pose_and_nowhere_else(name):
+    draw = np.random.default_rng(4)
+    target = photograph(name, SHAPE)
+    homography, size = pose(draw, SHAPE, scale=1.2)
+    capture = photographed.drowned(target, homography, size, draw)
+    with pytest.raises(CellError, match="not found"):
+        align(capture, target)
+    assert confirmed(capture, target, plane(homography)) is not None
+    for moved in (8.0, -8.0):
+        there = plane(np.array([[1, 0, moved], [0, 1, 0], [0, 0, 1.0]]) @ homography)
+        assert confirmed(capture, target, there) is None
+    for other in ("astronaut", "coffee", "camera", "rocket"):
+        assert (other == name) == (confirmed(capture, photograph(other, SHAPE), plane(homography)) is not None)
+
+
+@pytest.mark.parametrize("change", [half_replaced, shuffled, lambda t: 1 - t])
+def test_an_altered_target_is_not_confirmed_in_a_known_pose(change):
+    capture, target, homography = made("astronaut", 7, 0.3, scale=1.2)
+    assert confirmed(capture, np.ascontiguousarray(change(target)), plane(homography)) is None
+
+
 def test_alignments_that_agree_become_one_and_others_stay_alone():
     base = np.array([[1.2, 0, 40], [0, 1.2, 30], [0, 0, 1.0]])
 
     def shifted(by: float, correlation: float) -> Alignment:
         return Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1]]) @ base), correlation)
 
-    found = {"a": shifted(-0.4, 0.9), "b": shifted(0.4, 0.9), "far": shifted(9.0, 0.99)}
+    found = {"a": shifted(-0.2, 0.9), "b": shifted(0.2, 0.9), "far": shifted(9.0, 0.99)}
     common = shared(found)
     assert common is not None
     assert common[1] == {"a", "b"}
     assert np.abs(common[0].corners() - plane(base).corners()).max() < 0.01
-    assert shared({"a": shifted(0, 0.9), "far": shifted(9.0, 0.9)}) is None
-    assert shared({"a": shifted(0, 0.9)}) is None
+
+
+def test_a_shared_alignment_stands_only_for_those_within_a_quarter_of_a_capture_pixel():
+    still, moved = Alignment(plane(np.diag([3.0, 3.0, 1.0])), 0.99), np.diag([3.0, 3.0, 1.0])
+    for apart, stands in ((0.2, {"still", "moved"}), (0.3, set())):
+        moved[0, 2] = apart
+        common = shared({"still": still, "moved": Alignment(plane(moved), 0.6)})
+        assert common is not None
+        assert common[1] == stands
+
+
+def test_where_no_two_agree_the_best_correlated_alignment_is_there_for_those_that_are_not_found():
+    near, far = (Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1.0]])), c) for by, c in ((0, 0.9), (9, 0.8)))
+    for found in ({"near": near, "far": far}, {"near": near}):
+        common = shared(found)
+        assert common is not None
+        assert common == (near.warp, frozenset())
+    assert shared({}) is None
 
 
 def test_the_better_correlated_alignment_counts_more():
@@ -226,3 +265,58 @@ def test_a_real_capture_shows_no_other_picture():
     for name in ("astronaut", "coffee"):
         with pytest.raises(CellError, match="not found"):
             align(capture, photographed.photograph(name, (400, 400)))
+
+
+def cut(picture: Picture, homography: Array, side: str, pixels: float) -> Picture:
+    """A capture without what lies beyond a line ``pixels`` of the target inside one of its sides."""
+    ends, scale = mapped(homography, corners(SHAPE)), plane(homography).scale()
+    left, top = np.ceil(ends.min(axis=0) + pixels * scale).astype(int)
+    right, bottom = np.floor(ends.max(axis=0) - pixels * scale).astype(int)
+    window = {"left": np.s_[:, :, left:], "upper": np.s_[:, top:], "right": np.s_[:, :, :right]}
+    return np.ascontiguousarray(picture[window.get(side, np.s_[:, :bottom])])
+
+
+@pytest.mark.parametrize(("side", "pixels"), [("left", 6), ("right", 40), ("upper", 30), ("lower", 60)])
+def test_a_target_that_is_cut_off_is_found_and_the_side_is_named(side, pixels):
+    capture, target, homography = made("coffee", 2, 0.2, scale=1.2, tilt=0.0, perspective=0.0)
+    with pytest.raises(CellError, match=r"is found .*correlation 0.* --visible") as error:
+        align(cut(capture, homography, side, pixels), target)
+    found = re.findall(r"(\d+) of its pixels on the (\w+) side", str(error.value))
+    assert [name for _, name in found] == [side]
+    assert int(found[0][0]) == pytest.approx(pixels, abs=3)
+
+
+def test_a_target_of_another_scale_is_found_and_the_limits_are_named():
+    target = photograph("coffee", (1200, 1500))
+    small = cv2.resize(target.transpose(1, 2, 0), (180, 144), interpolation=cv2.INTER_AREA).transpose(2, 0, 1)
+    capture = np.pad(small, ((0, 0), (30, 30), (30, 30)))
+    with pytest.raises(
+        CellError, match=r"found .* takes 0\.1\d+ capture pixels for each of its own; 0\.2 to 8 are allowed"
+    ):
+        align(capture, target)
+
+
+def test_pictures_that_are_alike_but_for_a_part_are_told_so():
+    capture, target, _ = made("astronaut", 7, 0.1, scale=1.2)
+    altered = target.copy()
+    altered[:, :70, :120] = photograph("coffee", SHAPE)[:, :70, :120]
+    altered[:, 130:, 130:] = photograph("coffee", SHAPE)[:, 130:, 130:]
+    with pytest.raises(CellError, match=r"as a whole: the two are alike \(correlation 0\.[67]"):
+        align(capture, altered)
+
+
+@pytest.mark.parametrize(
+    ("side", "pixels", "contrast"), [("left", 80, 0.5), ("right", 40, 0.9), ("upper", 70, 0.5), ("lower", 6, 0.9)]
+)
+def test_the_visible_part_of_a_target_is_found_where_that_is_asked_for(side, pixels, contrast):
+    capture, target, homography = made("astronaut", 2, contrast, scale=1.2, turns=0)
+    part = cut(capture, homography, side, pixels)
+    found = align(part, target, partly=True)
+    full = mapped(homography, corners(SHAPE))
+    shift = (
+        (side == "left") * (capture.shape[2] - part.shape[2]),
+        (side == "upper") * (capture.shape[1] - part.shape[1]),
+    )
+    # Where nothing was seen, a corner is extrapolated.
+    assert np.linalg.norm(found.warp.corners() - (full - shift), axis=1).min() < 1.5 * found.warp.scale()
+    assert np.linalg.norm(found.warp.corners() - (full - shift), axis=1).max() < 5 * found.warp.scale()

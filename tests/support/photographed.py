@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from skimage import data
 
 Array = NDArray[np.float64]
@@ -18,6 +20,13 @@ def photograph(name: str, size: tuple[int, int] = (320, 400)) -> Picture:
     picture = np.asarray(getattr(data, name)(), dtype=np.float32) / 255
     colour = picture[..., :3] if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
     return np.ascontiguousarray(cv2.resize(colour, size[::-1], interpolation=cv2.INTER_AREA).transpose(2, 0, 1))
+
+
+def save(path: Path, picture: Picture) -> None:
+    """Write ``(1 or 3, h, w)`` in [0, 1] as levels of 8 bits; the name's ending chooses the format."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    levels = np.round(picture * 255).astype(np.uint8)
+    Image.fromarray(levels[0] if len(levels) == 1 else levels.transpose(1, 2, 0)).save(path)
 
 
 def pose(
@@ -78,6 +87,20 @@ def captured(
     speckled = np.clip(seen, 0, None) * _speckle(draw, seen.shape, contrast, grain) * beam + 0.01
     noisy = speckled / np.percentile(speckled, 99) * 0.9 + noise * draw.standard_normal(seen.shape)
     return np.round(np.clip(noisy, 0, 1) ** (1 / 2.2) * 255).astype(np.float32) / 255
+
+
+def drowned(
+    picture: Picture, homography: Array, size: tuple[int, int], draw: np.random.Generator, haze: float = 0.7
+) -> Picture:
+    """A baseline as a camera stores it: full speckle, alike in all colours, on unmodulated light beside the picture.
+
+    haze: mean of the unmodulated light over that of the picture.
+    """
+    light = np.clip(picture, 0, 1).mean(axis=0) ** 2.2
+    light = (light + haze * light.mean()).astype(np.float32)
+    seen = cv2.warpPerspective(light, homography, size[::-1]) * _speckle(draw, (1, *size), 1.0, 2.0)[0]
+    levels = np.clip(seen / np.percentile(seen, 99), 0, 1) ** (1 / 2.2)
+    return np.repeat(np.round(levels * 255)[None] / 255, 3, axis=0).astype(np.float32)
 
 
 def _speckle(draw: np.random.Generator, shape: tuple[int, ...], contrast: float, grain: float) -> Array:

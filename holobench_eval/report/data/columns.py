@@ -158,6 +158,8 @@ _FIGURES = {
     "scale_0": ("Factor of the intensity match, red", ""),
     "scale_1": ("Factor of the intensity match, green", ""),
     "scale_2": ("Factor of the intensity match, blue", ""),
+    "share_scored": ("Share of the target that is scored, which all its captures show", ""),
+    "share_seen": ("Share of the target that its capture shows", ""),
     "speckle_contrast": ("Standard deviation over mean of intensity in flat patches of the target", ""),
     "unexplained_by_target": ("Squared error of the capture that the target leaves, white being 1", _WHITE),
     "unexplained_by_ideal_image": ("The same that the ideal image of the hologram leaves", _WHITE),

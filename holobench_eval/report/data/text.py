@@ -220,8 +220,8 @@ GIVEN = replace(
     only="is the only method with a capture of every target",
     procedure=(
         "Photographs of a display and their target pictures were given as files; how the photographs were taken and "
-        "processed is unknown. No fiducials were photographed: each capture is aligned with its target from the "
-        "pictures alone. A capture is matched in intensity and scored on the pixels of its target."
+        'processed is unknown. No fiducials were photographed; "Alignment" says how each target was located in its '
+        "capture. A capture is matched in intensity and scored on the pixels of its target."
     ),
     floor="Images that nobody photographed, scored against the same targets with the same match and metrics.",
     picture="Each capture is aligned with its target and matched in intensity",

@@ -34,21 +34,30 @@ def _render(report: Report, figures: Figures) -> Blocks:
 def sentences(results: Results, records: Records) -> list[str]:
     """What a reader has to know of the geometry before the scores are believed."""
     kinds = [record["cell"]["geometry"]["kind"] for record in _captures(records)]
-    shared, own, none = (kinds.count(kind) for kind in ("shared", "own", "none"))
+    shared, own, given, none = (kinds.count(kind) for kind in ("shared", "own", "given", "none"))
     lines = [
-        "The geometry comes from the images, not from fiducials: features or templates locate a target in its capture, "
-        "and the enhanced correlation coefficient refines the homography. No score is used."
+        f"The geometry is given: {_count(given)} had the size of the target and were aligned before. Nothing was "
+        "searched. A capture of another picture has a correlation near 0."
+        if given
+        else "The geometry comes from the images, not from fiducials: features or templates locate a target in its "
+        "capture, and the enhanced correlation coefficient refines the homography. No score is used."
     ]
     if shared:
         lines.append(
-            f"One shared alignment for {_count(shared)} in one pose: the mean of their own alignments, which agree "
-            "within a pixel, so that none is better fitted than another. A capture without an alignment of its own is "
-            "included only if the shared one fits it."
+            f"One shared alignment for {_count(shared)} in one pose: the mean of the alignments that agree within a "
+            "pixel, so that none is better fitted than another. It stands for a capture whose own alignment is within "
+            "a quarter of a capture pixel (rms), and for one that is not found by itself, such as a speckled baseline, "
+            "where the two pictures are alike in this pose."
         )
     if own:
         lines.append(
-            f"An alignment of its own for {_count(own)}: no other capture of its size agrees with it within a pixel. "
-            "Its error affects its score."
+            f"An alignment of its own for {_count(own)}: the shared one, if there is one, is further away. Its error "
+            "affects its score."
+        )
+    if any("part" in record["cell"] for record in records):
+        lines.append(
+            "Of some targets only the part is scored that all their captures show, a rectangle of the target's pixels; "
+            "so is their floor."
         )
     if none:
         lines.append(f"Refused, without a score: {_count(none)}.")
@@ -57,7 +66,7 @@ def sentences(results: Results, records: Records) -> list[str]:
 
 def _captures_table(results: Results, records: Records) -> Markdown:
     """Each capture's alignment, and the headline metric by another algorithm's."""
-    score = _doubled(results)
+    score, in_part = _doubled(results), any("share_seen" in record["scores"] for record in records)
     rows = []
     for record in _captures(records):
         geometry, scores = record["cell"]["geometry"], record["scores"]
@@ -73,6 +82,7 @@ def _captures_table(results: Results, records: Records) -> Markdown:
                     else [UNKNOWN] * 4
                 ),
                 *(_pair(scores, score) if score else []),
+                *([_percent(scores, "share_seen"), _percent(scores, "share_scored")] if in_part else []),
             ]
         )
     columns = [
@@ -85,7 +95,11 @@ def _captures_table(results: Results, records: Records) -> Markdown:
         "mirrored",
     ]
     second = [score.axis, "by the second aligner", "difference", "apart [target px]"] if score else []
-    return table([*columns, *second], rows)
+    return table([*columns, *second, *(["seen [%]", "scored [%]"] if in_part else [])], rows)
+
+
+def _percent(scores: Mapping[str, float], key: str) -> str:
+    return f"{100 * scores[key]:.1f}" if key in scores else UNKNOWN
 
 
 def _captures(records: Records) -> list[Mapping[str, Any]]:

@@ -75,7 +75,7 @@ def _registration(results: Results) -> str:
     if layout.learned_display is not None:
         return "None: the network predicts in the frame of the target, and nothing is captured."
     if layout.measure == FILES:
-        return 'No fiducials. Each target was located in its capture from the two pictures alone; see "Alignment".'
+        return 'No fiducials; "Alignment" says where each target lies in its capture, and how that was found.'
     changed = done["condition"].isin(layout.changed)
     named = done["condition"].where(~changed, "displays after a change")
     residuals = [

@@ -15,7 +15,7 @@ from ..section import Blocks, Figures, Report, Section, by_method, column
 from .results import cost_columns
 
 MEMORY = "memory [MiB]"
-ELSEWHERE = ("refine_", "second_")  # how keys of figures begin that stand where the geometry is
+ELSEWHERE = ("refine_", "second_", "share_")  # how keys of figures begin that stand where the geometry is
 
 
 def _render(report: Report, _: Figures) -> Blocks:

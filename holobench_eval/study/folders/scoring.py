@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from ...core.io import now, write_atomically
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared
+from ...imaging.similarity import reduced, similarity
 from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
@@ -31,11 +32,15 @@ from ..scoring.pictures import write_thumbnail
 from ..store import Record, Store
 from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
-from .files import Folders, Picture, Values
+from .files import Folders, Key
+from .pictures import Values
+from .visible import LEAST, Part, cropped, largest_part, share, shown
 
+LARGE = 2**21  # pixels of a target: above, its floor has no score by metrics that take long
+WIDE = 2048  # pixels of a target's longer side to which the second aligner, of which 0.1 px is asked, reduces it
+SLOW = ("flip", "mofd", "lpips", "haarpsi")  # how their names begin
 CONDITION = "photographed display"
 
-Key = tuple[str, str]  # method and name of the target
 Alignments = dict[Key, Alignment | str]  # or the reason of a refusal
 Step = Callable[[str], None]  # called with the name of each step
 Draw = Callable[[Path, Values, Warp, Values, Values], None]  # file, capture, warp, matched capture, target
@@ -63,7 +68,8 @@ class Scoring:
     """Captures from folders, and how they are scored.
 
     store: of records, alignments and pictures; values: how files are read, ``stored`` (as they are), ``srgb``, or
-    ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values.
+    ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values; visible: score the part
+    of a target that all its captures show, if that is half of it; aligned: captures lie on their targets already.
     """
 
     folders: Folders
@@ -71,6 +77,8 @@ class Scoring:
     values: str
     lpips_weights: str | None
     draw: Draw
+    visible: bool = False
+    aligned: bool = False
 
     @property
     def domain(self) -> str:
@@ -84,22 +92,27 @@ class Scoring:
         return [f"{metric.name} {metric.version}" for metric in catalogue(weights) if metric.available() is None]
 
     def records(self, step: Step) -> list[Record]:
-        """A record for every method and target, and for the floor; old pictures of alignments go."""
+        """A record for every method and target, and for the floor of targets that are found in some capture.
+
+        Old pictures of alignments go.
+        """
         own = self.alignments(step)
-        placements = {**own, **self.common(own)}
+        placements = own if self.aligned else {**own, **self.common(own)}
+        parts = self.parts(placements) if self.visible else {}
         records = []
+        found = {key[1] for key, alignment in placements.items() if isinstance(alignment, Alignment)}
         for name in self.folders.targets:
             step(f"floor of {name}")
-            records += self.floor(name)
+            records += self.floor(name, parts.get(name)) if name in found else []
         kept = set()
         for method in self.folders.methods:
             for name in self.folders.targets:
                 key = (method, name)
                 if key in self.folders.captures:
                     step(f"scoring {method}, {name}")
-                records.append(
-                    self.scored(key, placements.get(key), shared=key in placements and placements[key] != own[key])
-                )
+                shared = key in placements and placements[key] != own[key]
+                kind = "given" if self.aligned else "shared" if shared else "own"
+                records.append(self.scored(key, placements.get(key), kind, parts.get(name)))
                 kept.add(alignment_name(*key))
         for old in (self.store.output / "figures").glob("alignment-*.jpg"):
             if old.name not in kept:
@@ -111,28 +124,50 @@ class Scoring:
         own: Alignments = {}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
-            target = self.folders.targets[key[1]]
-            identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT])
+            pairing, target = self.folders.pairings[key], self.folders.targets[key[1]]
+            if pairing.refused or self.aligned:
+                own[key] = pairing.refused or self.given(key)
+                continue
+            chosen = [*filter(None, [pairing.channel, "visible" if self.visible else ""])]
+            identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT, *chosen])
             path = self.store.folder / f"alignment-{identity}.json"
             plain = _read(path)
             if plain is None:
-                plain = self.aligned(picture, target)
+                plain = self.found(key)
                 write_atomically(path, f"{json.dumps(plain, sort_keys=True, allow_nan=False)}\n".encode())
             own[key] = str(plain["refused"]) if "refused" in plain else Alignment.from_dict(plain)
         return own
 
-    def aligned(self, picture: Picture, target: Picture) -> dict[str, Any]:
+    def given(self, key: Key) -> Alignment | str:
+        """Pixel to pixel, how alike a capture is to its target; or why it is refused."""
+        picture, target = self.folders.captures[key].shape[1:], self.folders.targets[key[1]].shape[1:]
+        if picture != target:
+            return (
+                f"the capture has {picture[1]} x {picture[0]} pixels and the target {target[1]} x {target[0]}; aligned "
+                "captures have the size of their target"
+            )
+        warp = Warp(target, np.eye(3), np.zeros((6, 2)))
+        frame, reference = (gray(values) for values in self.loaded(key))
+        return Alignment(warp, similarity(frame, reference, warp).overall)
+
+    def found(self, key: Key) -> dict[str, Any]:
         """The alignment of a capture by itself, or why it is refused, as plain values."""
-        if picture.shape[0] != target.shape[0]:
-            kinds = {1: "gray", 3: "in colour"}
-            return {
-                "refused": f"the capture is {kinds[picture.shape[0]]} and the target {kinds[target.shape[0]]}; "
-                "both have to be of one kind"
-            }
+        capture, target = self.loaded(key)
         try:
-            return align(self.viewable(picture.load()), target.load()).to_dict()
+            return align(self.viewable(capture), target, self.visible).to_dict()
         except CellError as error:
             return {"refused": str(error)}
+
+    def loaded(self, key: Key) -> tuple[Values, Values]:
+        """A capture and its target, in the channels that are compared."""
+        capture, target = self.folders.captures[key].load(), self.folders.targets[key[1]].load()
+        index = self.folders.pairings[key].index
+        return (capture, target) if index is None else (capture[index : index + 1], target[:1])
+
+    def floor_channels(self, name: str) -> int:
+        """How many channels of a target its floor has: one where a capture of it is scored on one."""
+        single = any(pairing.channel for (_, target), pairing in self.folders.pairings.items() if target == name)
+        return 1 if single else self.folders.targets[name].shape[0]
 
     def viewable(self, values: Values) -> Values:
         """Display-encoded values of a capture, in which it can be compared with its target by eye and by features."""
@@ -146,7 +181,8 @@ class Scoring:
         captures, targets = self.folders.captures, self.folders.targets
         groups: dict[tuple[int, ...], list[Key]] = {}
         for key, picture in captures.items():
-            groups.setdefault((*picture.shape, *targets[key[1]].shape), []).append(key)
+            if not self.folders.pairings[key].refused:
+                groups.setdefault((*picture.shape[1:], *targets[key[1]].shape[1:]), []).append(key)
         placements: Alignments = {}
         for keys in groups.values():
             common = shared({key: alignment for key in keys if isinstance(alignment := own[key], Alignment)})
@@ -155,14 +191,38 @@ class Scoring:
             warp, agreeing = common
             for key in keys:
                 if key in agreeing or isinstance(own[key], str):
-                    fit = confirmed(self.viewable(captures[key].load()), targets[key[1]].load(), warp)
+                    capture, target = self.loaded(key)
+                    fit = confirmed(self.viewable(capture), target, warp, self.visible)
                     placements |= {key: fit} if fit is not None else {}
         return placements
 
-    def scored(self, key: Key, alignment: Alignment | str | None, shared: bool) -> Record:
+    def parts(self, placements: Alignments) -> dict[str, Part]:
+        """The part of each target that all its captures show, where it is not all of it.
+
+        Where that is less than `LEAST` of the target, ``placements`` gets a refusal for each of them.
+        """
+        parts = {}
+        for name, target in self.folders.targets.items():
+            found = {key: warp.warp for key, warp in placements.items() if key[1] == name and not isinstance(warp, str)}
+            masks = [shown(warp, self.folders.captures[key].shape[1:]) for key, warp in found.items()]
+            if not masks or all(mask.all() for mask in masks):
+                continue
+            part = largest_part(np.logical_and.reduce(masks))
+            if share(part, target.shape[1:]) >= LEAST:
+                parts[name] = part
+                continue
+            seen = ", ".join(f"{key[0]} {mask.mean():.0%}" for key, mask in zip(found, masks, strict=True))
+            placements |= dict.fromkeys(
+                found,
+                f"the captures of this target have {share(part, target.shape[1:]):.0%} of it in common ({seen}), and "
+                f"{LEAST:.0%} is needed; score those that show least apart",
+            )
+        return parts
+
+    def scored(self, key: Key, alignment: Alignment | str | None, kind: str, part: Part | None) -> Record:
         """The record of a capture: kept, or computed."""
         method, name = key
-        cell = self.cell(method, name, alignment, "shared" if shared else "own")
+        cell = self.cell(method, name, alignment, kind, part=part)
         if alignment is None:
             return Record(cell, "missing", method, f"no capture of '{name}' in the folder of {method}")
         if isinstance(alignment, str):
@@ -173,15 +233,20 @@ class Scoring:
         kept = self.store.read(digest(cell))
         if kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file():
             return kept
-        capture, target = self.folders.captures[key].load(), self.folders.targets[name].load()
-        image = torch.from_numpy(sampled(self.capture_values(capture), alignment.warp))
+        capture, target = self.loaded(key)
+        warp = alignment.warp if part is None else cropped(alignment.warp, part)
+        target = _of(target, part)
+        image = torch.from_numpy(sampled(self.capture_values(capture), warp))
         reference = torch.from_numpy(self.target_values(target))
-        scores = self.scores(image, reference) | self.second(capture, target, alignment.warp)
-        full = sampled((capture >= 1).astype(np.float32), alignment.warp)
+        scores = self.scores(image, reference) | self.second(capture, target, warp)
+        if self.visible:
+            scores["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
+            scores["share_scored"] = 1.0 if part is None else share(part, alignment.warp.shape)
+        full = sampled((capture >= 1).astype(np.float32), warp)
         record = Record(cell, "done", method, scores=scores, saturated=float((full > 0.5).mean()))
         matched, _ = match(image, reference)
         write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
-        self.draw(figure, self.viewable(capture), alignment.warp, self.encoded(matched), target)
+        self.draw(figure, self.viewable(capture), warp, self.encoded(matched), target)
         self.store.write(record)
         return record
 
@@ -189,9 +254,13 @@ class Scoring:
         """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""
         frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
         light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(compared)
-        other = second_warp(gray(light.numpy()), gray(reference.numpy()), first)
-        if other is None:
+        small, to_target = reduced(gray(reference.numpy()), WIDE)
+        shrunk, to_frame = reduced(gray(light.numpy()), round(max(frame.shape) * max(small.shape) / max(first.shape)))
+        homography = np.linalg.inv(to_frame) @ first.homography @ to_target
+        found = second_warp(shrunk, small, Warp((small.shape[0], small.shape[1]), homography, np.zeros((6, 2))))
+        if found is None:
             return {}
+        other = replace(first, homography=to_frame @ found.homography @ np.linalg.inv(to_target))
         image = torch.from_numpy(sampled(frame, other))
         other_scores = score(
             image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored"
@@ -199,30 +268,40 @@ class Scoring:
         scores = {f"{name}_{self.domain}_second": other_scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return scores | {"second_aligner_px": disagreement(first, other)}
 
-    def floor(self, name: str) -> list[Record]:
+    def floor(self, name: str, part: Part | None) -> list[Record]:
         """The records of floor images."""
         names = list(self.folders.targets)
         after = names[names.index(name) + 1 :] + names[: names.index(name)]
-        shape = self.folders.targets[name].shape
-        wrong = [other for other in after if self.folders.targets[other].shape == shape][:1]
+        targets, channels = self.folders.targets, self.floor_channels(name)
+        fitting = [other for other in after if targets[other].shape[1:] == targets[name].shape[1:]]
+        wrong = [other for other in fitting if self.floor_channels(other) == channels][:1]
         rows = [row for row in FLOORS if wrong or row != "floor_wrong_target"]
-        cells = {row: self.cell(row, name, None, "reference", wrong[0] if "wrong" in row else "") for row in rows}
+        given = {row: wrong[0] if "wrong" in row else "" for row in rows}
+        cells = {row: self.cell(row, name, None, "reference", given[row], part) for row in rows}
         kept = [record for cell in cells.values() if (record := self.store.read(digest(cell))) is not None]
         thumbnail = self.store.target_thumbnail(name)
         if len(kept) == len(rows) and thumbnail.is_file():
             return kept
-        pair = (self.folders.targets[target].load() for target in (name, *wrong))
+        pair = (_of(targets[target].load()[:channels], part) for target in (name, *wrong))
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
         pictures = floor_captures(reference, others, name)
-        records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], reference)) for row in rows]
+        quick = self.quick if reference[0].numel() > LARGE else None
+        records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], reference, quick)) for row in rows]
         for record in records:
             self.store.write(record)
         return records
 
-    def scores(self, image: Tensor, reference: Tensor) -> dict[str, float]:
-        """All of the protocol, in the domains that the values have."""
-        scores = score(image, reference, lpips_weights=self.lpips_weights, stored=self.values == "stored")
+    @cached_property
+    def quick(self) -> tuple[str, ...]:
+        """Names of the metrics without the `SLOW` ones."""
+        names = (name.partition(" ")[0] for name in self.metrics)
+        return (*(name for name in names if not name.startswith(SLOW)), "speckle_contrast")
+
+    def scores(self, image: Tensor, reference: Tensor, metrics: tuple[str, ...] | None = None) -> dict[str, float]:
+        """All of the protocol, or some metrics of it, in the domains that the values have."""
+        weights, stored = self.lpips_weights, self.values == "stored"
+        scores = score(image, reference, lpips_weights=weights, stored=stored, metrics=metrics)
         return scores if len(image) > 1 else {"match_factor" if k == "scale_0" else k: v for k, v in scores.items()}
 
     def target_values(self, target: Values) -> Values:
@@ -243,10 +322,19 @@ class Scoring:
         return values.float().numpy()
 
     def cell(
-        self, method: str, name: str, alignment: Alignment | str | None, kind: str, wrong: str = ""
+        self,
+        method: str,
+        name: str,
+        alignment: Alignment | str | None,
+        kind: str,
+        wrong: str = "",
+        part: Part | None = None,
     ) -> dict[str, Any]:
         """The plain description of a number."""
         capture = self.folders.captures.get((method, name))
+        channel = self.folders.pairings[method, name].channel if capture else ""
+        if kind == "reference" and self.floor_channels(name) < self.folders.targets[name].shape[0]:
+            channel = "gray"
         geometry: dict[str, Any] = {"kind": kind}
         if kind != "reference":
             geometry = {"kind": kind, **alignment.to_dict()} if isinstance(alignment, Alignment) else {"kind": "none"}
@@ -263,11 +351,19 @@ class Scoring:
             "repeat": 0,
             "values": self.values,
             "geometry": geometry,
+            **({"channel": channel} if channel else {}),
+            **({"part": list(part)} if part else {}),
+            **({"visible": True} if self.visible and kind != "reference" else {}),
             "protocol": VERSION,
             "metrics": self.metrics,
             "harness_sha256": HARNESS,
             "code_sha256": ALIGNMENT,
         }
+
+
+def _of(picture: Values, part: Part | None) -> Values:
+    """A part of ``(C, h, w)``, or all of it."""
+    return picture if part is None else np.ascontiguousarray(picture[:, part[0] : part[1], part[2] : part[3]])
 
 
 def _read(path: Path) -> dict[str, Any] | None:

@@ -1,0 +1,73 @@
+"""Which channels of a capture are compared with its target, and captures that cannot be compared at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .pictures import Picture
+
+NAMES = ("red", "green", "blue")
+LASER = 0.3  # of the strongest channel: what filters of a colour camera let through of a laser that is not theirs
+FEWEST_LEVELS = 8  # rounding to so many leaves an error of 29 dB, as large as that of a good hologram
+
+UNKNOWN = "which gray picture was shown is not known; save the target as it was shown, in gray"
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """How a capture is compared with its target.
+
+    channel: the one channel of the capture that is compared with a gray target, ``gray`` where all its channels are
+    equal (empty: all channels, as they are); refused: why there is no comparison (empty: there is one).
+    """
+
+    channel: str = ""
+    refused: str = ""
+
+    @property
+    def index(self) -> int | None:
+        """The index of the capture's channel; None for all channels."""
+        return NAMES.index(self.channel) if self.channel in NAMES else 0 if self.channel else None
+
+
+def paired(capture: Picture, target: Picture) -> Pairing:
+    """How a capture is compared with its target.
+
+    A single laser in a colour photograph: one channel has the light, and the others have noise, which is no error of
+    the hologram. Gray and colour go together where nothing is lost and nothing is guessed.
+    """
+    if capture.levels is not None and capture.levels <= FEWEST_LEVELS:
+        return Pairing(
+            refused=f"the capture is under-exposed: it has {capture.levels} levels of brightness, whose rounding would "
+            f"decide the score; more than {FEWEST_LEVELS} are needed, and a bright capture has a hundred"
+        )
+    laser = _single_laser(capture, target)
+    if laser is not None and not target.gray:
+        return Pairing(
+            refused=f"the capture has light in its {NAMES[laser]} channel alone and the target is in colour: {UNKNOWN}"
+        )
+    if laser is not None:
+        return Pairing(NAMES[laser])
+    if capture.shape[0] == target.shape[0]:
+        return Pairing()
+    if capture.gray and target.gray:
+        return Pairing("gray")
+    if capture.gray:
+        return Pairing(refused=f"the capture is gray and the target in colour: {UNKNOWN}")
+    shares = ", ".join(
+        f"{value / max(capture.structure):.2f} in {name}" for name, value in zip(NAMES, capture.structure, strict=True)
+    )
+    return Pairing(
+        refused=f"the capture is in colour and the target gray, and no channel has nearly all of the light ({shares} "
+        f"of the strongest; up to {LASER:g} is a single laser); save the channel that saw the display in gray"
+    )
+
+
+def _single_laser(capture: Picture, target: Picture) -> int | None:
+    """The channel of a colour photograph that has nearly all of the light that the target has; None: no single one."""
+    wanted = target.structure if len(target.structure) == 3 else target.structure * 3
+    if capture.gray or min(wanted) <= LASER * max(wanted):  # a target of one colour has its light in one channel itself
+        return None
+    seen = [own / of_target for own, of_target in zip(capture.structure, wanted, strict=True)]
+    second, strongest = sorted(seen)[1:]
+    return seen.index(strongest) if second <= LASER * strongest else None

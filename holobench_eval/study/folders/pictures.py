@@ -1,0 +1,156 @@
+"""A picture file of ``holoeval score``: checked when it is first read, and decoded without a guess."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ...core.errors import UserError
+from ...core.io import decode_levels
+from ...datasets.images import PNG_END, opened, read
+from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
+from ...lab.raw import read_raw
+
+SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".webp", ".jpg", ".jpeg")
+RAW_SUFFIXES = (
+    ".arw",
+    ".cr2",
+    ".cr3",
+    ".dng",
+    ".nef",
+    ".orf",
+    ".pef",
+    ".rw2",
+    ".srw",
+)  # of cameras with a Bayer mosaic
+FORMATS = ("PNG", "TIFF", "BMP", "WEBP", "JPEG")
+MODES = ("1", "L", "P", "RGB", "LA", "RGBA")  # that are decoded without loss, if an alpha channel is opaque
+RIGHT = "expected an 8-bit or 16-bit PNG or TIFF, gray or RGB, or a BMP, WebP or JPEG"
+SMALLEST = 32  # pixels a side
+WIDEST = 16_384  # pixels a side
+BRIGHT = 99.9  # percent of the pixels that are darker than the brightest of interest; the others may be hot
+DIM = 0.1  # of full scale: below, the levels are counted
+FACTS_SIDE = 96  # pixels of the longer side to which noise is averaged away
+
+Values = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture file that was read once and is valid.
+
+    shape: ``(C, h, w)``, C = 1 or 3; sha256: of the file; pixels_sha256: of its values. gray: whether all channels are
+    equal; opaque: whether an alpha channel was left out that is opaque everywhere; is_lossy: whether it was compressed
+    with loss. structure: standard deviation of each channel's values, noise averaged away; levels: how many levels the
+    picture has, where it is darker than a tenth of full scale (None: it is brighter).
+    """
+
+    path: Path
+    shape: tuple[int, int, int]
+    sha256: str
+    pixels_sha256: str
+    gray: bool
+    opaque: bool
+    is_lossy: bool
+    structure: tuple[float, ...]
+    levels: int | None
+
+    @property
+    def is_raw(self) -> bool:
+        """Whether it is a camera's RAW file, whose values are linear in light."""
+        return self.path.suffix.lower() in RAW_SUFFIXES
+
+    def load(self) -> Values:
+        """Its values ``(C, h, w)`` as stored, over the full scale of 8 or 16 bits. UserError if it was changed.
+
+        Of a RAW file: counts above black, over those of white.
+        """
+        content = read(self.path)
+        if hashlib.sha256(content).hexdigest() != self.sha256:
+            raise UserError(f"{self.path}: changed while it was being scored; start again")
+        return _decoded(content, self.path)[0]
+
+
+def checked(path: Path) -> Picture:
+    """A picture file, read and looked at. UserError for one that is damaged, of another kind, or of another size."""
+    try:
+        content = read(path)
+        values, alpha = _decoded(content, path)
+    except UserError as error:
+        raise UserError(str(error).replace(RIGHT_FOR_DATASETS, RIGHT)) from error
+    channels, height, width = values.shape
+    if min(height, width) < SMALLEST or max(height, width) > WIDEST:
+        raise UserError(f"{path}: {width} x {height} pixels; expected sides from {SMALLEST} to {WIDEST} pixels")
+    return Picture(
+        path,
+        (channels, height, width),
+        hashlib.sha256(content).hexdigest(),
+        hashlib.sha256(repr(values.shape).encode() + values.tobytes()).hexdigest(),
+        gray=all(np.array_equal(plane, values[0]) for plane in values[1:]),
+        opaque=alpha,
+        is_lossy=path.suffix.lower() in (".jpg", ".jpeg") or (content[8:12] == b"WEBP" and b"VP8L" not in content[:64]),
+        structure=tuple(_structure(plane) for plane in values),
+        levels=_levels(values),
+    )
+
+
+def _structure(plane: Values) -> float:
+    """Standard deviation of a plane ``(h, w)`` reduced to a size at which noise and grains are averaged."""
+    factor = min(1.0, FACTS_SIDE / max(plane.shape))
+    size = (max(1, round(plane.shape[1] * factor)), max(1, round(plane.shape[0] * factor)))
+    return float(np.std(cv2.resize(plane, size, interpolation=cv2.INTER_AREA)))
+
+
+def _levels(values: Values) -> int | None:
+    """How many levels the brightest channel has; None for a picture that is not dim."""
+    ends = [float(np.percentile(plane, BRIGHT)) for plane in values]
+    brightest = values[int(np.argmax(ends))]
+    return None if max(ends) > DIM else len(np.unique(brightest[brightest <= max(ends)]))
+
+
+def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:
+    """``(C, h, w)`` values over full scale, and whether an opaque alpha channel was left out.
+
+    UserError for a file that is damaged or of another kind.
+    """
+    if path.suffix.lower() in RAW_SUFFIXES:
+        raw = read_raw(content, str(path))
+        black = np.array(raw.black, dtype=np.float32)
+        if black.max() >= raw.white:
+            raise UserError(f"{path}: black at {black.max():g} counts and white at {raw.white:g}; expected black below")
+        values = (raw.counts - black) / (np.float32(raw.white) - black)
+        return np.ascontiguousarray(values.transpose(2, 0, 1), dtype=np.float32), False
+    image = opened(content, str(path))
+    if image.format not in FORMATS:
+        raise UserError(f"{path}: a {image.format} file under another name; {RIGHT}")
+    if "transparency" in image.info:
+        raise UserError(f"{path}: an image with a transparent colour; {RIGHT}")
+    if image.mode not in MODES and not image.mode.startswith("I;16"):
+        raise UserError(f"{path}: an image of mode {image.mode}; {RIGHT}")
+    _load(image, content, path)
+    pixels = decode_levels(content)
+    if pixels is None:
+        raise UserError(f"{path}: an image that cannot be decoded; {RIGHT}")
+    full = 255 if pixels.dtype == np.uint8 else 65535
+    alpha = pixels.ndim == 3 and pixels.shape[2] == 4
+    if alpha and pixels[..., 3].min() < full:
+        raise UserError(f"{path}: an image with alpha that is not opaque everywhere; {RIGHT}")
+    planes = pixels[None] if pixels.ndim == 2 else pixels[..., :3].transpose(2, 0, 1)
+    return np.ascontiguousarray(planes, dtype=np.float32) / np.float32(full), alpha
+
+
+def _load(image: Image.Image, content: bytes, path: Path) -> None:
+    """Decode the file with Pillow, which reports truncated files that OpenCV would pad."""
+    if image.format == "PNG" and PNG_END not in content:
+        raise UserError(f"{path}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
+    try:
+        image.load()
+    except Exception as error:  # whatever a decoder trips over in a damaged file
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path}: truncated or damaged: {reason}; {RIGHT}") from error

@@ -1,0 +1,205 @@
+"""``holoeval score`` on photographs as laboratories have them: one laser, too dark, cut off, speckled, aligned."""
+
+from __future__ import annotations
+
+import io
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from holobench_eval.commands.score import score_folders
+from holobench_eval.core.errors import UserError
+from holobench_eval.metrics import score
+from holobench_eval.study.folders import scoring as scored_pictures
+from tests.support.bayer import bayer_dng
+from tests.support.photographed import Picture, captured, drowned, photograph, pose, save
+from tests.support.reports import whole
+
+SHAPE = (160, 200)
+KEY = "psnr_stored_db"
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """Only the two metrics that are quick."""
+
+    def few(*pictures: Any, **options: Any) -> dict[str, float]:
+        return score(*pictures, **{**options, "metrics": ("psnr", "ssim")})
+
+    monkeypatch.setattr(scored_pictures, "score", few)
+
+
+def run(root: Path, values: str = "stored", **options: Any) -> tuple[str, str, pd.DataFrame]:
+    """The whole report, what the terminal shows, and the records of captures by method and target."""
+    console = Console(file=io.StringIO(), width=200)
+    report, _ = score_folders(root / "captures", root / "targets", root / "out", values, None, None, console, **options)
+    records = pd.read_csv(root / "out" / "records.csv").set_index(["label", "target"])
+    return whole(report), console.file.getvalue(), records[records["category"] == "given"]
+
+
+def gray(picture: Picture) -> Picture:
+    return np.repeat(picture.mean(axis=0, keepdims=True), 3, axis=0)
+
+
+def test_one_laser_in_a_colour_photograph_is_scored_on_its_channel_and_methods_keep_their_order(tmp_path):
+    target = gray(photograph("astronaut", SHAPE))
+    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
+    save(tmp_path / "targets" / "astronaut.png", target)
+    for method, contrast, noise in (("better", 0.3, 0.03), ("worse", 0.5, 0.0)):
+        draw = np.random.default_rng(2)
+        capture = captured(target, where, size, draw, contrast=contrast)
+        save(tmp_path / "captures" / f"plane of {method}" / "astronaut.png", capture[:1])
+        capture[1:] = np.abs(noise * draw.standard_normal(capture[1:].shape))
+        save(tmp_path / "captures" / method / "astronaut.png", capture)
+    text, terminal, records = run(tmp_path)
+    found = records[KEY].droplevel("target")
+    assert found["better"] > found["worse"] + 0.5
+    assert found["better"] == pytest.approx(found["plane of better"], abs=0.01)
+    for said in (text, terminal):
+        assert "Scored on the red channel alone" in said
+        assert "better/astronaut, worse/astronaut" in said
+
+
+def test_an_under_exposed_capture_has_no_score_and_is_never_the_best(tmp_path):
+    target = photograph("astronaut", SHAPE)
+    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
+    save(tmp_path / "targets" / "astronaut.png", target)
+    speckled = captured(target, where, size, np.random.default_rng(2), contrast=0.7)
+    save(tmp_path / "captures" / "speckled" / "astronaut.png", speckled)
+    clean = captured(target, where, size, np.random.default_rng(2), contrast=0)
+    save(tmp_path / "captures" / "dark" / "astronaut.png", clean * 3 / 255)
+    text, _, records = run(tmp_path)
+    assert records["state"].droplevel("target").to_dict() == {"dark": "failed", "speckled": "done"}
+    assert "under-exposed: it has 4 levels" in text
+    assert records["reason"].str.contains("under-exposed").sum() == 1
+
+
+def test_raw_files_are_scored_as_linear_light_alone(tmp_path):
+    pytest.importorskip("rawpy")
+    target = photograph("astronaut", SHAPE)[:1]
+    save(tmp_path / "targets" / "astronaut.png", target)
+    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
+    light = captured(np.repeat(target, 3, axis=0), where, size, np.random.default_rng(2), contrast=0.2)[0] ** 2.2
+    mosaic = np.full((2 * light.shape[0], 2 * light.shape[1]), 512, np.uint16)
+    mosaic[::2, ::2] += np.round(light * 15000).astype(np.uint16)
+    (tmp_path / "captures" / "m").mkdir(parents=True)
+    (tmp_path / "captures" / "m" / "astronaut.dng").write_bytes(bayer_dng(mosaic))
+    with pytest.raises(UserError, match="a RAW file holds linear light; expected --values linear"):
+        run(tmp_path)
+    _, _, records = run(tmp_path, values="linear")
+    assert records.loc[("m", "astronaut"), "psnr_linear_db"] > 18
+
+
+def cut_off(root: Path, **lacking: int) -> Path:
+    """Captures of a target, each without so many pixels of it on the left."""
+    target = photograph("astronaut", SHAPE)
+    save(root / "targets" / "astronaut.png", target)
+    for method, pixels in lacking.items():
+        where = np.array([[1.5, 0, 30 - 1.5 * pixels], [0, 1.5, 25], [0, 0, 1]])
+        capture = captured(target, where, (300, 400), np.random.default_rng(3), contrast=0.3)
+        save(root / "captures" / method / "astronaut.png", capture[:, :, 30 * (pixels > 0) :])
+    return root
+
+
+def test_a_cut_capture_names_the_side_and_with_visible_its_part_is_scored_and_its_share_is_told(tmp_path):
+    root = cut_off(tmp_path, whole=0, cut=40)
+    text, _, records = run(root)
+    assert records["state"].droplevel("target").to_dict() == {"cut": "failed", "whole": "done"}
+    assert "40 of its pixels on the left side" in text
+    entire = records.loc[("whole", "astronaut"), KEY]
+    text, terminal, records = run(root, visible=True)
+    assert (records["state"] == "done").all()
+    shares = records.droplevel("target")[["share_seen", "share_scored"]]
+    assert shares.loc["whole", "share_seen"] == 1
+    assert shares.loc["cut", "share_seen"] == pytest.approx(0.8, abs=0.01)
+    assert shares["share_scored"].to_list() == pytest.approx([0.8] * 2, abs=0.01)
+    assert "Seen of it: cut 79." in terminal
+    assert "seen [%]" in text
+    assert "--visible" in text
+    # Both are scored on the same pixels, and the same photograph with the same speckle has nearly the same score.
+    found = records[KEY].droplevel("target")
+    assert found["cut"] == pytest.approx(found["whole"], abs=1.0)
+    assert found["whole"] != entire
+
+
+def test_visible_changes_no_score_of_captures_that_show_all(tmp_path):
+    root = cut_off(tmp_path, a=0, b=0)
+    _, _, before = run(root)
+    _, _, after = run(root, visible=True)
+    assert after[KEY].to_dict() == before[KEY].to_dict()
+    assert (after["share_scored"] == 1).all()
+
+
+def test_captures_that_have_little_of_their_target_in_common_are_refused_with_the_share_of_each(tmp_path):
+    target = photograph("astronaut", SHAPE)
+    save(tmp_path / "targets" / "astronaut.png", target)
+    capture = captured(target, np.diag([1.5, 1.5, 1]), (240, 300), np.random.default_rng(3), contrast=0.2)
+    save(tmp_path / "captures" / "left" / "astronaut.png", capture[:, :, :205])
+    save(tmp_path / "captures" / "right" / "astronaut.png", capture[:, :, 95:])
+    text, _, records = run(tmp_path, visible=True)
+    assert (records["state"] == "failed").all()
+    assert re.search(
+        r"have 3\d% of it in common \(left 6\d%, right 6\d%\), and 50% is needed", records["reason"].iloc[0]
+    )
+    assert "in common" in text
+
+
+def test_aligned_captures_are_scored_as_they_are_however_speckled(tmp_path):
+    target = photograph("astronaut", SHAPE)
+    save(tmp_path / "targets" / "astronaut.png", target)
+    capture = drowned(target, np.eye(3), SHAPE, np.random.default_rng(3))
+    save(tmp_path / "captures" / "speckled" / "astronaut.png", capture)
+    save(tmp_path / "captures" / "larger" / "astronaut.png", np.pad(capture, ((0, 0), (1, 1), (0, 0))))
+    text, _, records = run(tmp_path)
+    assert (records["state"] == "failed").all()
+    text, _, records = run(tmp_path, aligned=True)
+    assert records["state"].droplevel("target").to_dict() == {"larger": "failed", "speckled": "done"}
+    assert "200 x 162 pixels and the target 200 x 160; aligned captures have the size of their target" in text
+    assert "The geometry is given" in text
+    assert "--aligned" in text
+    levels = np.round(capture * 255).astype(np.float32) / 255
+    expected = score(levels, np.round(target * 255) / 255, metrics=("psnr",), stored=True, refine=False, blur=())
+    assert records.loc[("speckled", "astronaut"), KEY] == pytest.approx(expected["psnr_stored"], abs=1e-3)
+
+
+def test_aligned_and_visible_exclude_each_other(tmp_path):
+    with pytest.raises(UserError, match="expected one of the two"):
+        run(cut_off(tmp_path, a=0), visible=True, aligned=True)
+
+
+def test_a_baseline_that_is_not_found_by_itself_is_scored_in_the_pose_of_its_session(tmp_path):
+    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
+    for name in ("astronaut", "coffee"):
+        target = photograph(name, SHAPE)
+        save(tmp_path / "targets" / f"{name}.png", target)
+        draw = np.random.default_rng(5)
+        save(tmp_path / "captures" / "good" / f"{name}.png", captured(target, where, size, draw, contrast=0.2))
+        save(tmp_path / "captures" / "baseline" / f"{name}.png", drowned(target, where, size, draw))
+    text, _, records = run(tmp_path)
+    assert (records["state"] == "done").all()
+    assert "for one that is not found by itself" in text
+    assert (records.loc["good", KEY] > records.loc["baseline", KEY] + 2).all()
+    shutil.rmtree(tmp_path / "captures" / "good")
+    _, _, alone = run(tmp_path)
+    assert (alone["state"] == "failed").all()
+
+
+def test_a_target_that_no_capture_shows_has_no_floor_and_alone_it_makes_a_report_of_reasons(tmp_path):
+    for name, seen in (("astronaut", "astronaut"), ("coffee", "rocket")):
+        save(tmp_path / "targets" / f"{name}.png", photograph(name, SHAPE))
+        save(tmp_path / "captures" / "m" / f"{name}.png", np.pad(photograph(seen, SHAPE), ((0, 0), (20, 20), (20, 20))))
+    text, _, records = run(tmp_path)
+    assert records["state"].to_dict() == {("m", "astronaut"): "done", ("m", "coffee"): "failed"}
+    everything = pd.read_csv(tmp_path / "out" / "records.csv")
+    assert set(everything.loc[everything["category"] == "floor", "target"]) == {"astronaut"}
+    for place in ("targets", "captures/m"):
+        (tmp_path / place / "astronaut.png").unlink()
+    text, _, records = run(tmp_path)
+    assert "the target is not found in the capture" in text
+    assert list(pd.read_csv(tmp_path / "out" / "records.csv")["category"]) == ["given"]
