@@ -112,6 +112,15 @@ def test_lines_and_bar_show_the_time_left_of_the_run(tmp_path: Path) -> None:
         bar.expects(lambda: 90.0)
         bar.started(task)
     assert "0:01:30" in text.getvalue()
+    assert "at least" not in text.getvalue()
+    with watching(Console(file=text, force_terminal=True, width=120)) as bar:
+        bar.planned(2, 2, 0)
+        bar.expects(lambda: 90.0, lambda: False)
+    assert "at least 0:01:30" in text.getvalue()
+    watch.expects(lambda: 90.0, lambda: False)
+    now[0] += 10
+    watch.started(task)
+    assert ", at least 90 s left; now" in lines[-1]
 
 
 @pytest.mark.usefixtures("no_physics")
@@ -127,3 +136,17 @@ def test_a_run_says_what_is_left_of_it_and_ends_with_nothing(tmp_path: Path) -> 
     run(study, planning.plan(study), tmp_path / "out", Serial(), Asking(lambda line: None), 1, tmp_path / "artifacts")
     assert all(seconds is not None and seconds >= 0 for seconds in seen)
     assert seen[-1] == 0
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"))
+    study = load_study(config)
+    seen: list[str] = []
+
+    class Naming(Lines):
+        def started(self, task: planning.Task) -> None:
+            seen.append(task.label)
+
+    run(study, planning.plan(study), tmp_path / "out", Serial(), Naming(lambda line: None), 1, tmp_path / "artifacts")
+    assert seen == ["floor", "Toy", "Seeing", "floor", "floor", "Toy", "Toy", "Seeing", "Seeing"]
