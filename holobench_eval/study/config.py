@@ -54,7 +54,9 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     """
     document, changes = load(Path(path)), changes or Changes()
     document = changed(replace(document, data=_long_form(document.data)), changes)
-    study = replace(typed(document, Study), file=Path(path), text=document.text, changes=changes)
+    study = replace(
+        typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text, changes=changes
+    )
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))

@@ -85,6 +85,20 @@ def test_the_table_of_a_preview_shows_sums_and_brackets(tmp_path: Path) -> None:
     )
 
 
+def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path: Path) -> None:
+    study = load_study(write_config(tmp_path))
+    rows = [
+        Row("online_camera_network", 3, 28, 1234, 2800, 1000, 12, 1222, 12345.0),
+        Row("x" * 60, 3, 28, 84, None, 0, 0, 84, None),
+    ]
+    text = io.StringIO()
+    Console(file=text, width=80).print(table(study, rows))
+    lines = text.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "…" not in text.getvalue()
+    assert all(any(word in line.split() for line in lines) for word in ("displays", "captures", "1222", "2800", "1318"))
+
+
 def test_the_table_of_a_preview_says_how_many_cells_are_floors(tmp_path: Path) -> None:
     config = write_config(tmp_path)
     study, text = load_study(config), io.StringIO()
