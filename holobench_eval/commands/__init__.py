@@ -55,6 +55,9 @@ def _name(file: str) -> str:
 class _ByPurpose(TyperGroup):
     """A help that lists the commands as ``COMMANDS`` does, a line each."""
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        return super().parse_args(ctx, ["--version"] if "--version" in args else args)  # after a command, too
+
     def list_commands(self, ctx: Any) -> list[str]:
         return [_name(file) for files in COMMANDS.values() for file in files]
 

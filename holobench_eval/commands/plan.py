@@ -6,8 +6,9 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from rich import box
 from rich.markup import escape
 from rich.table import Table
 
@@ -139,14 +140,15 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
 
 
 def table(study: Study, rows: list[Row]) -> Table:
-    """The rows as a table with a line of sums."""
-    result = Table(title=escape(study.title), title_justify="left", show_footer=True)
+    """The rows as a table with a line of sums, in 80 columns."""
+    look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "padding": 0, "show_edge": False}
+    result = Table(title=escape(study.title), title_justify="left", show_footer=True, **look)
     floors = sum(row.cells for row in rows if row.label == FLOOR)
     result.add_column("method", footer=f"all, {floors} of them floors" if floors else "all", overflow="fold")
     numbers = ("conditions", "targets", "cells", "done", "failed", "missing")
     for name in numbers:
         total = str(sum(getattr(row, name) for row in rows)) if name in numbers[2:] else ""
-        result.add_column(name, justify="right", footer=total)
+        result.add_column("displays" if name == "conditions" else name, justify="right", footer=total)
     result.add_column("captures", justify="right")
     timed = [row.seconds for row in rows if row.seconds is not None]
     untimed = any(row.seconds is None and row.label != FLOOR for row in rows)

@@ -49,7 +49,7 @@ def study_schema() -> dict[str, Any]:
     ):
         entry = shared[definition]["properties"]
         entry[key] = {name: entry[key][name] for name in ("default", "description") if name in entry[key]} | choice
-    for key, definition, kind in (
+    for key, definition, what in (
         ("name", "MethodEntry", "method"),
         ("name", "Probe", "method"),
         ("method", "Learned", "method"),
@@ -59,7 +59,7 @@ def study_schema() -> dict[str, Any]:
         shared[definition]["allOf"] = [
             _params_of(key, name.partition(" ")[2], reference, shared[definition])
             for name, reference in references.items()
-            if name.startswith(f"{kind} ")
+            if name.startswith(f"{what} ")
         ]
     display = shared["DisplayGrid"]
     display["properties"]["profiles"] |= {"items": profile, "minItems": 1}

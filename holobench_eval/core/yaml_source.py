@@ -116,6 +116,8 @@ def _line_and_column(error: yaml.MarkedYAMLError) -> str:
 
 
 def _sentence(error: yaml.MarkedYAMLError) -> str:
+    if "'\\t'" in str(error.problem):
+        return "a tab, which YAML does not take here; use spaces"
     parts = [part for part in (error.context, error.problem) if part]
     return " ".join(", ".join(parts).split())
 

@@ -130,10 +130,11 @@ def _value(text: str, place: str) -> Any:
 def _with_methods(document: Document, texts: Sequence[str]) -> Document:
     """The config with some of its methods, in its order; what it says of others goes with them."""
     entries = document.data.get("methods")
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+    if not isinstance(entries, list) or not all(isinstance(entry, dict | str) for entry in entries):
         return document  # its own fault is told
-    names = [str(entry.get("name", "")) for entry in entries]
-    labels = [str(entry.get("label") or name.rpartition(":")[2]) for entry, name in zip(entries, names, strict=True)]
+    mappings = [{"name": entry} if isinstance(entry, str) else entry for entry in entries]
+    names = [str(entry.get("name", "")) for entry in mappings]
+    labels = [str(entry.get("label") or name.rpartition(":")[2]) for entry, name in zip(mappings, names, strict=True)]
     wanted = chosen("--methods", texts, [*dict.fromkeys([*labels, *names])], "method in the config")
     whole = set(wanted) - set(labels)  # names, each of every row of a method
     kept = [index for index, name in enumerate(names) if labels[index] in wanted or name in whole]

@@ -54,7 +54,9 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     """
     document, changes = load(Path(path)), changes or Changes()
     document = changed(replace(document, data=_long_form(document.data)), changes)
-    study = replace(typed(document, Study), file=Path(path), text=document.text, changes=changes)
+    study = replace(
+        typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text, changes=changes
+    )
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
@@ -181,7 +183,11 @@ def _check_profiles(study: Study, document: Document) -> None:
         name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
-            raise document.error(("display", "panel"), f"{message}; registration needs at least {SMALLEST_REGION}")
+            message += f"; registration needs at least {SMALLEST_REGION}"
+            if study.display.panel and not bench:
+                rows, columns = _smallest_panel(profile, study.display.panel, study.folder)
+                message += f", which a panel of [{rows}, {columns}] has"
+            raise document.error(("display", "panel"), message)
         if name in seen:
             raise document.error(
                 where, f"'{profile}' and '{seen[name]}' are both named '{name}'; list each display once"
@@ -189,6 +195,14 @@ def _check_profiles(study: Study, document: Document) -> None:
         if name == REFERENCE:
             raise document.error(where, f"a profile may not be named '{REFERENCE}': the floor rows have that name")
         seen[name] = profile
+
+
+def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[int, int]:
+    """The smallest panel, of at least these rows and columns, whose scored window is large enough for registration."""
+    profile, side = load_profile(source, folder), SMALLEST_REGION
+    while min(profile.spec((max(panel[0], side), max(panel[1], side))).region.shape) < SMALLEST_REGION:
+        side += 1
+    return max(panel[0], side), max(panel[1], side)
 
 
 def _entry(study: Study, document: Document, index: int) -> MethodEntry:

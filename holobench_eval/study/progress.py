@@ -29,6 +29,11 @@ def _unknown() -> None:
     """The time left before a run has begun."""
 
 
+def _whole() -> bool:
+    """That the time left is no lower limit."""
+    return True
+
+
 def _name(task: Task) -> str:
     return f"{task.label} · {task.cells[0].target}"
 
@@ -89,9 +94,9 @@ class Bar:
     missing: int = 0
     follower: Follower = field(default_factory=lambda: Follower(0.5))
 
-    def expects(self, seconds_left: Callable[[], float | None]) -> None:
+    def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = _whole) -> None:
         """Show the time left, ``-:--:--`` where it is not known."""
-        self.progress.update(self.bar, left=seconds_left)
+        self.progress.update(self.bar, left=seconds_left, whole=is_whole)
 
     def planned(self, cells: int, missing: int, floors: int) -> None:
         """Set the bar to the number of missing cells."""
@@ -135,14 +140,15 @@ class Lines:
     failures: int = 0
     follower: Follower = field(default_factory=lambda: Follower(15.0))
     seconds_left: Callable[[], float | None] = field(default_factory=lambda: _unknown, init=False)
+    is_whole: Callable[[], bool] = field(default_factory=lambda: _whole, init=False)
     last: float = field(init=False)
 
     def __post_init__(self) -> None:
         self.last = self.clock()
 
-    def expects(self, seconds_left: Callable[[], float | None]) -> None:
+    def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = _whole) -> None:
         """Write the time left in every line."""
-        self.seconds_left = seconds_left
+        self.seconds_left, self.is_whole = seconds_left, is_whole
 
     def planned(self, cells: int, missing: int, floors: int) -> None:
         """Write the number of cells to compute, and how many of the study's are of no method."""
@@ -178,18 +184,19 @@ class Lines:
     def _left(self) -> str:
         seconds, training = self.seconds_left(), len(self.follower.folders)
         beside = f" besides the {training} in training" * bool(training)
-        return "" if seconds is None else f", about {seconds:.0f} s left{beside}"
+        about = "about" if self.is_whole() else "at least"
+        return "" if seconds is None else f", {about} {seconds:.0f} s left{beside}"
 
 
-def _duration(seconds: float | None) -> str:
-    return "-:--:--" if seconds is None else str(timedelta(seconds=round(seconds)))
+def _duration(seconds: float | None, is_whole: bool) -> str:
+    return "-:--:--" if seconds is None else f"{'' if is_whole else 'at least '}{timedelta(seconds=round(seconds))}"
 
 
 class _TimeLeft(ProgressColumn):
     """The time left, by what the rows have cost so far."""
 
     def render(self, task: RichTask) -> Text:
-        return Text(_duration(task.fields["left"]()), style="progress.remaining")
+        return Text(_duration(task.fields["left"](), task.fields["whole"]()), style="progress.remaining")
 
 
 @contextmanager
@@ -206,4 +213,4 @@ def watching(console: Console) -> Iterator[Watch]:
         TextColumn("[red]{task.fields[failures]}"),
     )
     with Progress(*columns, console=console) as progress:
-        yield Bar(progress, progress.add_task("planning", total=None, failures="", left=_unknown))
+        yield Bar(progress, progress.add_task("planning", total=None, failures="", left=_unknown, whole=_whole))

@@ -22,7 +22,7 @@ from .displays import Preparation
 from .executors import Executor, Serial
 from .executors.clusters import Address
 from .executors.local import Local
-from .executors.remaining import Remaining
+from .executors.remaining import Kind, Remaining
 from .plan import Cell, Plan, Task
 from .scoring import starts
 from .scoring.cell import work
@@ -43,8 +43,9 @@ class Watch(Protocol):
         """The run begins: cells of the study, those that have to be computed, and those of floor images."""
         ...
 
-    def expects(self, seconds_left: Callable[[], float | None]) -> None:
-        """What gives the time [s] that the cells still take, at any moment; None where it is not known."""
+    def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = lambda: True) -> None:
+        """What gives the time [s] that the cells still take, at any moment; None where it is not known. is_whole:
+        whether it is that of all cells, and not a lower limit."""
         ...
 
     def training(self, names: list[tuple[str, Path]]) -> None:
@@ -191,9 +192,12 @@ def _compute(
     expected = {DRAWING: DRAWING_SECONDS}
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
     jobs = list(_jobs(plan, missing, missing if single else timed, setting))
+    if single:  # one of each method first, so that the time left is known soon
+        first = {job.task.label: job for job in reversed(jobs)}
+        jobs.sort(key=lambda job: first[job.task.label] is not job)
     known = _known(jobs) if isinstance(executor, Serial | Local) else {}  # else other machines compute
-    remaining = Remaining(((job.task.label, job.alone) for job in jobs), known, executor.workers)
-    watch.expects(remaining.seconds)
+    remaining = Remaining(((job.kind, job.alone) for job in jobs), known, executor.workers)
+    watch.expects(remaining.seconds, remaining.is_whole)
     steps = queue(trainings, jobs, unready, at_work, expected, drawings)
     watched = _watched(steps, at_work, remaining, watch)
     results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, watched)
@@ -245,14 +249,11 @@ def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: S
             yield Job(task, wanted, setting, alone=not wanted.isdisjoint(alone))
 
 
-def _known(jobs: Iterable[Job]) -> dict[str, float]:
-    """Seconds of a row's first solution, where it has been measured before."""
-    first: dict[str, Job] = {}
-    for job in jobs:
-        if not job.task.is_floor:
-            first.setdefault(job.task.label, job)
-    measured = {label: cost.recorded(job.timing) for label, job in first.items()}
-    return {label: earlier.seconds for label, earlier in measured.items() if earlier is not None}
+def _known(jobs: Iterable[Job]) -> dict[Kind, float]:
+    """Seconds of the first solution of each kind, where it has been measured before."""
+    first = {job.kind: job for job in reversed(list(jobs)) if not job.task.is_floor}
+    measured = {kind: cost.recorded(job.timing) for kind, job in first.items()}
+    return {kind: earlier.seconds for kind, earlier in measured.items() if earlier is not None}
 
 
 def _watched(
@@ -263,7 +264,7 @@ def _watched(
         if job is not None:
             at_work[id(job)] = time.monotonic()
         if isinstance(job, Job):
-            remaining.begins(id(job), job.task.label, job.alone)
+            remaining.begins(id(job), job.kind, job.alone)
             watch.started(job.task)
         yield job
 

@@ -218,10 +218,11 @@ def test_every_command_explains_itself(
     assert f"Usage: holoeval {command}" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("arguments", [(), ("run",), ("session", "export")])
 def test_the_version_is_that_of_the_package(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]
 ) -> None:
-    assert holoeval(monkeypatch, "--version") == 0
+    assert holoeval(monkeypatch, *arguments, "--version") == 0
     assert capsys.readouterr().out == f"holoeval {version('holobench_eval')}\n"
 
 

@@ -68,6 +68,14 @@ def test_a_value_replaces_that_of_the_config_and_its_defaults(tmp_path: Path) ->
     assert study.note.endswith(" a = b")
 
 
+def test_methods_may_be_set_as_a_config_writes_them_and_then_chosen(tmp_path: Path) -> None:
+    path = write(tmp_path, FULL.replace("baseline: GS\n", "").replace("GS: {psnr", "wirtinger: {psnr"))
+    changes = Changes(values=("methods=[wirtinger, sgd, {name: hio, label: HIO}]",))
+    assert load_study(path, changes).labels == ("wirtinger", "sgd", "HIO")
+    study = load_study(path, Changes(("HIO,wirtinger",), values=changes.values))
+    assert study.labels == ("wirtinger", "HIO")
+
+
 FAULTS = [
     (Changes(values=("seed=-1",)), "--set seed=-1: seed should be greater than or equal to 0, got -1"),
     (Changes(values=("sede=3",)), "--set sede=3: unknown key 'sede' in the document; did you mean 'seed'?"),

@@ -93,7 +93,9 @@ CHANGES = [
     ("panel: [128, 256]", "panel: [128, 9000]", "5:16: display.panel[1] should be less than or equal to 8192"),
     ("panel: [128, 256]", "panel: [128]", "5:10: display.panel has too few values"),
     ("panel: [128, 256]", "panel: [128, 1, 1]", "5:10: display.panel tuple should have at most 2 items"),
-    ("panel: [128, 256]", "panel: [64, 64]", "5:10: 'ideal' scores a window of 52 x 52 pixels"),
+    ("panel: [128, 256]", "panel: [64, 64]", "5:10: 'ideal' scores a window of 52 x 52 pixels of this panel; "),
+    ("  panel: [128, 256]", "\tpanel: [128, 256]", "5:1: a tab, which YAML does not take here; use spaces"),
+    ("- wirtinger", "- {name: sgd, params: {privileged: true}}", "9:26: method 'sgd': 'privileged' is no parameter; "),
     ("exposure: matched", "exposure: bright", "6:13: display.exposure should be 'equal' or 'matched'"),
     ("sets.py:Images", "phtographs", "7:20: unknown dataset 'phtographs'; did you mean 'photographs'?"),
     ("sets.py:Images", "sets.py:Training", "7:20: dataset 'sets.py:Training' holds training images"),
@@ -157,3 +159,26 @@ def test_every_config_of_the_repository_asks_its_question_and_says_what_would_ch
         assert study is None or "?" in study.question, path
         assert "\nquestion: " in text, path
         assert "\nwould_change: " in text, path
+
+
+@pytest.mark.parametrize(("panel", "enough"), [("[64, 64]", (118, 118)), ("[64, 256]", (118, 256))])
+def test_a_panel_that_is_too_small_gets_the_smallest_that_is_not(
+    tmp_path: Path, panel: str, enough: tuple[int, int]
+) -> None:
+    with pytest.raises(UserError, match=rf"at least 96, which a panel of \[{enough[0]}, {enough[1]}\] has$"):
+        load_study(write(tmp_path, FULL.replace("[128, 256]", panel)))
+    assert load_study(write(tmp_path, FULL.replace("[128, 256]", str(list(enough))))).display.panel == enough
+    with pytest.raises(UserError, match="registration needs at least 96"):
+        load_study(write(tmp_path, FULL.replace("[128, 256]", str([enough[0] - 1, enough[1]]))))
+
+
+def test_a_parameter_of_ones_own_method_may_not_say_what_only_its_class_declares(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from dataclasses import dataclass\n\n@dataclass(frozen=True)\nclass Mine:\n    privileged: bool = False\n\n"
+        "    def solve(self, target, bench):\n        return target\n"
+    )
+    text = FULL.replace("- wirtinger", '- {name: "mine.py:Mine", params: {privileged: true}}') + "isolation: none\n"
+    with pytest.raises(
+        UserError, match=r"study\.yaml:9:37: method 'mine\.py:Mine': 'privileged' is no parameter; only"
+    ):
+        load_study(write(tmp_path, text))

@@ -85,6 +85,20 @@ def test_the_table_of_a_preview_shows_sums_and_brackets(tmp_path: Path) -> None:
     )
 
 
+def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path: Path) -> None:
+    study = load_study(write_config(tmp_path))
+    rows = [
+        Row("online_camera_network", 3, 28, 1234, 2800, 1000, 12, 1222, 12345.0),
+        Row("x" * 60, 3, 28, 84, None, 0, 0, 84, None),
+    ]
+    text = io.StringIO()
+    Console(file=text, width=80).print(table(study, rows))
+    lines = text.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "…" not in text.getvalue()
+    assert all(any(word in line.split() for line in lines) for word in ("displays", "captures", "1222", "2800", "1318"))
+
+
 def test_the_table_of_a_preview_says_how_many_cells_are_floors(tmp_path: Path) -> None:
     config = write_config(tmp_path)
     study, text = load_study(config), io.StringIO()
@@ -112,6 +126,15 @@ def test_lines_and_bar_show_the_time_left_of_the_run(tmp_path: Path) -> None:
         bar.expects(lambda: 90.0)
         bar.started(task)
     assert "0:01:30" in text.getvalue()
+    assert "at least" not in text.getvalue()
+    with watching(Console(file=text, force_terminal=True, width=120)) as bar:
+        bar.planned(2, 2, 0)
+        bar.expects(lambda: 90.0, lambda: False)
+    assert "at least 0:01:30" in text.getvalue()
+    watch.expects(lambda: 90.0, lambda: False)
+    now[0] += 10
+    watch.started(task)
+    assert ", at least 90 s left; now" in lines[-1]
 
 
 @pytest.mark.usefixtures("no_physics")
@@ -127,3 +150,17 @@ def test_a_run_says_what_is_left_of_it_and_ends_with_nothing(tmp_path: Path) -> 
     run(study, planning.plan(study), tmp_path / "out", Serial(), Asking(lambda line: None), 1, tmp_path / "artifacts")
     assert all(seconds is not None and seconds >= 0 for seconds in seen)
     assert seen[-1] == 0
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"))
+    study = load_study(config)
+    seen: list[str] = []
+
+    class Naming(Lines):
+        def started(self, task: planning.Task) -> None:
+            seen.append(task.label)
+
+    run(study, planning.plan(study), tmp_path / "out", Serial(), Naming(lambda line: None), 1, tmp_path / "artifacts")
+    assert seen == ["floor", "Toy", "Seeing", "floor", "floor", "Toy", "Toy", "Seeing", "Seeing"]

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from holobench_eval.study.executors.remaining import Remaining
+from holobench_eval.study.executors.remaining import Kind, Remaining
 
 ROWS = {"slow": 20.0, "quick": 2.0}
 
@@ -17,7 +17,7 @@ class Clock:
         return self.now
 
 
-def compute(remaining: Remaining, clock: Clock, row: str, seconds: float, alone: bool = False) -> None:
+def compute(remaining: Remaining, clock: Clock, row: Kind, seconds: float, alone: bool = False) -> None:
     remaining.begins(row, row, alone)
     clock.now += seconds
     remaining.ends(row)
@@ -129,3 +129,39 @@ def test_the_first_task_of_a_worker_also_loads_libraries_and_does_not_count() ->
     assert remaining.seconds() == pytest.approx(3 * 30)  # nothing better is known
     compute(remaining, clock, "quick", 2)
     assert remaining.seconds() == pytest.approx(2 * 2)
+
+
+def test_a_method_costs_on_each_display_what_it_took_there() -> None:
+    clock = Clock()
+    kinds = [(("learned", name), False) for name in ("near", "far") for _ in range(3)]
+    remaining = Remaining([*kinds, (("quick", "near"), False)], {("learned", "far"): 30.0}, 1, clock)
+    compute(remaining, clock, ("quick", "near"), 1)
+    assert remaining.seconds() == pytest.approx(6 * 30)  # what is known of the other display
+    compute(remaining, clock, ("learned", "near"), 4)
+    assert remaining.seconds() == pytest.approx(2 * 4 + 3 * 30)
+    compute(remaining, clock, ("learned", "far"), 20)
+    assert remaining.seconds() == pytest.approx(2 * 4 + 2 * 20)
+
+
+def test_a_method_without_any_cost_makes_the_time_a_lower_limit_and_does_not_pass_for_another() -> None:
+    clock = Clock()
+    remaining = Remaining([("slow", False)] * 2 + [("quick", False)] * 3, {}, 1, clock)
+    assert not remaining.is_whole()
+    compute(remaining, clock, "quick", 2)
+    assert remaining.seconds() == pytest.approx(2 * 2)
+    assert not remaining.is_whole()
+    compute(remaining, clock, "slow", 60)
+    assert remaining.is_whole()
+    assert remaining.seconds() == pytest.approx(2 * 2 + 60)
+
+
+def test_one_outlier_does_not_lengthen_all_others() -> None:
+    clock = Clock()
+    names = ("a", "b", "c")
+    remaining = Remaining([(name, False) for name in names for _ in range(3)], dict.fromkeys(names, 2.0), 1, clock)
+    compute(remaining, clock, "a", 9)  # the first of the run
+    for name, seconds in (("a", 3), ("b", 3), ("c", 63)):
+        compute(remaining, clock, name, seconds)
+    assert remaining.seconds() == pytest.approx(1 * 3 + 2 * 3 + 2 * 63)
+    compute(remaining, clock, "c", 63)
+    assert remaining.seconds() == pytest.approx(1 * 3 + 2 * 3 + 63)

@@ -16,6 +16,7 @@ from ...core import plugins
 from ...core.device import CPU
 from ...core.errors import UserError
 from ...core.hashing import canonical
+from ...core.schema import FieldError
 from ..definition import Isolation, Limits
 from . import process
 from .inside import FUNCTIONS
@@ -92,8 +93,13 @@ def _calling(function: str) -> Any:
 
 
 def build(name: str, params: Mapping[str, Any], folder: Path) -> Any:
-    """A method with its parameters checked and complete, for what it declares. UserError as ``plugins.build``."""
+    """A method with its parameters checked and complete, for what it declares. UserError as ``plugins.build``, and for
+    a parameter that would say what only the class may declare."""
     cls = find(name, folder)
+    for flag in BOOLEANS:
+        if flag in params:
+            message = f"method '{name}': '{flag}' is no parameter; only its class declares it, as a ClassVar"
+            raise FieldError((flag,), message, at_key=True)
     if not issubclass(cls, Apart):
         return plugins.build("methods", name, dict(params), folder)
     complete = cls(params)._call("params")

@@ -81,6 +81,11 @@ class Job:
         return Store(self.setting.output)
 
     @property
+    def kind(self) -> tuple[str, str]:
+        """Method and display: jobs of a kind take about as long."""
+        return self.task.label, self.task.cells[0].condition
+
+    @property
     def timing(self) -> str:
         """The name of its timing; a job that ran alone is named as in a run with one worker."""
         workers = 1 if self.alone else max(2, self.setting.workers)  # one on a cluster may be joined by others
