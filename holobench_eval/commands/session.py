@@ -10,7 +10,7 @@ import typer
 from .output import console, write_report
 
 if TYPE_CHECKING:
-    from ..study.session import Advance
+    from ..study.folders.session import Advance
 
 session = typer.Typer(
     help="Exchange files with a bench that other software drives.", no_args_is_help=True, rich_markup_mode=None
@@ -28,8 +28,8 @@ def export(
     fixed_exposure: Annotated[bool, typer.Option("--fixed-exposure", help="One exposure time for all.")] = False,
 ) -> None:
     """Write the patterns of a study: what to show, in which order, and under which names to save photographs."""
+    from ..study.folders.session import export as begin
     from ..study.progress import watching
-    from ..study.session import export as begin
 
     with watching(console()) as watch:
         advance = begin(config, folder, watch, 1, bench, display, fixed_exposure=fixed_exposure)
@@ -42,8 +42,8 @@ def import_(
     study: Annotated[Path | None, typer.Option(help="The study's config, where the folder's copy may not do.")] = None,
 ) -> None:
     """Check the photographs in a session's folder, score them, and write the next round where a method needs one."""
+    from ..study.folders.session import go_on
     from ..study.progress import watching
-    from ..study.session import go_on
 
     with watching(console()) as watch:
         advance = go_on(folder, watch, 1, print, study)
@@ -52,7 +52,7 @@ def import_(
 
 def _finish(advance: Advance, folder: Path) -> None:
     """Name the photographs to take next; where there are none, write the report."""
-    from ..study.session import REPORT
+    from ..study.folders.session import REPORT
 
     records = advance.outcome.records
     if not advance.patterns:

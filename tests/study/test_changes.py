@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.commands import run as command
-from holobench_eval.commands.check import problems_in
 from holobench_eval.commands.options import changes_of, output_folder
-from holobench_eval.commands.report import report
+from holobench_eval.commands.reports.check import problems_in
+from holobench_eval.commands.reports.report import report
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.changes import Changes, noted, recorded
 from holobench_eval.study.config import load_study

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from holobench_eval.commands.check import problems_in
-from holobench_eval.commands.report import report
+from holobench_eval.commands.reports.check import problems_in
+from holobench_eval.commands.reports.report import report
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import build_report
 from holobench_eval.study.config import load_study

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import UserError
-from .options import Learned
-from .reports import committed
-from .reports.rerun import rerun_in
+from ...core.errors import UserError
+from ..options import Learned
+from . import committed
+from .rerun import rerun_in
 
 if TYPE_CHECKING:
-    from ..study.definition import Study
+    from ...study.definition import Study
 
 
 def check(
@@ -38,8 +38,8 @@ def check(
 
 def problems_in(folder: Path) -> tuple[int, list[str]]:
     """Number of reports in a folder, and a line for everything that no longer holds. UserError: no reports."""
-    from ..benchmarks import report as performance
-    from ..study import provenance
+    from ...benchmarks import report as performance
+    from ...study import provenance
 
     reports = sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
     timed = sorted(path.parent for path in folder.glob(f"*/{performance.MACHINE}"))
@@ -59,10 +59,10 @@ def _problems(report: Path) -> Iterator[str]:
 
 def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]:
     """What is different from when the report was made, of which its provenance is ``known``."""
-    from ..report import difference, layout_of, read_records, recompute_files
-    from ..study.displays import displays
-    from ..study.plan import plan
-    from ..study.provenance import text_digest
+    from ...report import difference, layout_of, read_records, recompute_files
+    from ...study.displays import displays
+    from ...study.plan import plan
+    from ...study.provenance import text_digest
 
     for display in displays(study).values():
         now = {"version": display.version, "sha256": display.digest}

@@ -7,26 +7,26 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..core.errors import Pending, UserError, suggest
-from ..core.hashing import digest
-from ..core.io import write_atomically
-from ..core.yaml_source import load
-from ..imaging.convention import Convention
-from ..lab.bench_file import load_bench_file
-from ..lab.live import letter
-from ..lab.real import RealBench
-from ..lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
-from ..lab.session.bench_checks import bench_checks
-from ..lab.session.geometry import look
-from ..lab.session.manifest import refuse_links_out
-from . import isolation
-from .config import load_study
-from .definition import Study
-from .displays import condition, displays, real_condition
-from .executors import Serial
-from .opening import forget_sessions, open_display
-from .plan import plan
-from .run import Outcome, Watch, run
+from ...core.errors import Pending, UserError, suggest
+from ...core.hashing import digest
+from ...core.io import write_atomically
+from ...core.yaml_source import load
+from ...imaging.convention import Convention
+from ...lab.bench_file import load_bench_file
+from ...lab.live import letter
+from ...lab.real import RealBench
+from ...lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
+from ...lab.session.bench_checks import bench_checks
+from ...lab.session.geometry import look
+from ...lab.session.manifest import refuse_links_out
+from .. import isolation
+from ..config import load_study
+from ..definition import Study
+from ..displays import condition, displays, real_condition
+from ..executors import Serial
+from ..opening import forget_sessions, open_display
+from ..plan import plan
+from ..run import Outcome, Watch, run
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 

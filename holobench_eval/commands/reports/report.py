@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import UserError
-from .options import Config, Output, output_folder
-from .output import console, write_report
+from ...core.errors import UserError
+from ..options import Config, Output, output_folder
+from ..output import console, write_report
 
 if TYPE_CHECKING:
-    from ..study.plan import Plan
+    from ...study.plan import Plan
 
 Print = Annotated[Path | None, typer.Option("--print", help="Draw the charts for print too, into this folder.")]
 
 
 def report(config: Config, output: Output = None, print_to: Print = None) -> None:
     """Write the report of a study again: from its records, or from a committed records.csv."""
-    from ..report.description import describe
-    from ..report.printing import print_figures
-    from ..report.section import Report
-    from ..study import provenance
-    from ..study.changes import recorded
-    from ..study.config import load_study
-    from ..study.plan import plan
-    from ..study.store import Store
+    from ...report.description import describe
+    from ...report.printing import print_figures
+    from ...report.section import Report
+    from ...study import provenance
+    from ...study.changes import recorded
+    from ...study.config import load_study
+    from ...study.plan import plan
+    from ...study.store import Store
 
     changes = recorded(provenance.read(output)) if output else None
     study = load_study(config, changes)
@@ -50,7 +50,7 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
 
 def _committed(grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:
     """The records of a committed records.csv. UserError: it has other cells than the study plans now."""
-    from ..report import committed_records, difference, read_records
+    from ...report import committed_records, difference, read_records
 
     frame = read_records(path.read_text(encoding="utf-8"))
     if differs := difference(frame, grid):
