@@ -145,6 +145,7 @@ def score(
         again, _ = match(moved.image.to(wanted), wanted)
         scores |= {f"{metric.name}_{first}_refined": float(metric.function(again, wanted)) for metric in repeated}
         scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
+        del moved, again  # of a large image, before the blurred ones are made
     for sigma in blur if repeated else ():
         soft_capture, soft_target = _blurred(light, sigma), fixed.blurred(sigma)
         soft, _ = match(soft_capture, soft_target)

@@ -287,7 +287,9 @@ class Scoring:
         write_thumbnail(thumbnail, self.as_light(reference))
         pictures = floor_captures(reference, others, name)
         quick = self.quick if reference[0].numel() > LARGE else None
-        records = [Record(cells[row], "done", row, scores=self.scores(pictures[row], reference, quick)) for row in rows]
+        records = [
+            Record(cells[row], "done", row, scores=self.scores(pictures.pop(row), reference, quick)) for row in rows
+        ]
         for record in records:
             self.store.write(record)
         return records
