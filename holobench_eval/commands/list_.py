@@ -7,6 +7,7 @@ import inspect
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -64,13 +65,21 @@ def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
 
     for name in plugins.names(kind):
         try:
-            cls = plugins.find(kind, name)
+            cls = _declared(kind, name)
         except UserError as error:
             yield name, str(error)
             continue
         summary = str(cls.__doc__ or "").strip().partition("\n")[0]
         marked = [word for flag, word in marks.items() if getattr(cls, flag, False)]
         yield name, summary + (f" ({', '.join(marked)})" if marked else "")
+
+
+def _declared(kind: plugins.Kind, name: str) -> type[Any]:
+    """The class of a plug-in, or what stands for a method of another package, whose code is not imported here."""
+    from ..core import plugins
+    from ..study import isolation
+
+    return isolation.find(name, Path()) if kind == "methods" else plugins.find(kind, name)
 
 
 def profiles() -> Entries:
@@ -116,7 +125,7 @@ def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
     from ..core import plugins
     from ..core.parameters import parameters, source, summary
 
-    cls = plugins.find(kind, name)
+    cls = _declared(kind, name)
     marks = [word for flag, word in MARKS.items() if getattr(cls, flag, False)]
     _heading(screen, kind, name, marks)
     screen.print(escape(summary(cls)), highlight=False)
@@ -124,6 +133,9 @@ def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
         screen.print(f"\nSource: {escape(paper)}", highlight=False)
     if hasattr(cls, "tuned"):
         screen.print(f"\nTuned: {escape(cls.tuned)}", highlight=False)
+    if not plugins.is_shipped(kind, name):
+        screen.print("\nIts package tells its parameters; holoeval plan checks those of a config.", highlight=False)
+        return
     screen.print("\nIts parameters (params: in a config), each with its default and what it may be:", highlight=False)
     for entry in parameters(cls):
         default = f" = {entry.default}" if entry.default else ""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from holobench_eval.commands.list_ import KINDS, list_
 from holobench_eval.core import plugins
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
@@ -85,3 +86,13 @@ def test_a_file_and_an_entry_point_can_be_named_in_a_study(tmp_path: Path) -> No
     cells = [cell for cell in plan(load_study(tmp_path / "study.yaml")).cells if cell.method == "flat"]
     assert [(cell.target, cell.params) for cell in cells] == [("dark", {"phase": 0.5}), ("bright", {"phase": 0.5})]
     assert len(cells[0].method_sha256) == 64  # code from elsewhere is named by its hash
+
+
+@pytest.mark.usefixtures("installed")
+def test_what_is_listed_of_another_package_is_told_by_a_process_that_imports_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert ("flat", "A constant phase.") in list(KINDS["methods"]())
+    list_("flat")
+    assert "Its package tells its parameters" in capsys.readouterr().out
+    assert "made_elsewhere.flat" not in sys.modules
