@@ -91,7 +91,7 @@ def _verdicts(room: str, drawn: list[tuple[str, Mutant]], seconds: float) -> lis
         if verdict == "cold":
             unchanged = compile((ROOT / name).read_bytes(), ROOT / name, "exec", dont_inherit=True)
             if not tried and apart(partial(cold, ROOT / name, unchanged, tests)) != "survived":
-                sys.exit(f"{name}: its tests fail without a mutant in a process that imports the package anew")
+                sys.exit(f"{name}: its tests do not pass without a mutant in a process that imports the package anew")
             tried = True
             verdict = apart(partial(cold, ROOT / name, mutant.code, tests))
             print(f"{verdict:9} {Path(name).stem} {mutant.name}", flush=True)
@@ -112,17 +112,16 @@ def text(known: dict[str, Any], reasons: dict[str, dict[str, str]]) -> str:
         survivors += [f"- {mutant}  \n  {why.get(mutant, 'No reason is known.')}" for mutant in row["survivors"]]
     tested, first = (sum(row[key] for row in known.values()) for key in ("tested", "at first"))
     lived = sum(len(row["survivors"]) for row in known.values())
-    drawn = sorted({(row["most"], row["seed"]) for row in known.values()})
-    sample = " or ".join(f"at most {most} by the seed {seed}" for most, seed in drawn)
+    most, seeds = (" or ".join(map(str, sorted({row[key] for row in known.values()}))) for key in ("most", "seed"))
     now, then = (f"{100 * (tested - left) / max(1, tested):.1f} %" for left in (lived, first))
     return f"""# Mutants
 
 `python -m tests.mutants`: **{tested - lived:,} of {tested:,} mutants of {len(known)} modules are killed, {now};
 when they were drawn, {then}.** In a mutant one operator, constant, condition, statement or returned value of the
 code is another. It is killed where a test of the folder that mirrors its module fails, or the example in its
-docstring. A test that takes four times as long as without the mutant, and three seconds more, fails. The mutants
-are drawn, of each module {sample}. Tests were then written against some that survived, so that of the mutants that
-were not drawn the second share says more than the first.
+docstring. A test that takes four times as long as without the mutant, and ten seconds more, fails. Of each module
+at most {most} mutants are drawn, by the seed {seeds}. Tests were then written against some that survived, so that of
+the mutants that were not drawn the second share says more than the first.
 
 Not mutated: docstrings, texts of errors, annotations, decorators, `__repr__`, and what Numba compiles.
 

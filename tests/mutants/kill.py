@@ -2,8 +2,11 @@
 
 A mutant in the body of a function takes the function's place in a fork of a process that has collected the tests; any
 other, and one whose function runs while the package is imported, needs a process that imports the package anew. Tests
-that reach the statement come first, then those that reach its file and, for what is executed on import, all others; of
+that reach the statement come first, then those that reach its file; what is executed on import is put to all tests. Of
 each the quickest come first.
+
+cosmic-ray starts an interpreter for each mutant, which takes ten seconds here; mutmut leaves out constants of modules
+and functions with decorators, as those of autograd and of caches have.
 """
 
 from __future__ import annotations
@@ -37,6 +40,7 @@ ROOT = Path(__file__).parents[2]
 OPTIONS = ["-n0", "-x", "-q", "-pno:cacheprovider", "-pno:faulthandler", "--capture=no", "--no-header", "--no-summary"]
 MEMORY = 6 * 2**30
 COLLECTING = 90.0  # seconds of a processor
+ONCE = 10.0  # seconds of a processor, for what the first test has to load
 PATIENCE = 1200.0  # seconds, for a mutant that only waits
 ELSEWHERE = (
     "cv2", "flip_evaluator", "kornia", "matplotlib.pyplot", "numba", "pandas", "pydantic", "rich.console",
@@ -140,8 +144,8 @@ class _Campaign:
             near = {test for line in mutant.lines for test in lines.get(line, ())}
             # A shared fixture or a cache is filled in one test, and others that depend on it do not reach the line.
             reaching = {test for tests in lines.values() for test in tests}
-            order = {test: (test not in near, test not in reaching, seconds[test]) for test in seconds}
-            tests = sorted(seconds if imported else reaching, key=order.__getitem__)
+            near_first = {test: (not imported and test not in near, seconds[test]) for test in seconds}
+            tests = sorted(seconds if imported else reaching, key=near_first.__getitem__)
             taken = accumulate(seconds[test] for test in tests)
             kept = {test: seconds[test] for test, sum_ in zip(tests, taken, strict=True) if sum_ <= self.most}
             code = None if imported else _code_of(mutant.code, mutant.function)
@@ -202,7 +206,7 @@ class _Timed:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> None:
-        signal.setitimer(signal.ITIMER_PROF, 3 + 4 * self.seconds[item.nodeid])
+        signal.setitimer(signal.ITIMER_PROF, ONCE + 4 * self.seconds[item.nodeid])
 
 
 def _in_place(session: pytest.Session, tests: Seconds, place: list[FunctionType], code: CodeType) -> int:
