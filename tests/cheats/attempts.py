@@ -273,6 +273,7 @@ class CopiesTheHandle(Photographer):
 class MakesAnotherHandle(Photographer):
     def cheat(self, target, bench):
         known = {"spec": bench.spec, "budget": None, "label": "", "target": target, "learned": None}
+        known |= {"target_name": "", "target_sha256": ""}
         handles = [type(bench)(bench._channel, known, bench.device) for _ in range(20)]
         self.photographed(self.phase(target, bench)[0], handles)
 

@@ -129,17 +129,17 @@ def test_a_changed_study_says_so_in_its_report_and_leaves_the_whole_one_alone(
     config = write_config(tmp_path)
     monkeypatch.setattr(command, "sheets", lambda *_: [])
     command.run(config, executor="serial", threads=1)
-    before = Path("reports/study/records.csv").read_bytes()
+    before = Path("holoeval-results/study/records.csv").read_bytes()
     command.run(config, executor="serial", threads=1, limit=2, values=["seed=4"])
-    assert Path("reports/study/records.csv").read_bytes() == before
-    text = Path("reports/study-changed/report.md").read_text()
+    assert Path("holoeval-results/study/records.csv").read_bytes() == before
+    text = Path("holoeval-results/study-changed/report.md").read_text()
     assert text.startswith("# Fake (changed: --limit 2 --set seed=4)")
     assert "not the whole study of the config, and not its result: it was run with --limit 2 --set seed=4." in text
     assert "\nholoeval run study.yaml --limit 2 --set seed=4\n" in text
-    assert problems_in(Path("reports"))[1] == []
+    assert problems_in(Path("holoeval-results"))[1] == []
 
-    Path("reports/study-changed/report.md").unlink()
-    report(config, Path("reports/study-changed"))
-    assert Path("reports/study-changed/report.md").read_text() == text
-    with pytest.raises(UserError, match="reports/study: holds the report of a whole study"):
-        output_folder(load_study(config, changes_of(None, None, 2, None)), Path("reports/study"))
+    Path("holoeval-results/study-changed/report.md").unlink()
+    report(config, Path("holoeval-results/study-changed"))
+    assert Path("holoeval-results/study-changed/report.md").read_text() == text
+    with pytest.raises(UserError, match="holoeval-results/study: holds the report of a whole study"):
+        output_folder(load_study(config, changes_of(None, None, 2, None)), Path("holoeval-results/study"))

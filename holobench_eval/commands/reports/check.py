@@ -73,17 +73,17 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     if differs := difference(read_records(records), plan(study)):
         yield f"{differs}: the study, the code or the metrics of this machine have changed; run the study again"
         return
-    again = f"run: holoeval report {study.file} --output {report}"
+    command = f"run: holoeval report {study.file} --output {report}"
     if text_digest(study.text) != known["config_sha256"]:
-        yield f"the text of the config has changed, but no cell; {again} (computes nothing)"
+        yield f"the text of the config has changed, but no cell; {command} (computes nothing)"
     for name in ("report.md", "details.md"):
         if not (report / name).is_file():
-            yield f"{name} is missing; {again}"
+            yield f"{name} is missing; {command}"
     for name, again in recompute_files(records, layout_of(study)).items():
         text = (report / name).read_text(encoding="utf-8") if (report / name).is_file() else None
         if text is None:
-            yield f"{name} is missing; {again}"
+            yield f"{name} is missing; {command}"
         elif again.partition("\n")[0] != text.partition("\n")[0]:
-            yield f"{name} has the columns of another version; {again}"
+            yield f"{name} has the columns of another version; {command}"
         elif again != text:
-            yield f"{name} does not follow from records.csv; {again}"
+            yield f"{name} does not follow from records.csv; {command}"

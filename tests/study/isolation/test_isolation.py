@@ -117,7 +117,7 @@ def test_what_a_method_declares_is_known_without_its_code(file: str) -> None:
         ("Mine", {"levl": 1.0}, "has no parameter 'levl'; did you mean 'level'"),
         ("Mine", {"level": "much"}, "parameter 'level': input should be a valid number"),
         ("Odd", {}, "camera should be True or False"),
-        ("None", {}, "has no class 'None'"),
+        ("None", {}, "has no 'None'"),
     ],
 )
 def test_what_is_wrong_with_a_method_is_told_in_one_line(
