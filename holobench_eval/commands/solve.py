@@ -10,6 +10,7 @@ import typer
 import yaml
 
 from ..core.errors import UserError
+from ..core.io import file_name
 from .options import RESULTS, Learned
 
 
@@ -26,12 +27,19 @@ def solve(
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from .run import run
 
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    if not picture.is_file() and Path(methods).is_file():
+        raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
     folder = output or RESULTS / picture.stem
-    config = write_study(methods.split(","), picture, display, panel, folder)
+    config = write_study(names, picture, display, panel, folder)
+    print(f"{picture}, cropped to the picture's part of {display} with {panel[0]} x {panel[1]} pixels")
     run(config, output=folder, executor="serial", artifacts=artifacts)
-    for what in ("figures/comparison-*.jpg", "phases/*/*", "captures/*/*"):
-        for path in sorted(folder.glob(what)):
-            print(path)
+    labels = [file_name(name.rpartition(":")[2]) for name in names]
+    for path in (
+        *sorted(folder.glob("figures/comparison-*.jpg")),
+        *(folder / what / label for what in ("phases", "captures") for label in labels),
+    ):
+        print(path)
 
 
 def write_study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> Path:

@@ -27,7 +27,7 @@ PREDICTIONS = ("prediction", "error_budget")  # measures of captures that method
 class Learned:
     """A display that is the frozen network of a trained method (paper 6.3).
 
-    method: the method, by its registered name or as ``path/to/file.py:Class``; profile: the display whose captures it
+    method: the method, by its registered name or as ``path/to/file.py:Name``; profile: the display whose captures it
     is trained on; params: parameters of the method.
     """
 
@@ -70,7 +70,7 @@ class DisplayGrid:
 class Targets:
     """The images that are scored.
 
-    dataset: a registered name or ``path/to/file.py:Class``; params: parameters of the dataset; only: some of its images
+    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset; only: some of its images
     (none: all).
     """
 
@@ -83,7 +83,7 @@ class Targets:
 class Training:
     """The images that methods may train on, never scored; equal for all methods of a study.
 
-    dataset: a registered name or ``path/to/file.py:Class``; params: parameters of the dataset;
+    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset;
     held_out: how many of the last images are kept back to watch the training; captures: the most captures that a
     method may take for its training, those of held-out images included (None: no limit).
     """
@@ -98,7 +98,7 @@ class Training:
 class Probe:
     """The method whose holograms are shown when predictions of captures are scored (paper Table 1).
 
-    name: a registered name or ``path/to/file.py:Class``; params: parameters of the method.
+    name: a registered name or ``path/to/file.py:Name``; params: parameters of the method.
     """
 
     name: Text = "wirtinger"
@@ -123,7 +123,7 @@ class Sweep:
 class MethodEntry:
     """A method of a study.
 
-    name: a registered name or ``path/to/file.py:Class``; label: its name in tables (without one: its name, or that of
+    name: a registered name or ``path/to/file.py:Name``; label: its name in tables (without one: its name, or that of
     its class); params: parameters of the method, its defaults for others; profiles: the displays it is shown on, a
     subset of the study's; captures: the most that the display allows a method with a camera for one target (None: no
     limit); exposure: of its scored captures (None: that of the study's displays).

@@ -146,6 +146,8 @@ class Phases:
         return self._planes(paths[0], spec, colours, phases)
 
     def _planes(self, path: str, spec: DisplaySpec, colours: int, phases: bool) -> Tensor:
+        if not Path(path).is_file():
+            raise CellError(f"{path}: no such file{self._hint(path)}")
         array = read_array(Path(path), self.variable)
         if array.ndim == 3 and array.shape[-1] == colours and array.shape[:2] == spec.shape:
             array = np.moveaxis(array, -1, 0)
@@ -163,6 +165,11 @@ class Phases:
         if not np.isfinite(values).all():
             raise CellError(f"{path}: holds values that are NaN or infinite")
         return torch.from_numpy(np.ascontiguousarray(values))
+
+    def _hint(self, path: str) -> str:
+        """The remedy where a pattern repeats the ending of a target's name, as in ``cat.png.png``."""
+        short = Path(path).with_suffix("").with_suffix(Path(path).suffix)
+        return f"; {{stem}} in the place of {{target}} names {short}" if short.is_file() else ""
 
     def _radians(self, array: NDArray[Any], path: str) -> NDArray[Any]:
         if array.dtype.kind == "c":

@@ -38,7 +38,7 @@ def test_several_methods_give_phases_captures_scores_and_a_picture(
     solve("double_phase, mine.py:flat", picture, display="ideal", panel=(128, 128))
     folder = Path("holoeval-results", "my picture")
     printed = capsys.readouterr().out
-    for path in ("figures/comparison-ideal-1.jpg", "phases/double_phase/ideal", "captures/flat/ideal"):
+    for path in ("figures/comparison-ideal-1.jpg", "phases/double_phase", "captures/flat"):
         assert str(folder / path) in printed.replace("\n", "")
         assert (folder / path).exists()
     table = pd.read_csv(folder / "table.csv")
@@ -64,6 +64,11 @@ def test_what_is_no_picture_is_refused_and_nothing_is_written(
     with pytest.raises(UserError, match=message):
         solve("double_phase", Path(name), output=Path("out"))
     assert not Path("out").exists()
+
+
+def test_arguments_in_the_other_order_are_told(picture: Path) -> None:
+    with pytest.raises(UserError, match=r"the picture comes second: holoeval solve METHODS my picture\.png"):
+        solve(str(picture), Path("wirtinger"))
 
 
 def test_a_folder_holds_one_picture(picture: Path) -> None:

@@ -111,7 +111,7 @@ def _short(entry: Any) -> Any:
     if len(entry.get("enum", ())) > LONGEST:
         return {"type": "a name of `holoeval list`"}
     if "pattern" in entry:
-        return {"type": "`path/to/file.py:Class`" if "py" in entry["pattern"] else "`path/to/file.yaml`"}
+        return {"type": "`path/to/file.py:Name`" if "py" in entry["pattern"] else "`path/to/file.yaml`"}
     return {key: _short(part) for key, part in entry.items()}
 
 

@@ -139,18 +139,19 @@ def test_the_symmetries_are_seven_and_keep_a_square_in_its_place():
 def test_a_camera_sees_no_fold_no_steep_perspective_and_no_extreme_scale_or_place():
     frame, inside = (400, 500), np.array([[1, 0, 100], [0, 1, 100], [0, 0, 1.0]])
 
-    def sane(*rows, slack=1.0):
-        return aligning._sane(plane(rows), frame, slack)
+    def sane(*rows, around=0.05):
+        return not aligning._fault(plane(rows), frame, False, around)
 
     assert sane(*inside)
     assert sane([-1, 0, 400], [0, 1, 100], [0, 0, 1])  # mirrored
     for scale, fits in ((0.19, False), (0.21, True), (7.9, True), (8.1, False)):
-        assert aligning._sane(plane([[scale, 0, 0], [0, scale, 0], [0, 0, 1]]), (2000, 2500)) == fits
+        fault = aligning._fault(plane([[scale, 0, 0], [0, scale, 0], [0, 0, 1]]), (2000, 2500), False)
+        assert ("0.2 to 8 are allowed" in fault) != fits
     room = 2.0 + 0.05 * 500  # two pixels and a twentieth of the frame
     for beyond, fits in ((room - 0.5, True), (room + 0.5, False)):
-        for across, down in ((-beyond, 0), (0, -beyond), (500 - 249 + beyond, 0), (0, 400 - 199 + beyond)):
+        for across, down in ((-beyond, 0), (0, -beyond), (499 - 249 + beyond, 0), (0, 399 - 199 + beyond)):
             assert sane([1, 0, across], [0, 1, down], [0, 0, 1]) == fits
-    assert sane([1, 0, -10 * room + 5], [0, 1, 0], [0, 0, 1], slack=10.0)
+    assert sane([1, 0, -(2.0 + 0.5 * 500) + 5], [0, 1, 0], [0, 0, 1], around=0.5)
     assert not sane([1, 0, 100], [0, 1, 100], [-1 / 240, 0, 1])  # folded
     assert not sane([np.nan, 0, 100], [0, 1, 100], [0, 0, 1])
     for steepness, fits in ((2.4, True), (2.6, False)):  # between the scales at two corners
@@ -162,14 +163,14 @@ def test_a_camera_sees_no_fold_no_steep_perspective_and_no_extreme_scale_or_plac
 def test_two_pixels_of_a_target_may_lie_beyond_the_capture(across, down):
     frame = (2 * SHAPE[0], 2 * SHAPE[1])
 
-    def refuse(beyond):
+    def fault(beyond):
         middle = np.array([0.5, 0.5])  # two capture pixels a target pixel, borders on borders
         x, y = middle + 2 * beyond * np.array([across, down])
-        aligning._refuse_overhang(plane([[2, 0, x], [0, 2, y], [0, 0, 1]]), frame)
+        return aligning._fault(plane([[2, 0, x], [0, 2, y], [0, 0, 1]]), frame, False)
 
-    refuse(1.9)
-    with pytest.raises(CellError, match="3 of its pixels beyond the capture"):
-        refuse(2.8)
+    assert fault(1.9) == ""
+    side = {(1, 0): "right", (-1, 0): "left", (0, 1): "lower", (0, -1): "upper"}[across, down]
+    assert f"reaches beyond the capture, 3 of its pixels on the {side} side" in fault(2.8)
 
 
 def test_a_given_warp_is_confirmed_only_where_it_fits():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import Plan, plan
@@ -65,8 +66,11 @@ def ids(grid: Plan) -> dict[str, str]:
 def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     path = config(tmp_path, "files", '{name: phases, params: {file: "{target}.npy"}}')
+    with pytest.raises(UserError, match=r"none of the files that it reads is there, such as astronaut\.npy"):
+        planned(path)
+    np.save(tmp_path / "astronaut.npy", np.zeros((3, 128, 128)))
     cells = [cell for label, cell in planned(path).labelled() if label == "phases"]
-    assert {cell.files[f"{cell.target}.npy"] for cell in cells} == {"missing"}
+    assert [cell.files[f"{cell.target}.npy"] == "missing" for cell in cells] == [False, True]
     names = [cell.target for cell in cells]
     for name in names:
         np.save(tmp_path / f"{name}.npy", np.zeros((3, 128, 128)))

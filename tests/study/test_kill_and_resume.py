@@ -7,7 +7,6 @@ import sys
 import time
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from holobench_eval.report import build_report
@@ -17,7 +16,7 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import run
 from tests.support import fake_study
-from tests.support.fake_study import solves, write_config
+from tests.support.fake_study import solves, untimed_table, write_config
 
 TARGETS = 10  # of which the second run has seconds left when it is interrupted, also on a busy machine
 
@@ -44,14 +43,6 @@ def wait_for_solves(folder: Path, count: int, process: subprocess.Popen[str]) ->
 def wait_for(process: subprocess.Popen[str]) -> tuple[int, str, str]:
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
-
-
-def untimed(path: Path) -> str:
-    """The text of a table without its columns of time and memory, which each run measures itself."""
-    frame = pd.read_csv(path, dtype=str, keep_default_na=False)
-    timed = [name for name in frame if name.endswith(("_s", "_mib"))]
-    assert timed
-    return frame.drop(columns=timed).to_csv()
 
 
 @pytest.mark.slow
@@ -86,4 +77,4 @@ def test_a_run_that_was_killed_and_interrupted_gives_the_bytes_of_one_that_was_n
     whole = run(study, grid, tmp_path / "whole", Serial(), watch, threads=1, artifacts=artifacts)
     build_report(study, whole.records, tmp_path / "whole", whole.provenance)
     for name in ("table.csv", "records.csv"):
-        assert untimed(output / name) == untimed(tmp_path / "whole" / name)
+        assert untimed_table(output / name) == untimed_table(tmp_path / "whole" / name)

@@ -18,7 +18,7 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import Outcome, run
 from holobench_eval.study.store import Store
-from tests.support.fake_study import solves, write_config
+from tests.support.fake_study import solves, untimed, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
@@ -33,10 +33,6 @@ def compute(
     study, watch = load_study(config), Lines(write)
     artifacts = output.parent / "artifacts"
     return run(study, plan(study), output, executor or Serial(), watch, threads=1, artifacts=artifacts, **options)
-
-
-def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{**record, "seconds": None, "memory_mib": None} for record in records]
 
 
 def test_every_cell_of_the_plan_gets_a_record(tmp_path: Path) -> None:

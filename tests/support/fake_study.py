@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+import pandas as pd
 import torch
 from torch import Tensor
 
@@ -236,6 +237,19 @@ def noted_work(task: Job) -> list[Record]:
     with (task.setting.output / "solves.txt").open("a") as log:
         log.write(f"task {begun} {time.time()}\n")
     return records
+
+
+def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Records without what each run measures itself."""
+    return [{**record, "seconds": None, "memory_mib": None} for record in records]
+
+
+def untimed_table(path: Path) -> str:
+    """The text of table.csv or records.csv without its columns of time and memory."""
+    frame = pd.read_csv(path, dtype=str, keep_default_na=False)
+    timed = [name for name in frame if name.endswith(("_s", "_mib"))]
+    assert timed
+    return frame.drop(columns=timed).to_csv()
 
 
 if __name__ == "__main__":

@@ -15,14 +15,21 @@ MISSING = "missing"
 
 
 def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str]) -> dict[str, Mapping[str, str]]:
-    """What ``digests`` gives for every target of a method of a study. folder: of the config."""
+    """What ``digests`` gives for every target of a method of a study. folder: of the config.
+
+    UserError where not one of the files is there; a few that lack are holes of the table.
+    """
     if not hasattr(cls, "files"):
         return {target: {} for target in targets}
     method = build(entry.name, entry.params, folder)
     try:
-        return {target: digests(method, target) for target in targets}
+        found: dict[str, Mapping[str, str]] = {target: digests(method, target) for target in targets}
     except (CellError, OSError) as error:
         raise UserError(f"method '{entry.name}' does not say which files it reads: {error}") from error
+    read = [(path, sha256) for files in found.values() for path, sha256 in files.items()]
+    if read and all(sha256 == MISSING for _, sha256 in read):
+        raise UserError(f"method '{entry.name}': none of the files that it reads is there, such as {read[0][0]}")
+    return found
 
 
 def digests(method: Any, target: str) -> dict[str, str]:

@@ -181,6 +181,12 @@ def test_wrong_parameters_are_refused_in_one_line(params: dict[str, Any], messag
         plugins.build("methods", "phases", params)
 
 
+def test_a_doubled_ending_is_told_with_its_remedy(tmp_path: Path) -> None:
+    np.save(tmp_path / "cat.npy", PHASE)
+    with pytest.raises(CellError, match=r"cat\.jpg\.npy: no such file; \{stem\} in the place of .*cat\.npy"):
+        solved(tmp_path / "{target}.npy")
+
+
 def test_the_files_of_a_target_are_those_that_are_read() -> None:
     params = {"file": "p/{target}-{channel}.png", "amplitude": "a/{stem}-{channel}.png", "channels": ["r", "g"]}
     found = plugins.build("methods", "phases", params).files("my cat.jpg")

@@ -50,6 +50,7 @@ REGISTRY = {
     "field_network": (GREEN, "o"),
     "online_camera": (VIOLET, "D"),
     "online_camera_network": (VIOLET, "s"),
+    "phases": (SKY, "^"),
     "oracle": (BLACK, "D"),
 }
 
@@ -64,7 +65,7 @@ class Look:
 
 
 def look(name: str, variant: int = 0, variants: int = 1) -> Look:
-    """The look of a method by its registered name, or by ``path/to/file.py:Class``, of which the class counts.
+    """The look of a method by its registered name, or by ``path/to/file.py:Name``, of which the class counts.
 
     variant, variants: which of how many rows of the method it is; later ones have paler faces.
     """
