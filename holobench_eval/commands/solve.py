@@ -33,7 +33,7 @@ def solve(
     folder = output or RESULTS / picture.stem
     config = write_study(names, picture, display, panel, folder)
     print(f"{picture}, cropped to the picture's part of {display} with {panel[0]} x {panel[1]} pixels")
-    run(config, output=folder, artifacts=artifacts)
+    run(config, output=folder, executor="serial", artifacts=artifacts)
     labels = [file_name(name.rpartition(":")[2]) for name in names]
     for path in (
         *sorted(folder.glob("figures/comparison-*.jpg")),
