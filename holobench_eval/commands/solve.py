@@ -10,7 +10,6 @@ import typer
 import yaml
 
 from ..core.errors import UserError
-from ..core.io import file_name
 from .options import RESULTS, Learned
 
 
@@ -25,6 +24,7 @@ def solve(
     artifacts: Learned = Path("artifacts"),
 ) -> None:
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
+    from ..core.io import file_name
     from .run import run
 
     names = [name.strip() for name in methods.split(",") if name.strip()]
