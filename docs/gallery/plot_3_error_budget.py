@@ -65,7 +65,7 @@ with chdir(folder):
 # that could be gained at most, if everything explained up to there were removed
 # from the captures.
 
-report = folder / "reports" / "small-budget"
+report = folder / "holoeval-results" / "small-budget"
 figure, axis = plt.subplots(figsize=(10, 4), layout="constrained")
 axis.imshow(plt.imread(report / "figures" / "error-budget.png"))
 axis.set_axis_off()
