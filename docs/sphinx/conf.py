@@ -36,7 +36,6 @@ root_doc = "docs/start/index"
 include_patterns = ["CONTRIBUTING.md", "docs/**", "reports/*/report.md", "reports/*/details.md"]
 include_patterns += ["holobench_eval/report/page/vendor/README.md"]  # licences, which docs/results/page.md links to
 exclude_patterns = ["**/.*", "artifacts", "build", "methods", "datasets", "tests", "configs"]
-exclude_patterns += ["reports/quick"]  # which a reader of the first page has made
 exclude_patterns += ["docs/gallery"]  # its pages are docs/examples, which the build writes
 
 myst_heading_anchors = 3

@@ -32,7 +32,8 @@ def solve(
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
     folder = output or RESULTS / picture.stem
     config = write_study(names, picture, display, panel, folder)
-    print(f"{picture}, cropped to the picture's part of {display} with {panel[0]} x {panel[1]} pixels")
+    size = f"{panel[0]} x {panel[1]} pixels"
+    print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
     run(config, output=folder, executor="serial", artifacts=artifacts)
     labels = [file_name(name.rpartition(":")[2]) for name in names]
     for path in (

@@ -1,4 +1,4 @@
-"""What is installed: this package's version and the studies that ship with it, and other packages; imports no other."""
+"""What is installed: this package's version, the studies that ship with it, other packages; nothing is imported."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def read_array(path: Path, variable: str = "") -> NDArray[Any]:
         raise CellError(f"{path}: damaged, or no {suffix} file: {first[:200]}") from None
     if array.dtype.kind not in "uifc" or not array.size:
         raise CellError(f"{path}: holds {array.size} values of type {array.dtype}; expected numbers")
-    return array
+    return array.astype(array.dtype.newbyteorder("="), copy=False)  # the machine's own, as torch demands
 
 
 def _picture(content: bytes) -> NDArray[Any]:

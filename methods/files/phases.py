@@ -125,7 +125,7 @@ class Phases:
             if phase.is_complex():
                 raise CellError(f"{self.file}: a complex field needs no file of amplitudes")
             modulus = self._read(self.amplitude, bench.target_name, spec, colours, phases=False)
-            phase = torch.polar(modulus, phase)
+            phase = torch.polar(modulus, phase.double())
         if phase.is_complex():
             phase = encode(phase) if self.encoder == "double_phase" else phase.angle()
         return phase.float().to(target.device).expand(len(target), -1, -1, -1).clone()

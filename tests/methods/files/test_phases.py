@@ -118,6 +118,16 @@ def test_a_field_is_encoded_by_the_encoder_that_is_named_whether_in_one_file_or_
     assert turns_apart(conjugate, 0.5 - PHASE) < 1e-6
 
 
+@pytest.mark.parametrize("kind", ["<f4", ">f4", ">f8", "<f2"])
+def test_real_numbers_of_any_precision_and_byte_order_are_read(tmp_path: Path, kind: str) -> None:
+    np.save(tmp_path / "phase.npy", PHASE.astype(kind))
+    np.save(tmp_path / "modulus.npy", np.ones(SHAPE, kind))
+    pair = {"amplitude": str(tmp_path / "modulus.npy"), "encoder": "phase_only"}
+    apart = 1e-3 if kind == "<f2" else 1e-6  # half precision has eleven bits
+    assert turns_apart(solved(tmp_path / "phase.npy"), PHASE) < apart
+    assert turns_apart(solved(tmp_path / "phase.npy", **pair), PHASE) < apart
+
+
 def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "gray.png"), LEVELS[0])
     assert turns_apart(solved(tmp_path / "gray.png", colours=1), PHASE[:1]) < 1e-6
