@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import json
+import subprocess
+import sys
 import zipfile
 from collections.abc import Mapping
 from math import prod
@@ -11,13 +14,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import io as scipy_io
 
 from ...core.errors import CellError
 from ...core.io import decode_levels
 
 PICTURES = (".png", ".tif", ".tiff", ".bmp")
 SUFFIXES = (*PICTURES, ".npy", ".npz", ".mat")
+SECONDS = 120.0  # that reading a .mat file may take
 LARGEST_BYTES = 1_000_000_000  # a complex field of three colours on a panel of 4K in double precision takes 400 MB
 
 
@@ -35,18 +38,19 @@ def read_array(path: Path, variable: str = "") -> NDArray[Any]:
     if suffix not in SUFFIXES:
         raise CellError(f"{path}: phases are read from {', '.join(SUFFIXES)}")
     try:
-        content = path.read_bytes()
-        array = _picture(content) if suffix in PICTURES else _numbers(content, suffix, variable)
+        array = _matlab(path, variable) if suffix == ".mat" else _content(path.read_bytes(), suffix, variable)
     except CellError as error:
         raise CellError(f"{path}: {error}") from None
-    except NotImplementedError:  # what SciPy says to HDF5
-        raise CellError(f"{path}: a .mat file of version 7.3; in MATLAB: save(..., '-v7')") from None
     except Exception as error:  # whatever a reader trips over in a damaged file
         first = next(iter(str(error).splitlines()), type(error).__name__)
         raise CellError(f"{path}: damaged, or no {suffix} file: {first[:200]}") from None
     if array.dtype.kind not in "uifc" or not array.size:
         raise CellError(f"{path}: holds {array.size} values of type {array.dtype}; expected numbers")
     return array.astype(array.dtype.newbyteorder("="), copy=False)  # the machine's own, as torch demands
+
+
+def _content(content: bytes, suffix: str, variable: str) -> NDArray[Any]:
+    return _picture(content) if suffix in PICTURES else _numbers(content, suffix, variable)
 
 
 def _picture(content: bytes) -> NDArray[Any]:
@@ -62,15 +66,23 @@ def _numbers(content: bytes, suffix: str, variable: str) -> NDArray[Any]:
     if suffix == ".npy":
         _refuse_large(_npy_shape(io.BytesIO(content)))
         return np.asarray(np.load(io.BytesIO(content), allow_pickle=False))
-    if suffix == ".npz":
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            sizes = {info.filename.removesuffix(".npy"): (info.file_size,) for info in archive.infolist()}
-        name = _chosen(sizes, variable)
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return np.asarray(arrays[name])
-    file: Any = io.BytesIO(content)  # which SciPy reads, whatever its types say
-    name = _chosen({name: (*shape, 16) for name, shape, _ in scipy_io.whosmat(file)}, variable)
-    return np.asarray(scipy_io.loadmat(file, variable_names=[name])[name])
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        sizes = {info.filename.removesuffix(".npy"): (info.file_size,) for info in archive.infolist()}
+    name = _chosen(sizes, variable)
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        return np.asarray(arrays[name])
+
+
+def _matlab(path: Path, variable: str) -> NDArray[Any]:
+    command = [sys.executable, str(Path(__file__).with_name("matlab.py")), str(path), variable, str(LARGEST_BYTES)]
+    done = subprocess.run(command, capture_output=True, timeout=SECONDS, check=False)
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").splitlines()
+        crashed = f"damaged: its reader ends with {done.returncode}"
+        raise CellError(said[-1][:200] if said and done.returncode == 1 else crashed)
+    sizes, _, array = done.stdout.partition(b"\n")
+    _chosen(json.loads(sizes), variable)
+    return np.asarray(np.load(io.BytesIO(array), allow_pickle=False))
 
 
 def _npy_shape(file: io.BytesIO) -> tuple[int, ...]:

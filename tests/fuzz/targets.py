@@ -20,6 +20,7 @@ from holobench_eval.display.simulated.profile import load_profile
 from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.lab.session.manifest import FILE as MANIFEST
 from holobench_eval.lab.session.manifest import capture_of, file_of, read_manifest
+from holobench_eval.methods.files.arrays import read_array
 from holobench_eval.report.compare.runs import records_of
 from holobench_eval.study.artifacts import read_tensors
 from holobench_eval.study.config import load_study
@@ -43,6 +44,22 @@ def _file(folder: Path, name: str, content: bytes) -> Path:
     path = folder / name
     path.write_bytes(content)
     return path
+
+
+ARRAYS = (".npy", ".npz")  # the first byte of an input says which of them follows; .mat is read in a process of its own
+
+
+def _phases() -> list[bytes]:
+    buffers = [io.BytesIO() for _ in ARRAYS]
+    phases = np.arange(12, dtype=np.float32).reshape(3, 2, 2)
+    np.save(buffers[0], phases)
+    np.savez(buffers[1], phases)
+    return [bytes([number]) + buffer.getvalue() for number, buffer in enumerate(buffers)]
+
+
+def _read_phases(content: bytes, folder: Path) -> object:
+    suffix = ARRAYS[content[0] % len(ARRAYS)] if content else ARRAYS[0]
+    return read_array(_file(folder, f"phases{suffix}", content[1:]))
 
 
 def _configs() -> list[bytes]:
@@ -141,6 +158,7 @@ TARGETS = {
     "profile": Target(lambda content, folder: load_profile(str(_file(folder, "mine.yaml", content))), _profiles),
     "bench": Target(lambda content, folder: load_bench_file(_file(folder, "bench.yaml", content)), _benches),
     "picture": Target(lambda content, folder: decode(content, "picture"), _pictures),
+    "phases": Target(_read_phases, _phases),
     "tensors": Target(lambda content, folder: read_tensors(_file(folder, "learned.pt", content)), _tensors),
     "record": Target(_read_record, _records),
     "provenance": Target(

@@ -96,8 +96,8 @@ def test_the_convention_of_a_file_is_undone(
 ) -> None:
     levels = sign * (PHASE - origin) / math.tau * two_pi
     written = levels[:: 1 if order == "rgb" else -1, :: -1 if down else 1, :: -1 if across else 1]
-    file = tmp_path_factory.mktemp("convention") / "levels.mat"
-    savemat(file, {"levels": written})
+    file = tmp_path_factory.mktemp("convention") / "levels.npy"
+    np.save(file, written)
     convention = {"sign": sign, "origin": origin, "two_pi_level": two_pi, "levels": "all", "order": order}
     found = solved(file, **convention, flip_horizontal=across, flip_vertical=down)
     assert turns_apart(found, PHASE) < 1e-5
@@ -143,6 +143,15 @@ def wrong_files(folder: Path) -> None:
     (folder / "cut.npy").write_bytes((folder / "small.npy").read_bytes()[:200])
     (folder / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400))
     (folder / "noise.mat").write_bytes(bytes(range(200)))
+    savemat(folder / "crash.mat", {"phases": PHASE})
+    values = (9).to_bytes(4, "little") + PHASE.nbytes.to_bytes(
+        4, "little"
+    )  # double precision, and how many bytes follow
+    crash = (folder / "crash.mat").read_bytes()
+    assert crash.count(values) == 1
+    (folder / "crash.mat").write_bytes(crash.replace(values, (200).to_bytes(4, "little") + values[4:]))
+    savemat(folder / "two.mat", {"a": PHASE, "b": PHASE})
+    savemat(folder / "struct.mat", {"a": {"phase": PHASE}})
     (folder / "noise.png").write_bytes(bytes(range(200)))
     cv2.imwrite(str(folder / "alpha.png"), np.zeros((12, 12, 4), np.uint8))
     huge = np.lib.format.magic(1, 0) + np.uint16(118).tobytes()
@@ -164,6 +173,9 @@ def wrong_files(folder: Path) -> None:
         ("cut.npy", {}, "damaged, or no .npy file"),
         ("new.mat", {}, "version 7.3; in MATLAB"),
         ("noise.mat", {}, "damaged, or no .mat file"),
+        ("crash.mat", {}, "damaged: its reader ends with"),  # an unknown type crashes SciPy's reader
+        ("two.mat", {}, "several variables; name one as 'variable'; it holds a, b"),
+        ("struct.mat", {}, "Object arrays cannot be saved|of type"),
         ("noise.png", {}, "no picture of 8 or 16 bits that can be read"),
         ("alpha.png", {}, "a picture with alpha"),
         ("huge.npy", {}, "an array of more than 1000 MB"),
