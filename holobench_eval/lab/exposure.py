@@ -52,6 +52,33 @@ def _exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]
     return frame, real
 
 
+class FreshCamera:
+    """A camera that refuses the last frame from before the panel or the laser changed.
+
+    Drivers hold frames back, and an old one would be scored as the new picture. Noise alone makes any two frames of a
+    sensor differ, but for dark ones.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+        self.name, self.white, self.exposures, self.close = camera.name, camera.white, camera.exposures, camera.close
+        self._shown: object = None
+        self._before: Counts | None = None
+        self._latest: Counts | None = None
+
+    def changed(self, shown: object) -> None:
+        """Another picture than before is on the sensor, unless ``shown`` is what was shown before."""
+        if shown != self._shown:
+            self._shown, self._before = shown, self._latest
+
+    def expose(self, seconds: float) -> tuple[Counts, float]:
+        """As the camera's own; DeviceError for an old frame."""
+        self._latest, real = self.camera.expose(seconds)
+        if self._before is not None and np.array_equal(self._latest, self._before) and np.ptp(self._latest):
+            raise DeviceError(f"{self.name}: gave the frame from before the panel changed")
+        return self._latest, real
+
+
 def auto_exposure(camera: Camera, plane: int) -> float:
     """The exposure [s] at which the brightest samples of the present picture fill `FILL` of the camera's range.
 

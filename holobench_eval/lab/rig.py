@@ -15,7 +15,7 @@ from torch import Tensor
 from ..core.errors import CellError, LostDeviceError, UserError
 from ..imaging.convention import Convention
 from .devices import Camera, DeviceError, Slm
-from .exposure import Dark, auto_exposure, averaged, combined, dark_frames, dark_level
+from .exposure import Dark, FreshCamera, auto_exposure, averaged, combined, dark_frames, dark_level
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
 from .preflight import Check, full_turn, linearity, phase_sign
@@ -60,6 +60,7 @@ class Rig:
     ) -> None:
         self.slm, self.camera, self.convention, self.settings = slm, camera, convention, settings
         self.laser, self.wait = laser, wait
+        self._fresh = FreshCamera(camera)
         self.planes = tuple(plane_of(wavelength) for wavelength in wavelengths)
         self.prepared: Prepared | None = None
         self._failures = 0
@@ -175,7 +176,7 @@ class Rig:
         for channel, (exposure, dark) in enumerate(zip(ready.exposures, ready.darks, strict=True)):
             self._show(request.phase, channel, convention, ready.settle)
             wanted, plane = exposure * request.relative_exposure, self.planes[channel]
-            bracket = [averaged(self.camera, wanted * each, settings.average, plane) for each in settings.hdr]
+            bracket = [averaged(self._fresh, wanted * each, settings.average, plane) for each in settings.hdr]
             light, saturated = combined(bracket, dark)
             frames.append(light)
             lost.append(saturated)
@@ -188,7 +189,9 @@ class Rig:
 
     def _show(self, phase: Tensor, channel: int, convention: Convention, settle: float) -> None:
         self.laser.select(channel)
-        self.slm.show(convention.levels(phase[channel]))
+        levels = convention.levels(phase[channel])
+        self._fresh.changed((channel, levels.tobytes()))
+        self.slm.show(levels)
         self.wait(settle)
 
     def _check_phase(self, phase: Tensor) -> None:

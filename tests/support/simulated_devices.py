@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,6 +18,8 @@ from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages.relay import sample
 from holobench_eval.imaging.convention import Levels
 from holobench_eval.lab.devices import Counts, DeviceError
+from holobench_eval.lab.drivers import catalogue
+from holobench_eval.lab.laser import SwitchedLaser
 from holobench_eval.lab.test_pattern import draw_pattern
 from holobench_eval.methods.fiducials import fiducial_phases
 from holobench_eval.methods.initial_phase import InitialPhase
@@ -209,3 +213,29 @@ class SimulatedCamera:
 
     def close(self) -> None:
         pass
+
+
+BENCH = """\
+name: small-table
+version: 1
+panel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [6.36e-7, 5.17e-7, 4.46e-7], distance: 0.0118518518, bits: 8, \
+pupil: 0.8, region: 0.8}
+slm: {driver: simulated}
+camera: {driver: simulated}
+capture: {average: 1, dark: 1, settle: 0.0}
+laser: {callable: "switch.py:switch"}
+"""
+
+
+@dataclass(frozen=True)
+class Nothing:
+    """No settings."""
+
+
+def connect(slm: SimulatedSlm, camera: SimulatedCamera, put: Callable[[Any, str, Any], None] = setattr) -> None:
+    """Put the devices behind the names that `BENCH` has. put: sets an attribute, such as pytest's for a test."""
+    for name, device in (("SLM_DRIVERS", slm), ("CAMERA_DRIVERS", camera)):
+        known = next(iter(getattr(catalogue, name).values()))
+        driver = replace(known, settings=Nothing, opens=lambda _, device=device: device)
+        put(catalogue, name, {"simulated": driver})
+    put(SwitchedLaser, "select", lambda _, channel: slm.scene.select(channel))

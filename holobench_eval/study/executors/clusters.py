@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -94,6 +96,7 @@ class Address:
     def _client(self) -> Iterator[Any]:
         from distributed import Client
 
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # not the traceback of a lost scheduler
         try:
             client = Client(self.address, timeout=ANSWER)  # type: ignore[no-untyped-call]
         except (OSError, ValueError, TimeoutError) as error:
@@ -159,12 +162,15 @@ def _results(
             running[future] = job
             completed.add(future)  # type: ignore[no-untyped-call]
 
-    fill()
-    for future in completed:
-        job = running.pop(future)
-        error = future.exception()
-        yield job, error if error is not None else future.result()
+    try:
         fill()
+        for future in completed:
+            job = running.pop(future)
+            error = future.exception()
+            yield job, error if error is not None else future.result()
+            fill()
+    except (CancelledError, OSError) as error:
+        raise UserError("the Dask scheduler went away; start it and run the same command again") from error
 
 
 def _exports() -> list[str]:
