@@ -24,7 +24,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from ..core.installed import installed
+from ..core.installed import installed, pinned, shipped
 from .output import console
 
 State = Literal["ok", "missing", "warning"]
@@ -157,11 +157,21 @@ def _packages() -> Iterator[Finding]:
             yield Finding(name, "ok", version(name), core=True)
     complete = len(modules) - len(seen["errors"])
     yield Finding("packages", "ok", f"{complete} of {len(modules)} that the core needs can be imported")
+    yield _versions(names)
     yield _kernel(seen.get("kernel"))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     yield Finding("CPU", "ok", f"{cores} cores for this process, {seen.get('threads', 'no')} torch threads")
     gpus = seen.get("gpus") or ["none that torch can use; nothing here needs one"]
     yield Finding("GPU", "ok", ", ".join(gpus))
+
+
+def _versions(names: list[str]) -> Finding:
+    """Whether the packages that the core needs are those that the committed results were made with."""
+    wanted, remedy = pinned(), f"pip install -c {shlex.quote(str(shipped() / 'constraints.txt'))} holobench_eval"
+    there = {name: found.partition("+")[0] for name in names if (found := installed(name))}
+    other = {name: found for name, found in there.items() if found != wanted.get(name, found)}
+    told = ", ".join(f"{name} {found} (not {wanted[name]})" for name, found in other.items())
+    return _either("versions", None if other else "those of the committed results", told, remedy, "warning")
 
 
 def _kernel(fault: str | None) -> Finding:

@@ -17,6 +17,7 @@ from rich.padding import Padding
 from rich.table import Table
 
 from ..core.errors import UserError, suggest
+from ..core.installed import shipped_configs
 from .output import console
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ Entries = Iterator[tuple[str, str]]  # names and descriptions
 
 def list_(
     name: Annotated[
-        str | None, typer.Argument(help="methods, datasets, profiles, metrics, conditions, or one by its name.")
+        str | None,
+        typer.Argument(help="studies, methods, datasets, profiles, metrics, conditions, or one of them."),
     ] = None,
 ) -> None:
     """List what a config may name; of one method, dataset or other name, its parameters and its paper."""
@@ -54,6 +56,20 @@ def _unknown(name: str) -> str:
     if not near or near[0] in KINDS:
         return f"unknown kind '{name}'; {suggest(name, KINDS)}, or a name that holoeval list shows"
     return f"unknown name '{name}'; did you mean '{near[0]}'? holoeval list shows them all"
+
+
+def studies() -> Entries:
+    """Every study that ships, with its title."""
+    for name, file in shipped_configs().items():
+        yield name, _words(file)["title"]
+
+
+def _words(file: Path) -> dict[str, str]:
+    """What a config says in words."""
+    import yaml
+
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    return {key: " ".join(content[key].split()) for key in ("title", "question", "would_change") if key in content}
 
 
 def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
@@ -118,6 +134,14 @@ def _values_of(kind: Change) -> str:
         return "values: names"
     unit = f" [{kind.unit}]" if kind.unit else ""
     return f"values{unit} from {kind.low:g} to {kind.high:g}; {kind.nominal:g} changes nothing"
+
+
+def explain_study(screen: Console, name: str) -> None:
+    """Print what a study asks, and where its config is."""
+    file = shipped_configs()[name]
+    _heading(screen, "studies", name, [])
+    for key, text in {**_words(file), "config": str(file), "run": f"holoeval run {name}"}.items():
+        screen.print(escape(f"{key}: {text}"), highlight=False, soft_wrap=key == "config")
 
 
 def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
@@ -196,6 +220,7 @@ MARKS = {
     "training": "for training, never scored",
 }
 KINDS: dict[str, Callable[[], Entries]] = {
+    "studies": studies,
     "methods": partial(plug_ins, "methods", camera="captures", privileged="privileged"),
     "datasets": partial(plug_ins, "datasets", training="for training, never scored"),
     "profiles": profiles,
@@ -203,6 +228,7 @@ KINDS: dict[str, Callable[[], Entries]] = {
     "conditions": conditions,
 }
 EXPLAINED: dict[str, Callable[[Console, str], None]] = {
+    "studies": explain_study,
     "methods": partial(explain_plug_in, "methods"),
     "datasets": partial(explain_plug_in, "datasets"),
     "profiles": explain_profile,

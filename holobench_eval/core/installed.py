@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -18,8 +19,18 @@ def installed(package: str) -> str | None:
         return None
 
 
+def shipped() -> Path:
+    """The folder of the studies that ship, and of ``constraints.txt``."""
+    return Path(str(files(f"{__package__.partition('.')[0]}.configs")))
+
+
 @cache
 def shipped_configs() -> dict[str, Path]:
     """The configs that ship, by name such as ``table3``."""
-    folder = Path(str(files(f"{__package__.partition('.')[0]}.configs")))
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return {path.stem: path for path in sorted(shipped().glob("*.yaml"))}
+
+
+def pinned() -> dict[str, str]:
+    """The versions of packages that the committed results were made with, by name."""
+    lines = (shipped() / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    return {found[1].lower(): found[2] for line in lines if (found := re.match(r"([\w.-]+)==([\w.]+)", line))}

@@ -1,7 +1,9 @@
 import json
+import shlex
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -9,6 +11,7 @@ import typer
 
 from holobench_eval.commands import doctor as module
 from holobench_eval.commands.doctor import Finding, _ask, doctor, examine
+from holobench_eval.core.installed import installed, pinned
 
 DEVICES = [
     {"kind": "slm", "driver": "monitor", "version": "2.1", "devices": ["HDMI-2, 1920x1080"], "why": ""},
@@ -64,6 +67,14 @@ def test_a_machine_without_the_compiler_gets_one_line_and_is_not_broken(quick):
     assert [(each.what, each.state, each.remedy, each.broken) for each in lines] == [
         ("propagation", "missing", "pip install numba", False)
     ]
+
+
+def test_versions_that_differ_from_the_pinned_ones_are_told_with_the_constraints_that_ship(quick):
+    assert pinned()["numpy"] == installed("numpy")
+    quick.setattr(module, "pinned", lambda: {"numpy": "0.1"})
+    found = named(examine(), "versions")
+    assert (found.state, found.found) == ("warning", f"numpy {installed('numpy')} (not 0.1)")
+    assert Path(shlex.split(found.remedy)[3]).is_file()
 
 
 def test_everything_missing_has_something_to_do(quick):

@@ -40,6 +40,7 @@ def test_parameters_inside_others_have_dotted_names(capsys: pytest.CaptureFixtur
         ("ssim", ("IEEE Trans. Image Process. 13", "columns: ssim_linear, ssim_amplitude, ssim_srgb")),
         ("lpips_alex", ("lower is better", "columns: lpips_alex_srgb")),
         ("crops", ("size = 208 (whole number from 32 to 4096) pixels a side",)),
+        ("table3", ("question: Does hil", "configs/table3.yaml", "run: holoeval run table3")),
         ("conditions", ("camera_shift_x", "values [mm] from -40 to 40")),
     ],
 )
@@ -67,7 +68,7 @@ def test_everything_that_is_listed_can_be_explained(capsys: pytest.CaptureFixtur
         ("wirtinker", "unknown name 'wirtinker'; did you mean 'wirtinger'?"),
         ("leto2020", "unknown name 'leto2020'; did you mean 'leto-2020'?"),
         ("condition", "unknown kind 'condition'; did you mean 'conditions'?"),
-        ("?", "unknown kind '?'; allowed: conditions, datasets, methods, metrics, profiles, or a name that"),
+        ("?", "unknown kind '?'; allowed: conditions, datasets, methods, metrics, profiles, studies, or a name that"),
     ],
 )
 def test_an_unknown_name_gets_the_nearest(name: str, message: str) -> None:

@@ -3,7 +3,16 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
-from holobench_eval.lab.exposure import Averaged, Dark, auto_exposure, averaged, combined, dark_frames, dark_level
+from holobench_eval.lab.exposure import (
+    Averaged,
+    Dark,
+    FreshCamera,
+    auto_exposure,
+    averaged,
+    combined,
+    dark_frames,
+    dark_level,
+)
 from holobench_eval.lab.settings import CaptureSettings
 from tests.support.simulated_devices import SimulatedCamera, Still
 
@@ -49,6 +58,25 @@ def test_auto_exposure_says_why_there_is_none(light, settings, line):
     with pytest.raises(DeviceError, match=line) as error:
         auto_exposure(camera(speckle(light), **settings), 0)
     assert "\n" not in str(error.value)
+
+
+def test_a_frame_from_before_the_panel_changed_is_refused_and_the_same_picture_twice_is_not():
+    frames = iter(np.array(row, np.uint8)[None] for row in 4 * [[1, 2]] + [[3, 2]] + 2 * [[0, 0]])
+    device = SimulatedCamera(Still(np.ones((1, 2))))
+    device.expose = lambda seconds: (next(frames), seconds)
+    camera = FreshCamera(device)
+    camera.changed("first")
+    camera.expose(1.0)
+    camera.changed("first")
+    camera.expose(1.0)
+    camera.changed("second")
+    for _ in range(2):
+        with pytest.raises(DeviceError, match="gave the frame from before the panel changed"):
+            camera.expose(1.0)
+    assert camera.expose(1.0)[0].max() == 3
+    camera.expose(1.0)
+    camera.changed("third")  # black
+    assert camera.expose(1.0)[0].max() == 0
 
 
 def test_the_average_is_a_mean_that_neither_clips_nor_rounds():
