@@ -58,7 +58,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "show_signature": False,
     "capture_repr": (),
-    "notebook_extensions": set(),
+    "notebook_extensions": {".py"},
     "write_computation_times": False,
     "run_stale_examples": True,  # an example may change with the package
     "abort_on_example_error": True,

@@ -132,3 +132,6 @@ def main() -> None:
     except (UserError, OSError) as error:
         print(f"holoeval: {' '.join(str(error).split())}", file=sys.stderr)
         sys.exit(2)
+    except MemoryError:
+        print("holoeval: memory is used up; with more of it, the same command goes on", file=sys.stderr)
+        sys.exit(2)

@@ -127,7 +127,7 @@ def live(
         outcome = run(study, planned, Path("out"), executor(where), watch, 1, Path("artifacts"), retry_failed=peace)
         layout = layout_of(study)
         write_files(Results(records_frame(outcome.records, layout), layout), Path("out"))
-    except (UserError, OSError):  # which the command says in one line
+    except (UserError, OSError, MemoryError):  # which the command says in one line
         os._exit(2)
     except Exception:
         traceback.print_exc()
