@@ -73,6 +73,17 @@ def holoeval(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     return code if isinstance(code, int) else 0
 
 
+def test_memory_that_is_used_up_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full() -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("holobench_eval.commands.app", full)
+    assert holoeval(monkeypatch, "list") == 2
+    assert capsys.readouterr().err == "holoeval: memory is used up; with more of it, the same command goes on\n"
+
+
 @pytest.mark.slow
 def test_a_study_from_run_to_check(
     config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
