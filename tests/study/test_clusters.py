@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import stat
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -105,6 +107,26 @@ def test_workers_with_several_threads_are_refused() -> None:
         pytest.raises(UserError, match="start workers with --nthreads 1"),
     ):
         _ = Address(cluster.scheduler_address).workers
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("waiting", [False, True], ids=["with a job", "before its first job"])
+def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch: pytest.MonkeyPatch, waiting: bool) -> None:
+    from distributed import LocalCluster
+
+    monkeypatch.setattr(clusters, "ANSWER", 2.0)
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+
+        def jobs() -> Iterator[float]:
+            if waiting:
+                cluster.close()
+                time.sleep(0.5)  # until the client has seen it
+            else:
+                threading.Timer(1.0, cluster.close).start()
+            yield 30.0
+
+        with pytest.raises(UserError, match="the Dask scheduler went away; start it and run the same command again"):
+            list(Address(cluster.scheduler_address).map(time.sleep, jobs()))
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

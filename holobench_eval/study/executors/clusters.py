@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import platform
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ WORKER_ENVIRONMENT = {
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
 }
+POLL = 0.02  # s between two looks for results
 ANSWER = 30.0  # s that a scheduler has to answer
 GPU = {"GPU": 1}  # resource that a worker with a GPU declares, and that a job on a GPU requests
 SETTINGS = {
@@ -116,7 +118,7 @@ class Address:
 
 def _usable(client: Any, on_gpu: bool) -> dict[str, Any]:
     """The scheduler's present information on its workers, by name; on_gpu: only of those that declare a GPU."""
-    workers = client.scheduler_info(n_workers=-1)["workers"]
+    workers = client.scheduler_info(n_workers=-1).get("workers", {})  # none of a scheduler that went away
     return {
         name: worker
         for name, worker in workers.items()
@@ -164,11 +166,18 @@ def _results(
 
     try:
         fill()
-        for future in completed:
-            job = running.pop(future)
-            error = future.exception()
-            yield job, error if error is not None else future.result()
-            fill()
+        while running:
+            done = completed.next_batch(block=False)
+            if not done:
+                # Dask cancels what it had; what it is given while it looks for a lost scheduler would wait for ever.
+                if client.status == "closed":
+                    raise CancelledError
+                time.sleep(POLL)
+            for future in done:
+                job = running.pop(future)
+                error = future.exception()
+                yield job, error if error is not None else future.result()
+                fill()
     except (CancelledError, OSError) as error:
         raise UserError("the Dask scheduler went away; start it and run the same command again") from error
 
