@@ -23,7 +23,7 @@ from holobench_eval.display.simulated.stages import Panel
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics import match, score
 from holobench_eval.optics import srgb_encode
-from holobench_eval.report.charts.style import METADATA, new_figure, style
+from holobench_eval.report.charts.style import new_figure, style
 from holobench_eval.study.opening import open_bench
 
 PANEL, TARGET, STEPS = (192, 192), "astronaut", 100
@@ -160,7 +160,7 @@ def draw(name: str, path: Path) -> None:
         else:
             _change(axes[2], after.light - before.light)
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, metadata=METADATA[".png"])
+        figure.savefig(path, metadata={"Software": None})  # equal pictures have equal bytes
 
 
 def _decibels(picture: Seen) -> str:

@@ -53,10 +53,10 @@ def _exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]
 
 
 class FreshCamera:
-    """A camera that refuses the last frame from before the panel or the laser changed.
+    """A camera that refuses a second delivery of the last frame from before the panel or the laser changed.
 
-    Drivers hold frames back, and an old one would be scored as the new picture. Noise alone makes any two frames of a
-    sensor differ, but for dark ones.
+    Some drivers repeat a frame, and an old one would be scored as the new picture. Noise alone makes any two frames of
+    a sensor differ, but for dark ones. An old frame that was never delivered cannot be known by its bytes.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -67,16 +67,23 @@ class FreshCamera:
         self._latest: Counts | None = None
 
     def changed(self, shown: object) -> None:
-        """Another picture than before is on the sensor, unless ``shown`` is what was shown before."""
+        """The panel and the laser are about to show ``shown``, which may be what they showed before."""
         if shown != self._shown:
             self._shown, self._before = shown, self._latest
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """As the camera's own; DeviceError for an old frame."""
-        self._latest, real = self.camera.expose(seconds)
-        if self._before is not None and np.array_equal(self._latest, self._before) and np.ptp(self._latest):
+        frame, real = self.camera.expose(seconds)
+        self._latest = frame.copy()  # a driver may fill the same buffer again
+        if self._before is not None and np.array_equal(frame, self._before) and not _dark(frame):
             raise DeviceError(f"{self.name}: gave the frame from before the panel changed")
-        return self._latest, real
+        return frame, real
+
+
+def _dark(frame: Counts) -> bool:
+    """Whether a frame is the same nearly everywhere; hot pixels are few."""
+    low, high = np.percentile(frame, (1, 99))
+    return bool(low == high)
 
 
 def auto_exposure(camera: Camera, plane: int) -> float:

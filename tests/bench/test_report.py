@@ -2,7 +2,9 @@
 
 import json
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from holobench_eval.benchmarks import report
 from holobench_eval.benchmarks.report import Timing
@@ -58,7 +60,7 @@ def test_what_was_not_timed_and_the_load_are_told():
 
 def test_a_report_follows_from_its_timings(tmp_path):
     assert report.write(tmp_path, TIMINGS, MACHINE) == tmp_path / "report.md"
-    assert (tmp_path / "ratios.png").stat().st_size > 5000
+    assert np.ptp(Image.open(tmp_path / "ratios.png").convert("L")) > 200  # is drawn
     assert report.problems(tmp_path) == []
     changed = (tmp_path / "timings.csv").read_text().replace("0.06", "0.05")
     (tmp_path / "timings.csv").write_text(changed)

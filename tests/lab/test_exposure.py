@@ -79,6 +79,22 @@ def test_a_frame_from_before_the_panel_changed_is_refused_and_the_same_picture_t
     assert camera.expose(1.0)[0].max() == 0
 
 
+def test_a_driver_may_fill_one_buffer_again_and_a_dark_frame_may_repeat_with_its_hot_pixel():
+    buffer = np.zeros((40, 40), np.uint16)
+    device = SimulatedCamera(Still(np.ones((40, 40))))
+    device.expose = lambda seconds: (buffer, seconds)
+    camera = FreshCamera(device)
+    for number in range(3):
+        camera.changed(number)
+        buffer[:, 0] = number
+        camera.expose(1.0)
+    buffer[:] = 0
+    buffer[3, 5] = 900
+    for number in range(3, 5):
+        camera.changed(number)
+        camera.expose(1.0)
+
+
 def test_the_average_is_a_mean_that_neither_clips_nor_rounds():
     device = camera(np.full((40, 40), 1.0), bits=16, gain=3e6, noise=3.0, dark=0.0)
     taken = averaged(device, 0.02, 64, 0)  # about 60,000 counts, whose sum no 16 bits hold
