@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from .. import __version__
-from ..core.errors import UserError
+from ..core.errors import UserError, out_of_memory
 
 # By purpose and in the order of work, as the help lists them. Each is a file in this folder; its last name is that of
 # the function, or group of functions, in it.
@@ -132,6 +132,8 @@ def main() -> None:
     except (UserError, OSError) as error:
         print(f"holoeval: {' '.join(str(error).split())}", file=sys.stderr)
         sys.exit(2)
-    except MemoryError:
-        print("holoeval: memory is used up; with more of it, the same command goes on", file=sys.stderr)
+    except (MemoryError, RuntimeError) as error:
+        if not out_of_memory(error):
+            raise
+        print("holoeval: out of memory; what is finished is kept, run the same command with more", file=sys.stderr)
         sys.exit(2)

@@ -168,6 +168,8 @@ def _packages() -> Iterator[Finding]:
 def _versions(names: list[str]) -> Finding:
     """Whether the packages that the core needs are those that the committed results were made with."""
     wanted, remedy = pinned(), f"pip install -c {shlex.quote(str(shipped() / 'constraints.txt'))} holobench_eval"
+    if not wanted:
+        return Finding("versions", "warning", f"cannot be compared: {shipped() / 'constraints.txt'} names none")
     there = {name: found.partition("+")[0] for name in names if (found := installed(name))}
     other = {name: found for name, found in there.items() if found != wanted.get(name, found)}
     told = ", ".join(f"{name} {found} (not {wanted[name]})" for name, found in other.items())

@@ -30,7 +30,9 @@ Entries = Iterator[tuple[str, str]]  # names and descriptions
 def list_(
     name: Annotated[
         str | None,
-        typer.Argument(help="studies, methods, datasets, profiles, metrics, conditions, or one of them."),
+        typer.Argument(
+            help="studies, methods, datasets, profiles, metrics, conditions; or one by its name, such as wirtinger."
+        ),
     ] = None,
 ) -> None:
     """List what a config may name; of one method, dataset or other name, its parameters and its paper."""

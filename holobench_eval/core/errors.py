@@ -43,6 +43,11 @@ def reason(error: BaseException) -> str:
     return " ".join(text.split())[:300]
 
 
+def out_of_memory(error: BaseException) -> bool:
+    """Whether memory is used up, in NumPy, in Python or in torch, which has no class of its own for it on a CPU."""
+    return isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
+
+
 def suggest(word: str, allowed: Iterable[str]) -> str:
     """``"did you mean 'x'? "`` for a near miss, then the allowed words; for the end of an error line."""
     words = sorted(allowed)

@@ -31,6 +31,7 @@ def shipped_configs() -> dict[str, Path]:
 
 
 def pinned() -> dict[str, str]:
-    """The versions of packages that the committed results were made with, by name."""
-    lines = (shipped() / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    """The versions of packages that the committed results were made with, by name; none if their file is lost."""
+    path = shipped() / "constraints.txt"
+    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
     return {found[1].lower(): found[2] for line in lines if (found := re.match(r"([\w.-]+)==([\w.]+)", line))}

@@ -75,7 +75,10 @@ def _numbers(content: bytes, suffix: str, variable: str) -> NDArray[Any]:
 
 def _matlab(path: Path, variable: str) -> NDArray[Any]:
     command = [sys.executable, str(Path(__file__).with_name("matlab.py")), str(path), variable, str(LARGEST_BYTES)]
-    done = subprocess.run(command, capture_output=True, timeout=SECONDS, check=False)
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        raise CellError(f"not read within {SECONDS:g} s") from None
     if done.returncode:
         said = done.stderr.decode(errors="replace").splitlines()
         crashed = f"damaged: its reader ends with {done.returncode}"

@@ -15,18 +15,25 @@ import numpy as np
 from scipy.io import loadmat, whosmat
 
 MOST = 16  # bytes of a value: a complex number of double precision
+NUMBERS = {"double", "single", "logical"} | {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
 
 
 def main(file: str, name: str, largest: str) -> None:
     """Read and write; what the reader raises goes to standard error as one line."""
     try:
-        sizes = {found: (*shape, MOST) for found, shape, _ in whosmat(file)}
+        stored = whosmat(file)
+        sizes = {found: (*shape, MOST) for found, shape, _ in stored}
+        classes = {found: kind for found, _, kind in stored}
         print(json.dumps(sizes), flush=True)
         name = name or (next(iter(sizes)) if len(sizes) == 1 else "")
+        if name in sizes and classes[name] not in NUMBERS:
+            sys.exit(f"'{name}' is of class {classes[name]}; expected a full array of numbers")
         if name in sizes and prod(sizes[name]) <= int(largest):
             np.save(sys.stdout.buffer, loadmat(file, variable_names=[name])[name], allow_pickle=False)
     except NotImplementedError:  # what SciPy says to HDF5
         sys.exit("a .mat file of version 7.3; in MATLAB: save(..., '-v7')")
+    except MemoryError:
+        sys.exit("there is not enough memory to read it")
     except Exception as error:  # whatever a reader trips over in a damaged file
         sys.exit(f"damaged, or no .mat file: {next(iter(str(error).splitlines()), type(error).__name__)}")
 

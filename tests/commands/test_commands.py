@@ -8,7 +8,9 @@ from importlib.metadata import version
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
+import numpy as np
 import pytest
+import torch
 
 from holobench_eval import commands
 from holobench_eval.commands import main
@@ -73,15 +75,18 @@ def holoeval(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     return code if isinstance(code, int) else 0
 
 
+@pytest.mark.parametrize("by", ["numpy", "torch"])
 def test_memory_that_is_used_up_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], by: str
 ) -> None:
     def full() -> None:
-        raise MemoryError
+        np.empty(2**60, np.uint8) if by == "numpy" else torch.empty(2**60, dtype=torch.uint8)
 
     monkeypatch.setattr("holobench_eval.commands.app", full)
     assert holoeval(monkeypatch, "list") == 2
-    assert capsys.readouterr().err == "holoeval: memory is used up; with more of it, the same command goes on\n"
+    assert (
+        capsys.readouterr().err == "holoeval: out of memory; what is finished is kept, run the same command with more\n"
+    )
 
 
 @pytest.mark.slow

@@ -43,6 +43,7 @@ def main() -> int:
 def text(seen: Count, cells: list[int], seed: int, hours: float) -> str:
     """The report."""
     rows = "\n".join(f"| {name} | {seen.faults.get(name, 0)} |" for kind in KINDS for name in kind.faults)
+    told = "\n".join(["", "Lives that ended wrongly:", "", *(f"- `{line}`" for line in seen.told), ""])
     return f"""# Faults
 
 `python -m tests.faults --hours {hours:g} --seed {seed}`: **{sum(seen.faults.values())} faults in {seen.studies} studies
@@ -54,13 +55,15 @@ A study plans, trains a model of the display, solves with methods of the package
 photographs, scores, and writes its files of numbers. Every other study runs on a panel and a camera, which are
 simulated behind their drivers, and trains nothing. A study is hit {FAULTS_A_STUDY} times at moments drawn by the seed,
 each time followed by the same command, and then left in peace once, with `--retry-failed`. Its records and its table
-are then compared, but for seconds and memory, with those of a study that nothing happened to. The program asks the
-clock of the day for nothing but the dates in its files; so no fault sets it.
+are then compared, but for seconds and memory, with those of a study that nothing happened to. Before each fault half of
+the records are taken away, so that there is something to hit; a fault that met no life, and a limit that none reached,
+are not counted ({seen.late} more). The program asks the clock of the day for nothing but the dates in its files; so no
+fault sets it.
 
 | fault | times |
 |---|---:|
 {rows}
-"""
+{told if seen.told else ""}"""
 
 
 if __name__ == "__main__":

@@ -160,26 +160,40 @@ def _results(
 
     def fill() -> None:
         while len(running) < workers() and (job := next(waiting, None)) is not None:
-            future = client.submit(_at_home, home, function, job, pure=False, resources=GPU if on_gpu else None)
-            running[future] = job
-            completed.add(future)  # type: ignore[no-untyped-call]
+            with _answering():
+                future = client.submit(_at_home, home, function, job, pure=False, resources=GPU if on_gpu else None)
+                running[future] = job
+                completed.add(future)  # type: ignore[no-untyped-call]
+
+    fill()
+    while running:
+        with _answering():
+            done = completed.next_batch(block=False)  # type: ignore[no-untyped-call]
+            # Dask cancels what it had; what it is given while it looks for a lost scheduler would wait for ever.
+            if not done and client.status == "closed":
+                raise CancelledError
+        if not done:
+            time.sleep(POLL)
+        for future in done:
+            job = running.pop(future)
+            with _answering():
+                error = future.exception()
+                result = error if error is not None else future.result()
+            yield job, result
+            fill()
+
+
+@contextmanager
+def _answering() -> Iterator[None]:
+    """What is asked of a Dask scheduler. UserError: it went away."""
+    from distributed.client import ClosedClientError
 
     try:
-        fill()
-        while running:
-            done = completed.next_batch(block=False)
-            if not done:
-                # Dask cancels what it had; what it is given while it looks for a lost scheduler would wait for ever.
-                if client.status == "closed":
-                    raise CancelledError
-                time.sleep(POLL)
-            for future in done:
-                job = running.pop(future)
-                error = future.exception()
-                yield job, error if error is not None else future.result()
-                fill()
-    except (CancelledError, OSError) as error:
-        raise UserError("the Dask scheduler went away; start it and run the same command again") from error
+        yield
+    except (CancelledError, ClosedClientError, OSError) as error:
+        raise UserError(
+            "the Dask scheduler went away; what is finished is kept, and the same command computes the rest"
+        ) from error
 
 
 def _exports() -> list[str]:

@@ -1,0 +1,125 @@
+"""One life of a small study, in a process of its own that a fault may end."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import traceback
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from holobench_eval.core.errors import UserError, out_of_memory
+from holobench_eval.report.data.layout import layout_of
+from holobench_eval.report.data.results import Results
+from holobench_eval.report.data.tables import records_frame
+from holobench_eval.report.files import write_files
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Executor, Serial
+from holobench_eval.study.executors.clusters import Address
+from holobench_eval.study.executors.local import Local
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
+from tests.faults import devices
+
+LONGEST = 300.0  # seconds that a life may take before it counts as hung
+WORKERS = 2
+TRACEBACK = 3  # how a life ends that ends with one
+SAID = "said.txt"  # what lives print
+
+METHOD = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+
+
+@dataclass(frozen=True)
+class Mine:
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        phase = torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("start"))
+        for _ in range(3):
+            phase = phase + bench.rectify(bench.capture(phase[0])).mean()
+        return phase
+"""
+
+STUDY = """title: faults
+display: {profiles: [leto-mild], panel: [128, 160]}
+targets: {dataset: photographs, params: {count: 2}}
+training: {dataset: dead_leaves, params: {count: 4}, held_out: 1}
+protocol: {metrics: [psnr]}
+methods:
+  - double_phase
+  - {name: wirtinger, params: {iterations: 5}}
+  - {name: "mine.py:Mine", captures: 3}
+  - {name: parametric_model, params: {training: {rounds: 1, images: 2, steps: 3}}}
+"""
+
+
+SIMULATED = {"mine.py": METHOD, "study.yaml": STUDY}
+DEVICES = {"mine.py": METHOD, **devices.FILES}
+
+
+def executor(name: str) -> Executor:
+    """One by one, on two workers of this machine, or on those of a Dask scheduler."""
+    return {"serial": Serial(), "workers": Local(WORKERS)}.get(name) or Address(name)
+
+
+def live(
+    folder: Path,
+    where: str = "serial",
+    limits: dict[int, int] | None = None,
+    peace: bool = False,
+    fault: devices.Fault | None = None,
+) -> None:
+    """One life of a study: the run and its files of numbers. It ends with 0, with 1 for holes, with 2 for a refusal.
+
+    where: see `executor`; peace: cells that failed are tried again; fault: of its devices.
+    """
+    os.chdir(folder)
+    for output in (1, 2):
+        os.dup2(os.open(SAID, os.O_WRONLY | os.O_CREAT | os.O_APPEND), output)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    for limit, value in (limits or {}).items():
+        resource.setrlimit(limit, (value, value))
+    if Path("bench.yaml").is_file():
+        devices.failing(fault)
+    try:
+        study = load_study(Path("study.yaml"))
+        planned, watch = plan(study), Lines(lambda _: None)
+        outcome = run(study, planned, Path("out"), executor(where), watch, 1, Path("artifacts"), retry_failed=peace)
+        layout = layout_of(study)
+        write_files(Results(records_frame(outcome.records, layout), layout), Path("out"))
+    except (UserError, OSError):  # which the command says in one line
+        os._exit(2)
+    except Exception as error:
+        if out_of_memory(error):  # said in one line, too
+            os._exit(2)
+        traceback.print_exc()
+        os._exit(TRACEBACK)
+    os._exit(1 if outcome.failed else 0)
+
+
+def begin(folder: Path, files: dict[str, str]) -> None:
+    """A folder with the files of a study."""
+    folder.mkdir(parents=True)
+    for name, content in files.items():
+        (folder / name).write_text(content)
+
+
+def ends(process: BaseProcess) -> bool:
+    """Wait for the end of a life; whether it came."""
+    process.join(LONGEST)
+    if process.is_alive():
+        process.kill()
+        process.join()
+        return False
+    return True
+
+
+def on_devices(folder: Path) -> bool:
+    """Whether a study photographs with devices, which are those of one process."""
+    return (folder / "bench.yaml").is_file()

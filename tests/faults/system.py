@@ -1,0 +1,188 @@
+"""Faults of the system: signals, limits, a full disk, two runs at once, a Dask cluster that is lost.
+
+A fault is a generator: it gives the life that it is about to hit, then hits it, and may tell whether the life was still
+going on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from multiprocessing import forkserver
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+from holobench_eval.study.executors.processes import start
+from tests.faults import devices
+from tests.faults.life import LONGEST, WORKERS, ends, live, on_devices
+
+Told = Iterator[Any]  # the process of a life, then whether it was hit
+IMPORTS = 1.0  # seconds that a life on a Dask cluster takes to begin
+ANSWER = 60.0  # seconds that a Dask cluster has to begin
+
+
+def others(driver: BaseProcess) -> list[int]:
+    """Workers, processes of methods and their calls."""
+    parents: dict[int, int] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError, ValueError):
+                parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+    server = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]
+    family = [server]
+    for process in family:
+        family += [child for child, parent in parents.items() if parent == process]
+    return [process for process in family[1:] if process != driver.pid]
+
+
+def kills(number: int, of: Callable[[BaseProcess], list[int]]) -> Callable[..., Told]:
+    """A fault: a signal to one of some processes, at a random moment."""
+
+    def fault(folder: Path, draw: random.Random, length: float) -> Told:
+        where, when, which = draw.random(), draw.random(), draw.random()
+        process = start(live, folder, "workers" if where < 0.7 and not on_devices(folder) else "serial")
+        yield process
+        time.sleep(when * length)
+        victims = of(process) if process.is_alive() else []
+        if victims:
+            with suppress(ProcessLookupError):
+                os.kill(victims[int(which * len(victims))], number)
+        yield bool(victims)
+
+    return fault
+
+
+def limits(limit: int, low: int, high: int) -> Callable[..., Told]:
+    """A fault: a limit of the system that is met sooner or later, drawn evenly in its logarithm."""
+
+    def fault(folder: Path, draw: random.Random, length: float) -> Told:
+        yield start(live, folder, "serial", {limit: round(low * (high / low) ** draw.random())})
+
+    return fault
+
+
+def full_disk(folder: Path, draw: random.Random, length: float) -> Told:
+    """A fault: the disk of the results is full after some kilobytes. Only root can mount one."""
+    disk = folder / "out"
+    disk.mkdir(exist_ok=True)
+    kept = folder / "kept"
+    subprocess.run(["cp", "-a", str(disk), str(kept)], check=True)
+    held = sum(path.stat().st_blocks * 512 for path in disk.rglob("*") if path.is_file())
+    size = held + draw.randint(8, 400) * 1024
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(disk)], check=True)
+    try:
+        with suppress(subprocess.CalledProcessError):
+            subprocess.run(["cp", "-a", f"{kept}/.", str(disk)], check=True, stderr=subprocess.DEVNULL)
+        process = start(live, folder, draw.choice(["serial", "workers"]))
+        yield process
+        process.join(LONGEST)
+        subprocess.run(["rm", "-rf", str(kept)], check=True)
+        subprocess.run(["cp", "-a", str(disk), str(kept)], check=True)
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+    subprocess.run(["cp", "-a", f"{kept}/.", str(disk)], check=True)
+    subprocess.run(["rm", "-rf", str(kept)], check=True)
+
+
+def two_runs(folder: Path, draw: random.Random, length: float) -> Told:
+    """A fault: the same command twice at once."""
+    first = start(live, folder, "workers")
+    yield first
+    time.sleep(draw.random() * length)
+    both = first.is_alive()
+    second = start(live, folder)
+    assert ends(second)
+    first.join(LONGEST)
+    yield both
+
+
+def dask(victim: int) -> Callable[..., Told]:
+    """A fault: the scheduler of a Dask cluster (victim 0) or one of its workers is killed."""
+
+    def fault(folder: Path, draw: random.Random, length: float) -> Told:
+        known = folder / "scheduler.json"
+        known.unlink(missing_ok=True)
+        file = ["--scheduler-file", str(known), "--no-dashboard"]
+        commands = [
+            ["scheduler", "--port", "0", *file],
+            *[["worker", "--nthreads", "1", "--no-nanny", *file]] * WORKERS,
+        ]
+        cluster = [
+            subprocess.Popen(
+                [sys.executable, "-m", "distributed.cli.dask_" + command[0], *command[1:]],
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                cwd=folder,
+            )
+            for command in commands
+        ]
+        try:
+            process = start(live, folder, _address(known))
+            yield process
+            time.sleep(IMPORTS + draw.random() * length)
+            hit = process.is_alive()
+            cluster[victim].kill()
+            process.join(LONGEST)
+            yield hit
+        finally:
+            for each in cluster:
+                each.kill()
+                each.wait()
+
+    return fault
+
+
+def _address(known: Path) -> str:
+    """The address of a Dask scheduler whose workers have come. RuntimeError: the cluster does not begin."""
+    from distributed import Client
+
+    until = time.monotonic() + ANSWER
+    while not known.exists() or not known.stat().st_size:
+        if time.monotonic() > until:
+            raise RuntimeError("no Dask scheduler begins")
+        time.sleep(0.05)
+    address = str(json.loads(known.read_text())["address"])
+    with Client(address, timeout=ANSWER) as client:
+        client.wait_for_workers(WORKERS, timeout=ANSWER)
+    return address
+
+
+FAULTS: dict[str, Any] = {
+    "the run is killed": kills(signal.SIGKILL, lambda driver: [driver.pid or 0]),
+    "the run is told to end": kills(signal.SIGTERM, lambda driver: [driver.pid or 0]),
+    "the run is interrupted": kills(signal.SIGINT, lambda driver: [driver.pid or 0]),
+    "a worker or a method's process is killed": kills(signal.SIGKILL, others),
+    "a worker or a method's process aborts": kills(signal.SIGABRT, others),
+    "files have a largest size": limits(resource.RLIMIT_FSIZE, 200, 300_000),
+    "few files may be open": limits(resource.RLIMIT_NOFILE, 12, 80),
+    "memory is short": limits(resource.RLIMIT_DATA, 50 * 2**20, 2**31),
+    "the disk is full": full_disk,
+    "two runs at once": two_runs,
+    "the Dask scheduler is killed": dask(0),
+    "a Dask worker is killed": dask(1),
+}
+
+
+def device(kind: str, least: int, most: int) -> Callable[..., Told]:
+    """A fault: from a random moment on, a device fails so many times."""
+    return devices.fails(lambda folder, fault: start(live, folder, "serial", None, False, fault), kind, least, most)
+
+
+FAULTS_OF_DEVICES: dict[str, Any] = {
+    "a frame does not come": device("late", 1, 6),
+    "an old frame comes": device("old", 1, 6),
+    "a frame of another size comes": device("small", 1, 6),
+    "the panel does not answer": device("panel", 1, 6),
+    "the camera vanishes": device("late", devices.FOREVER, devices.FOREVER),
+    "the panel vanishes": device("panel", devices.FOREVER, devices.FOREVER),
+    "the run on devices is killed": FAULTS["the run is killed"],
+}
