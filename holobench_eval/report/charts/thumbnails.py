@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from ...study.store import Store
 from ..data.results import Results
+from ..data.scores import Score
 from ..data.tables import DONE
 from .gallery import Picture, Tile, load_picture
 
@@ -43,7 +46,7 @@ class Thumbnails:
         if picture.shape != shape:
             return Tile(None, f"thumbnail is {picture.shape[1]} x {picture.shape[0]}, target {shape[1]} x {shape[0]}")
         scores = [self.results.headline, *(score for score in self.results.leading if score.metric == "ssim")][:2]
-        return Tile(picture, "   ".join(f"{score.title} {score.with_unit(float(cell[score.key]))}" for score in scores))
+        return Tile(picture, noted(scores, cell))
 
     def by_quality(self, condition: str) -> list[str]:
         """The targets that have a picture, from worst to best by their mean over methods."""
@@ -65,3 +68,10 @@ class Thumbnails:
         if picture is None:
             self.absent.add(path.name)
         return picture
+
+
+def noted(scores: Sequence[Score], cell: pd.Series) -> str:
+    """The scores of a cell for below its tile, which is narrow: that all are in focus stands there once."""
+    focus = all(score.in_focus for score in scores)
+    values = (f"{score.name if focus else score.title} {score.with_unit(float(cell[score.key]))}" for score in scores)
+    return ("in focus: " if focus else "") + "   ".join(values)

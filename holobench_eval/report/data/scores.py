@@ -32,11 +32,15 @@ class Score:
     variant: str = ""
 
     @property
-    def title(self) -> str:
+    def name(self) -> str:
         """The metric's usual name."""
         metric = METRICS.get(self.metric)
-        name = (metric.title if metric else _FACTORS.get(self.metric)) or self.metric.replace("_", " ")
-        return f"{name} in focus" if self.in_focus else name
+        return (metric.title if metric else _FACTORS.get(self.metric)) or self.metric.replace("_", " ")
+
+    @property
+    def title(self) -> str:
+        """The name, and whether it is of what is in focus."""
+        return f"{self.name} in focus" if self.in_focus else self.name
 
     @property
     def in_focus(self) -> bool:

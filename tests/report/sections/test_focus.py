@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from holobench_eval.report import Description, Results, records_frame
+from holobench_eval.report.charts.thumbnails import noted
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.text import text_of
 from holobench_eval.report.section import Report
@@ -95,6 +97,8 @@ def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
     assert parse("psnr_linear_infocus").axis == "PSNR in focus, linear light [dB]"
     leading = [score.key for score in results_of({"lens": 20.0}).leading]
     assert leading[:3] == ["psnr_linear_infocus", "ssim_linear_infocus", "psnr_linear"]
+    scores, cell = [parse(key) for key in leading[:2]], pd.Series({leading[0]: 16.384, leading[1]: 0.4})
+    assert noted(scores, cell) == "in focus: PSNR 16.38 dB   SSIM 0.400"
 
 
 def test_blur_is_compared_with_whole_pictures() -> None:
