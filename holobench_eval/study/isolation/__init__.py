@@ -14,7 +14,7 @@ import torch
 
 from ...core import plugins
 from ...core.device import CPU
-from ...core.errors import UserError
+from ...core.errors import CellError, UserError
 from ...core.hashing import canonical
 from ...core.schema import FieldError
 from ..definition import Isolation, Limits
@@ -93,8 +93,8 @@ def _calling(function: str) -> Any:
 
 
 def build(name: str, params: Mapping[str, Any], folder: Path) -> Any:
-    """A method with its parameters checked and complete, for what it declares. UserError as ``plugins.build``, and for
-    a parameter that would say what only the class may declare."""
+    """A method with its parameters checked and complete, for what it declares. UserError as ``plugins.build``, for a
+    parameter that would say what only the class may declare, and where the method's process ends."""
     cls = find(name, folder)
     for flag in BOOLEANS:
         if flag in params:
@@ -102,7 +102,10 @@ def build(name: str, params: Mapping[str, Any], folder: Path) -> Any:
             raise FieldError((flag,), message, at_key=True)
     if not issubclass(cls, Apart):
         return plugins.build("methods", name, dict(params), folder)
-    complete = cls(params)._call("params")
+    try:
+        complete = cls(params)._call("params")
+    except CellError as error:  # no cell is computed yet
+        raise UserError(f"method '{name}' does not give its parameters: {error}") from error
     canonical(complete)
     return cls(complete)
 
