@@ -138,7 +138,8 @@ def test_a_file_that_ends_its_process_is_refused_in_one_line(tmp_path: Path, end
 def test_a_process_that_ends_while_its_study_is_read_is_told_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "ends.py").write_text(
         "import os\nfrom dataclasses import dataclass\n\n@dataclass(frozen=True)\nclass Ends:\n"
-        "    def __post_init__(self):\n        os.abort()\n\n    def solve(self, target, bench):\n        return target\n"
+        "    def __post_init__(self):\n        os.abort()\n\n"
+        "    def solve(self, target, bench):\n        return target\n"
     )
     with pytest.raises(UserError, match=r"'ends.py:Ends' does not give its parameters: .*SIGABRT"):
         isolation.build("ends.py:Ends", {}, tmp_path)
