@@ -87,12 +87,12 @@ def test_a_driver_may_fill_one_buffer_again_and_a_dark_frame_may_repeat_with_its
     for number in range(3):
         camera.changed(number)
         buffer[:, 0] = number
-        camera.expose(1.0)
+        assert camera.expose(1.0)[0][0, 0] == number
     buffer[:] = 0
     buffer[3, 5] = 900
     for number in range(3, 5):
         camera.changed(number)
-        camera.expose(1.0)
+        assert camera.expose(1.0)[0].max() == 900
 
 
 def test_the_average_is_a_mean_that_neither_clips_nor_rounds():

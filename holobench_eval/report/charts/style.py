@@ -90,7 +90,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def _save_chart(figure: Figure, path: Path) -> None:
-    """A PNG of 256 colours, a third of the bytes: white stays white, and no colour is off by more than 9 of 255."""
+    """A PNG of 256 colours, a third of the bytes: white stays white, colours are off by 9 of 255 where it was most."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=DPI)
     chart = Image.open(drawn).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
