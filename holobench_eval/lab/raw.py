@@ -54,7 +54,8 @@ def read_raw(source: Path | bytes, name: str = "") -> RawFrame:
     except UserError:
         raise
     except Exception as error:  # a damaged file fails in many ways
-        raise UserError(f"{where}: not a RAW file that LibRaw can read ({error or type(error).__name__})") from error
+        reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else str(error)
+        raise UserError(f"{where}: not a RAW file that LibRaw can read ({reason or type(error).__name__})") from error
 
 
 def is_jpeg(data: bytes) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from functools import cached_property
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,9 @@ _ENCODINGS: dict[Domain, Callable[[Tensor], Tensor]] = {
     "srgb": srgb_encode,
     "stored": lambda values: values,
 }
+# What the scores need of a target alone, for repeats, displays and floor images one after the other.
+_encoded_target = {domain: remembered(encode, most=2) for domain, encode in _ENCODINGS.items()}
+_refinement = remembered(Refinement, most=2)
 _REPEATED = ("psnr", "ssim")  # also given after refinement and after blur
 
 
@@ -133,21 +136,24 @@ def score(
     names, chosen = _chosen(metrics, lpips_weights)
     first: Domain = "stored" if stored else "linear"
     image, factors = match(light, wanted)
-    fixed, encoded = _fixed(wanted), _Encoded(image)
     scores: dict[str, float] = {}
-    for metric in chosen:
-        if min(image.shape[1:]) >= metric.smallest:
-            for domain in (first,) if stored else metric.domains:
-                scores[f"{metric.name}_{domain}"] = float(metric.function(encoded[domain], fixed.encoded[domain]))
+    computed = [metric for metric in chosen if min(image.shape[1:]) >= metric.smallest]
+    for domain in _ENCODINGS:  # one after the other: in all of them a large image would fill the memory
+        here = [metric for metric in computed if domain in (("stored",) if stored else metric.domains)]
+        if here:
+            encoded, reference = _ENCODINGS[domain](image), _encoded_target[domain](wanted)
+            scores |= {f"{metric.name}_{domain}": float(metric.function(encoded, reference)) for metric in here}
+            del encoded, reference
+    del image
     repeated = [metric for metric in chosen if metric.name in _REPEATED]
     if refine and repeated:
-        moved = fixed.refinement(factors.view(-1, 1, 1) * light)
+        moved = _refinement(wanted)(factors.view(-1, 1, 1) * light)
         again, _ = match(moved.image.to(wanted), wanted)
         scores |= {f"{metric.name}_{first}_refined": float(metric.function(again, wanted)) for metric in repeated}
         scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
         del moved, again  # of a large image, before the blurred ones are made
     for sigma in blur if repeated else ():
-        soft_capture, soft_target = _blurred(light, sigma), fixed.blurred(sigma)
+        soft_capture, soft_target = _blurred(light, sigma), _softened(sigma)(wanted)
         soft, _ = match(soft_capture, soft_target)
         scores |= {f"{m.name}_{first}_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
     if "speckle_contrast" in names and not stored:
@@ -158,38 +164,10 @@ def score(
     return scores | {f"scale_{channel}": float(factor) for channel, factor in enumerate(factors)}
 
 
-class _Encoded(dict[Domain, Tensor]):
-    """An image in every domain, computed when asked for."""
-
-    def __init__(self, image: Tensor) -> None:
-        super().__init__()
-        self.image = image
-
-    def __missing__(self, domain: Domain) -> Tensor:
-        self[domain] = _ENCODINGS[domain](self.image)
-        return self[domain]
-
-
-class _Fixed:
-    """What the scores need of a target ``(C, h, w)`` alone; each part is computed when first asked for."""
-
-    def __init__(self, target: Tensor) -> None:
-        self.target, self.encoded = target, _Encoded(target)
-        self._soft: dict[float, Tensor] = {}
-
-    @cached_property
-    def refinement(self) -> Refinement:
-        """The search for the move of a capture."""
-        return Refinement(self.target)
-
-    def blurred(self, sigma: float) -> Tensor:
-        """The target behind a Gaussian of width sigma [px]."""
-        if sigma not in self._soft:
-            self._soft[sigma] = _blurred(self.target, sigma).clamp(0, 1)
-        return self._soft[sigma]
-
-
-_fixed = remembered(_Fixed, most=2)  # of repeats, displays and floor images one after the other
+@lru_cache(maxsize=8)
+def _softened(sigma: float) -> Callable[[Tensor], Tensor]:
+    """What puts a target behind a Gaussian of width sigma [px]."""
+    return remembered(lambda target: _blurred(target, sigma).clamp(0, 1), most=2)
 
 
 def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -39,8 +40,8 @@ def shifted(target: Tensor) -> Tensor:
     return torch.cat([target[..., :1], target[..., :-1]], dim=-1)
 
 
-def floor_captures(target: Tensor, others: Sequence[Tensor], *names: object) -> dict[str, Tensor]:
-    """Reference captures for a target (C, h, w) in linear light, by row name.
+def floor_captures(target: Tensor, others: Sequence[Tensor], *names: object) -> dict[str, Callable[[], Tensor]]:
+    """What makes the reference captures for a target (C, h, w) in linear light, by row name.
 
     others: the study's other targets, in cyclic order from the one after this; the first is the wrong target, and
     without any that row is absent. names: what the speckle depends on (for example the target's name).
@@ -48,13 +49,11 @@ def floor_captures(target: Tensor, others: Sequence[Tensor], *names: object) -> 
     """
     if target.ndim != 3 or any(other.shape != target.shape for other in others):
         raise ValueError("targets must all be (C, h, w) of one shape")
-    captures = {
-        "floor_constant": constant(target),
-        "floor_black": black(target),
-        "floor_speckle": speckle(target, *names),
-        "floor_mirrored": mirrored(target),
-        "floor_shift_1px": shifted(target),
+    captures: dict[str, Callable[[], Tensor]] = {
+        "floor_constant": partial(constant, target),
+        "floor_black": partial(black, target),
+        "floor_speckle": partial(speckle, target, *names),
+        "floor_mirrored": partial(mirrored, target),
+        "floor_shift_1px": partial(shifted, target),
     }
-    if others:
-        captures["floor_wrong_target"] = others[0].clone()
-    return captures
+    return captures | ({"floor_wrong_target": others[0].clone} if others else {})

@@ -18,6 +18,7 @@ from holobench_eval.core.hashing import digest
 from holobench_eval.datasets.images import decode
 from holobench_eval.display.simulated.profile import load_profile
 from holobench_eval.lab.bench_file import load_bench_file
+from holobench_eval.lab.raw import read_raw
 from holobench_eval.lab.session.manifest import FILE as MANIFEST
 from holobench_eval.lab.session.manifest import capture_of, file_of, read_manifest
 from holobench_eval.methods.files.arrays import read_array
@@ -27,6 +28,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.isolation.messages import Channel
 from holobench_eval.study.provenance import read as read_provenance
 from holobench_eval.study.store import SCHEMA, Record, Store
+from tests.support.bayer import bayer_dng
 
 ROOT = Path(__file__).parents[2]
 REFUSALS = (UserError, CellError)
@@ -94,6 +96,11 @@ def _pictures() -> list[bytes]:
     return written
 
 
+def _photographs() -> list[bytes]:
+    mosaic = np.arange(32 * 32, dtype=np.uint16).reshape(32, 32) * 15
+    return [bayer_dng(mosaic), bayer_dng(mosaic, pattern=bytes([2, 1, 1, 0]))]
+
+
 def _tensors() -> list[bytes]:
     buffer = io.BytesIO()
     torch.save({"format": 1, "state": {"w": torch.ones(2, 3), "n": 3, "s": [1.5, "a"]}}, buffer)
@@ -158,6 +165,7 @@ TARGETS = {
     "profile": Target(lambda content, folder: load_profile(str(_file(folder, "mine.yaml", content))), _profiles),
     "bench": Target(lambda content, folder: load_bench_file(_file(folder, "bench.yaml", content)), _benches),
     "picture": Target(lambda content, folder: decode(content, "picture"), _pictures),
+    "raw": Target(lambda content, _: read_raw(content, "picture"), _photographs),
     "phases": Target(_read_phases, _phases),
     "tensors": Target(lambda content, folder: read_tensors(_file(folder, "learned.pt", content)), _tensors),
     "record": Target(_read_record, _records),

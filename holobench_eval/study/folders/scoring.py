@@ -288,7 +288,7 @@ class Scoring:
         pictures = floor_captures(reference, others, name)
         quick = self.quick if reference[0].numel() > LARGE else None
         records = [
-            Record(cells[row], "done", row, scores=self.scores(pictures.pop(row), reference, quick)) for row in rows
+            Record(cells[row], "done", row, scores=self.scores(pictures[row](), reference, quick)) for row in rows
         ]
         for record in records:
             self.store.write(record)

@@ -90,7 +90,7 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor], scored: Sc
     write_thumbnail(job.store.target_thumbnail(cells[0].target), target)
 
     def reference(cell: Cell, _: Condition) -> Record:
-        scores = scored(job, cell, captures[cell.method], target)
+        scores = scored(job, cell, captures[cell.method](), target)
         return Record(cell.description(), "done", cell.method, scores=scores)
 
     return reference
