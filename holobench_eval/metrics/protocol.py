@@ -30,7 +30,7 @@ Image = Tensor | NDArray[np.floating]
 _ENCODINGS: dict[Domain, Callable[[Tensor], Tensor]] = {
     "linear": lambda light: light,
     "amplitude": torch.sqrt,
-    "srgb": srgb_encode,
+    "srgb": lambda light: _by_channel(srgb_encode, light),
     "stored": lambda values: values,
 }
 # What the scores need of a target alone, for repeats, displays and floor images one after the other.
@@ -65,12 +65,12 @@ def match(capture: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     (0.125, 0.5)
     """
     factors = _factors(capture, target)
-    return (factors.view(-1, 1, 1) * capture).clamp(0, 1), factors
+    return (factors.view(-1, 1, 1) * capture).clamp_(0, 1), factors
 
 
 def _factors(capture: Tensor, target: Tensor) -> Tensor:
     # Divided by the peak first, so that the squares neither overflow nor vanish.
-    peak = capture.abs().amax(dim=(1, 2), keepdim=True)
+    peak = torch.maximum(capture.amax(dim=(1, 2), keepdim=True), -capture.amin(dim=(1, 2), keepdim=True))
     peak = torch.where(peak > 0, peak, 1.0)
     scaled = capture / peak
     power = scaled.square().sum(dim=(1, 2))
@@ -153,9 +153,10 @@ def score(
         scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
         del moved, again  # of a large image, before the blurred ones are made
     for sigma in blur if repeated else ():
-        soft_capture, soft_target = _blurred(light, sigma), _softened(sigma)(wanted)
-        soft, _ = match(soft_capture, soft_target)
+        soft_target = _softened(sigma)(wanted)
+        soft, _ = match(_blurred(light, sigma), soft_target)
         scores |= {f"{m.name}_{first}_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
+        del soft, soft_target
     if "speckle_contrast" in names and not stored:
         contrast = speckle_contrast(light, wanted)
         scores |= {} if math.isnan(contrast) else {"speckle_contrast": contrast}
@@ -167,7 +168,7 @@ def score(
 @lru_cache(maxsize=8)
 def _softened(sigma: float) -> Callable[[Tensor], Tensor]:
     """What puts a target behind a Gaussian of width sigma [px]."""
-    return remembered(lambda target: _blurred(target, sigma).clamp(0, 1), most=2)
+    return remembered(lambda target: _blurred(target, sigma).clamp_(0, 1), most=2)
 
 
 def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
@@ -209,4 +210,12 @@ def _chosen(names: Collection[str] | None, weights: str | Path | None) -> tuple[
 def _blurred(image: Tensor, sigma: float) -> Tensor:
     if not 0 < 4 * sigma < min(image.shape[1:]) - 1:
         raise ValueError(f"blur width {sigma} px must be positive and less than a quarter of the image's side")
-    return gaussian_blur(image[None], sigma)[0]
+    return _by_channel(lambda channel: gaussian_blur(channel[None, None], sigma)[0, 0], image)
+
+
+def _by_channel(function: Callable[[Tensor], Tensor], image: Tensor) -> Tensor:
+    """What a function makes of each channel ``(h, w)``, one after the other: a large image takes less memory so."""
+    made = torch.empty_like(image)
+    for channel, result in zip(image, made, strict=True):
+        result.copy_(function(channel))
+    return made

@@ -253,20 +253,26 @@ class Scoring:
     def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
         """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""
         frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
-        light, reference = self.as_light(torch.from_numpy(frame)), self.as_light(compared)
-        small, to_target = reduced(gray(reference.numpy()), WIDE)
-        shrunk, to_frame = reduced(gray(light.numpy()), round(max(frame.shape) * max(small.shape) / max(first.shape)))
-        homography = np.linalg.inv(to_frame) @ first.homography @ to_target
-        found = second_warp(shrunk, small, Warp((small.shape[0], small.shape[1]), homography, np.zeros((6, 2))))
-        if found is None:
+        other = self.second_geometry(torch.from_numpy(frame), compared, first)
+        if other is None:
             return {}
-        other = replace(first, homography=to_frame @ found.homography @ np.linalg.inv(to_target))
         image = torch.from_numpy(sampled(frame, other))
         other_scores = score(
             image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored"
         )
         scores = {f"{name}_{self.domain}_second": other_scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return scores | {"second_aligner_px": disagreement(first, other)}
+
+    def second_geometry(self, frame: Tensor, compared: Tensor, first: Warp) -> Warp | None:
+        """Where a second algorithm finds the target, from values of a capture and its target that are compared."""
+        small, to_target = reduced(gray(self.as_light(compared).numpy()), WIDE)
+        side = round(max(frame.shape) * max(small.shape) / max(first.shape))
+        shrunk, to_frame = reduced(gray(self.as_light(frame).numpy()), side)
+        homography = np.linalg.inv(to_frame) @ first.homography @ to_target
+        found = second_warp(shrunk, small, Warp((small.shape[0], small.shape[1]), homography, np.zeros((6, 2))))
+        if found is None:
+            return None
+        return replace(first, homography=to_frame @ found.homography @ np.linalg.inv(to_target))
 
     def floor(self, name: str, part: Part | None) -> list[Record]:
         """The records of floor images."""
