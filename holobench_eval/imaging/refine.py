@@ -170,4 +170,9 @@ def _inner(image: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def _inner_correlation(a: Frame, b: Frame) -> float:
-    return float(np.corrcoef(_inner(a).ravel(), _inner(b).ravel())[0, 1])
+    # np.corrcoef takes seven copies in double precision.
+    first, second = (_inner(side).astype(np.float64).ravel() for side in (a, b))
+    first -= first.mean()
+    second -= second.mean()
+    scale = math.sqrt((first @ first) * (second @ second))
+    return float(first @ second) / scale if scale else 0.0

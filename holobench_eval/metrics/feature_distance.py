@@ -162,7 +162,7 @@ def _in_strips(x: Tensor, y: Tensor) -> Tensor:
             a, b = (opponent_channels(side[:, :, first : bottom + REACH], scale) for side in (x, y))
             total = total + _Scale.of(b).distance(a)[:, top - first : bottom - first].sum(dim=(1, 2))
         parts.append(total / (height * width))
-        x, y = _halved(x), _halved(y)
+        x, y = (torch.cat([_halved(channel) for channel in side.split(1, dim=1)], dim=1) for side in (x, y))
     return torch.stack([*parts, _colour_distance(x, y)]).mean(0)
 
 

@@ -15,7 +15,7 @@ from .base import Metric, halved, mix, paired, similarity
 YIQ = ((0.299, 0.587, 0.114), (0.5959, -0.2746, -0.3213), (0.2115, -0.5227, 0.3112))
 C = 30.0
 ALPHA = 4.2
-STRIP = 2**20  # pixels
+STRIP = 2**17  # pixels
 
 
 def _haar(luma: Tensor, size: int) -> Tensor:
