@@ -31,7 +31,8 @@ def list_(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="studies, methods, datasets, profiles, metrics, conditions; or one by its name, such as wirtinger."
+            help="studies, methods, datasets, profiles, metrics, conditions; or one by its name, such as wirtinger or "
+            "mine.py:solve."
         ),
     ] = None,
 ) -> None:
@@ -44,7 +45,7 @@ def list_(
                 table.add_row(entry, escape(text))
             screen.print(table)
         return
-    found = [kind for kind in KINDS if name in dict(KINDS[kind]())]
+    found = ["methods"] if ".py:" in name else [kind for kind in KINDS if name in dict(KINDS[kind]())]
     if not found:
         raise UserError(_unknown(name))
     for kind in found:
@@ -88,7 +89,7 @@ def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
             yield name, str(error)
             continue
         summary = str(cls.__doc__ or "").strip().partition("\n")[0]
-        marked = [word for flag, word in marks.items() if getattr(cls, flag, False)]
+        marked = [word for flag, word in marks.items() if getattr(cls, flag, False) is True]
         yield name, summary + (f" ({', '.join(marked)})" if marked else "")
 
 
@@ -148,22 +149,20 @@ def explain_study(screen: Console, name: str) -> None:
 
 def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
     """Print what a method or a dataset is, its paper and its parameters."""
-    from ..core import plugins
-    from ..core.parameters import parameters, source, summary
+    from ..core.parameters import words
+    from ..study import isolation
 
     cls = _declared(kind, name)
-    marks = [word for flag, word in MARKS.items() if getattr(cls, flag, False)]
+    said = isolation.words(name, Path()) if kind == "methods" else words(cls)
+    marks = [word for flag, word in MARKS.items() if getattr(cls, flag, False) is True]
     _heading(screen, kind, name, marks)
-    screen.print(escape(summary(cls)), highlight=False)
-    if paper := source(cls):
-        screen.print(f"\nSource: {escape(paper)}", highlight=False)
+    screen.print(escape(said.summary), highlight=False)
+    if said.source:
+        screen.print(f"\nSource: {escape(said.source)}", highlight=False)
     if hasattr(cls, "tuned"):
         screen.print(f"\nTuned: {escape(cls.tuned)}", highlight=False)
-    if not plugins.is_shipped(kind, name):
-        screen.print("\nIts package tells its parameters; holoeval plan checks those of a config.", highlight=False)
-        return
     screen.print("\nIts parameters (params: in a config), each with its default and what it may be:", highlight=False)
-    for entry in parameters(cls):
+    for entry in said.parameters:
         default = f" = {entry.default}" if entry.default else ""
         screen.print(f"[bold]{entry.name}[/bold]{escape(default)}   ({escape(entry.allowed)})", highlight=False)
         screen.print(Padding(escape(entry.meaning), (0, 0, 0, 4), expand=False), highlight=False)

@@ -74,9 +74,10 @@ def headline_table(results: Results, condition: str) -> Table:
         table.add_column("captures", justify="right", no_wrap=True)
     for name in methods:
         row, category = results.row(name, condition), layout.category(name)
-        scored = f" ({row['n']:.0f} of {len(results.targets)} targets)" * (row["n"] < len(results.targets))
+        lacks = row["n"] < len(results.targets)
+        scored = f" ({row['n']:.0f} of {len(results.targets)} targets)" * lacks
         rank = number(row.get("rank", math.nan))
-        place = f"{rank} {category}" if several and rank != "–" else rank
+        place = f"{rank} {category}" if several and rank != "–" else "not ranked" if lacks else rank
         captures = [number(row["total_captures"])] if spends else []
         table.add_row(
             *map(escape, (f"{marked(results, name, condition)}{scored}", score.in_row(row), place, *captures))

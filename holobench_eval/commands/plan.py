@@ -65,6 +65,12 @@ def plan(
     console.print(table(study, preview(study, grid, Store(folder), many, workers, gpu_name(find(device)))))
     if learning := trainings(grid, Artifacts(artifacts)):
         console.print(training_table(learning))
+        if not artifacts.is_dir():
+            console.print(
+                "A clone of the repository has what the shipped studies need in its folder artifacts; with --artifacts "
+                "FOLDER it need not be trained.",
+                highlight=False,
+            )
     console.print(f"output folder: {folder}", highlight=False, soft_wrap=True)
 
 

@@ -32,6 +32,20 @@ class Parameter:
     meaning: str
 
 
+@dataclass(frozen=True)
+class Words:
+    """What a class says of itself: see ``summary``, ``source`` and ``parameters``."""
+
+    summary: str
+    source: str
+    parameters: list[Parameter]
+
+
+def words(cls: type[Any]) -> Words:
+    """What a dataclass says of itself."""
+    return Words(summary(cls), source(cls), parameters(cls))
+
+
 def parameters(cls: type[Any]) -> list[Parameter]:
     """Every parameter of a dataclass, those of dataclasses in it after their own.
 

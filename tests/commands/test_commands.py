@@ -89,6 +89,17 @@ def test_memory_that_is_used_up_is_one_line(
     )
 
 
+def test_a_plan_without_a_folder_of_trained_methods_says_where_a_clone_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = "A clone of the repository has what the shipped studies need in its folder artifacts"
+    assert holoeval(monkeypatch, "plan", "table3", "--methods", "hil") == 0
+    assert said in capsys.readouterr().out
+    assert holoeval(monkeypatch, "plan", "table3", "--methods", "wirtinger") == 0
+    assert said not in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_a_study_from_run_to_check(
     config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

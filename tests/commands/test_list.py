@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -28,7 +29,20 @@ def test_a_method_is_shown_with_its_paper_and_every_parameter(capsys: pytest.Cap
 def test_parameters_inside_others_have_dotted_names(capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, "hil")
     assert "retrieval.step = 0.06 (number above 0, at most 10) Adam's step [rad]" in text  # HIL's, not the class's own
-    assert "is trained first" in text
+    assert "hil, one of the methods (is trained first) " in text
+
+
+def test_a_function_of_a_file_is_shown_with_its_parameters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = ["def solve(target, bench, steps: int = 3):", '    """A flat phase.', "", "    steps: how many", '    """']
+    Path("mine.py").write_text("\n".join(lines))
+    text = shown(capsys, "mine.py:solve")
+    assert text.startswith("mine.py:solve, one of the methods A flat phase. ")
+    assert "steps = 3 (whole number) how many" in text
+    with pytest.raises(UserError, match=r"mine\.py has no 'other'; allowed: solve"):
+        list_("mine.py:other")
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import torch
+from pydantic import TypeAdapter, ValidationError
 
-from ...core import plugins
+from ...core import parameters, plugins
 from ...core.device import CPU
 from ...core.errors import CellError, UserError
 from ...core.hashing import canonical
@@ -22,7 +23,7 @@ from . import process
 from .inside import FUNCTIONS
 from .messages import Unsendable
 
-__all__ = ["Apart", "Unsendable", "build", "find", "imports", "opened", "params_of", "runs_inside", "solver"]
+__all__ = ["Apart", "Unsendable", "build", "find", "imports", "opened", "params_of", "runs_inside", "solver", "words"]
 
 BOOLEANS = ("camera", "privileged", "trains", "follows", "planes")
 
@@ -108,6 +109,17 @@ def build(name: str, params: Mapping[str, Any], folder: Path) -> Any:
         raise UserError(f"method '{name}' does not give its parameters: {error}") from error
     canonical(complete)
     return cls(complete)
+
+
+def words(name: str, folder: Path) -> parameters.Words:
+    """What a method says of itself. UserError as ``find``, and where its process ends or tells something else."""
+    cls = find(name, folder)
+    if not issubclass(cls, Apart):
+        return parameters.words(cls)
+    try:
+        return TypeAdapter(parameters.Words).validate_python(cls({})._call("words"))
+    except (CellError, ValidationError) as error:
+        raise UserError(f"method '{name}' does not tell what it is: {error}") from error
 
 
 def params_of(method: Any) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import time
 import traceback
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from importlib.machinery import ModuleSpec
 from multiprocessing import reduction
 from multiprocessing.connection import Connection, wait
@@ -27,6 +28,7 @@ from ... import display
 from ...core import plugins
 from ...core.device import find, moved, repeatable
 from ...core.errors import UserError
+from ...core.parameters import words
 from ...core.schema import FieldError
 from ..versions import method_version
 from .handles import SolvingHandle, TrainingHandle
@@ -175,6 +177,8 @@ def _call(channel: Channel, cls: type[Any], owner: str) -> None:
 def _result(
     channel: Channel, cls: type[Any], owner: str, device: torch.device, function: str, params: dict[str, Any], args: Any
 ) -> Any:
+    if function == "words":
+        return asdict(words(cls))
     method = plugins.made(cls, owner, params)
     if function == "params":
         return plugins.params_of(method)
