@@ -159,6 +159,26 @@ def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet() -> None:
     assert run.communicate(timeout=60) == ("seen\n", "")
 
 
+@pytest.mark.slow
+def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_server_to_the_others() -> None:
+    code = """if True:
+        import time
+        from multiprocessing import forkserver
+        from socket import AF_UNIX, socket
+        from holobench_eval.study.executors.processes import prepare, start
+        prepare()
+        server = forkserver._forkserver._forkserver_pid
+        for _ in range(3):
+            with socket(AF_UNIX) as client:
+                client.connect(forkserver._forkserver._forkserver_address)
+            other = start(time.sleep, 0)
+            other.join(60)
+            print(other.exitcode, forkserver._forkserver._forkserver_pid == server)
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert (done.stdout, done.stderr) == ("0 True\n" * 3, "")
+
+
 @pytest.mark.parametrize(
     ("name", "workers", "small", "begins"),
     [

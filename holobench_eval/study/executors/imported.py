@@ -1,10 +1,27 @@
-"""What workers need beside the package, imported before they are forked; nothing is computed here."""
+"""What the process that workers are forked from imports before: what they need, and what lets it live on."""
 
+import errno
 from contextlib import suppress
 from importlib import import_module
+from multiprocessing import reduction
+from socket import socket
 
 from ...optics.transfer import kernel
 
 kernel()
 with suppress(ImportError):
     import_module("torch._dynamo")  # by torch's optimisers at their first use, which takes more than a second
+
+_receive = reduction.recvfds
+
+
+def _received(client: socket, most: int) -> list[int]:
+    """As ``recvfds``. The server ends with an EOFError of it, but goes on after a connection that was aborted: so is
+    that of a process which was killed while it asked for another one."""
+    try:
+        return _receive(client, most)
+    except EOFError as error:
+        raise ConnectionAbortedError(errno.ECONNABORTED, "the client has ended") from error
+
+
+reduction.recvfds = _received
