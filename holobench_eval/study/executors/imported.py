@@ -15,11 +15,11 @@ with suppress(ImportError):
 _receive = reduction.recvfds
 
 
-def _received(client: socket, most: int) -> list[int]:
+def _received(sock: socket, size: int) -> list[int]:
     """As ``recvfds``. The server ends with an EOFError of it, but goes on after a connection that was aborted: so is
     that of a process which was killed while it asked for another one."""
     try:
-        return _receive(client, most)
+        return _receive(sock, size)
     except EOFError as error:
         raise ConnectionAbortedError(errno.ECONNABORTED, "the client has ended") from error
 
