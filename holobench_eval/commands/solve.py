@@ -12,6 +12,8 @@ import yaml
 from ..core.errors import UserError
 from .options import RESULTS, Learned
 
+STUDY = "study.yaml"  # in the output folder
+
 
 def solve(
     methods: Annotated[str, typer.Argument(help="A method, or several with commas between: names, or mine.py:solve.")],
@@ -31,10 +33,16 @@ def solve(
     if not picture.is_file() and Path(methods).is_file():
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
     folder = output or RESULTS / picture.stem
+    earlier = before.read_bytes() if (before := folder / STUDY).is_file() else None
     config = write_study(names, picture, display, panel, folder)
     size = f"{panel[0]} x {panel[1]} pixels"
     print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
-    run(config, output=folder, executor="serial", artifacts=artifacts)
+    try:
+        run(config, output=folder, executor="serial", artifacts=artifacts)
+    except UserError:
+        if earlier is not None:  # the report that is there is of this one
+            config.write_bytes(earlier)
+        raise
     labels = [file_name(name.rpartition(":")[2]) for name in names]
     for path in (
         *sorted(folder.glob("figures/comparison-*.jpg")),
@@ -68,7 +76,7 @@ def write_study(methods: list[str], picture: Path, display: str, panel: tuple[in
         "methods": [_absolute(method.strip()) for method in methods],
         "save": {"captures": True, "phases": True},
     }
-    config = folder / "study.yaml"
+    config = folder / STUDY
     config.write_text(yaml.safe_dump(study, sort_keys=False), encoding="utf-8")
     return config
 

@@ -71,6 +71,14 @@ def test_arguments_in_the_other_order_are_told(picture: Path) -> None:
         solve(str(picture), Path("wirtinger"))
 
 
+def test_a_refused_method_leaves_the_study_of_the_report_that_is_there(picture: Path) -> None:
+    solve("double_phase", picture, display="ideal", panel=(128, 128), output=Path("out"))
+    study = Path("out/study.yaml").read_text()
+    with pytest.raises(UserError, match="wirtinger"):
+        solve("wirtinker", picture, output=Path("out"))
+    assert Path("out/study.yaml").read_text() == study
+
+
 def test_a_folder_holds_one_picture(picture: Path) -> None:
     Path("out", "picture").mkdir(parents=True)
     Path("out", "picture", "other.png").touch()

@@ -111,4 +111,5 @@ def _tuned(report: Report) -> Iterator[str]:
         same.setdefault(text, []).append(label)
     parts = [f"of {words(labels)}, {text}" for text, labels in same.items()]
     if parts:
-        yield f"Tuned: {'; '.join(parts)}. Other methods have the settings of their papers or of this package."
+        others = "The others have the settings of their papers, of this package or of the config."
+        yield f"Tuned: {'; '.join(parts)}. {others}"

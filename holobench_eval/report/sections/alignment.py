@@ -176,7 +176,7 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         for method, target in zip(done["method"], done["target"], strict=True)
         if (path := report.figures / alignment_name(method, target)).is_file()
     ]
-    more = f" {len(drawn) - FIGURES} more are in `{report.figures.name}/`." if len(drawn) > FIGURES else ""
+    more = f" {len(drawn) - FIGURES} more are in the folder {report.figures.name}." if len(drawn) > FIGURES else ""
     for path, method, target in drawn[:FIGURES]:
         yield (
             path,

@@ -38,12 +38,15 @@ def _notes(report: Report) -> Iterator[tuple[str, object]]:
     results, layout, text = report.results, report.layout, report.layout.text
     files, trained = layout.measure == FILES, bool(report.trainings)
     yield "Domains", text.domains
-    lit = " and the efficiency (light in the scored region over light on the panel)" * ("efficiency" in results.frame)
+    hidden = [
+        "the factors",
+        f"the brightness ratio (mean of the {text.scored} over mean of the {text.truth}, before the match)",
+    ]
+    hidden += ["the efficiency (light in the scored region over light on the panel)"] * ("efficiency" in results.frame)
     yield (
         "Intensity match",
         f"One least-squares factor per colour channel, {text.compared}, without offset, then clipped to [0, 1]. It "
-        f"hides wasted light; the factors, the brightness ratio (mean of the {text.scored} over mean of the "
-        f"{text.truth}, before the match){lit} are therefore given under "
+        f"hides wasted light; {words(hidden)} are therefore given under "
         f'"{"Light" if files else "Captures, time and light"}".',
     )
     yield "Registration", _registration(results)

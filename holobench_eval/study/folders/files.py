@@ -52,7 +52,9 @@ def read_folders(captures: Path, targets: Path) -> Folders:
     }
     for (_, name), path in capture_paths.items():
         if name not in target_paths:
-            raise UserError(f"{path}: no target of this name in {targets}; {suggest(name, target_paths)}")
+            raise UserError(
+                f"{path}: no target of this name in {targets}; {suggest(name, target_paths)}; rename it or take it away"
+            )
     pictures = {name: checked(path) for name, path in target_paths.items()}
     photographs = {key: checked(path) for key, path in capture_paths.items()}
     pairings = {key: paired(picture, pictures[key[1]]) for key, picture in photographs.items()}
