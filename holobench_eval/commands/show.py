@@ -11,13 +11,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..core.panels import is_small
-from .options import Profile
+from .options import PANEL, Profile
 from .output import console
 
 
 def show(
     profile: Profile,
-    panel: Annotated[tuple[int, int] | None, typer.Option(help="Rows and columns in pixels.")] = None,
+    panel: Annotated[tuple[int, int] | None, PANEL] = None,
     output: Annotated[Path | None, typer.Option(help="Picture to write.")] = None,
 ) -> None:
     """Draw what a display does to a hologram: stage by stage, with a list of its effects."""

@@ -10,7 +10,7 @@ import typer
 import yaml
 
 from ..core.errors import UserError
-from .options import RESULTS, Learned
+from .options import PANEL, RESULTS, Learned
 
 STUDY = "study.yaml"  # in the output folder
 
@@ -19,7 +19,7 @@ def solve(
     methods: Annotated[str, typer.Argument(help="A method, or several with commas between: names, or mine.py:solve.")],
     picture: Annotated[Path, typer.Argument(help="An 8-bit RGB or gray image.")],
     display: Annotated[str, typer.Option(help="A display profile: its name or its file.")] = "leto-2020",
-    panel: Annotated[tuple[int, int], typer.Option(help="Rows and columns of the simulated panel [px].")] = (256, 256),
+    panel: Annotated[tuple[int, int], PANEL] = (256, 256),
     output: Annotated[
         Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the picture>]")
     ] = None,

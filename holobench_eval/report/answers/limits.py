@@ -42,7 +42,7 @@ def _sample(report: Report) -> str:
     results = report.results
     targets, clusters = len(results.targets), len(set(results.clusters))
     among = (
-        f" in {clusters} clusters (parts of one picture form a cluster, which counts as one)"
+        f" in {clusters} cluster{'s' * (clusters > 1)} (parts of one picture form a cluster, which counts as one)"
         if clusters < targets
         else ""
     )

@@ -106,7 +106,7 @@ def _targets(results: Results) -> tuple[str, str]:
     more = len(results.targets) - TARGETS_NAMED
     names = ", ".join(results.targets[:TARGETS_NAMED])
     count, clusters = len(results.targets), len(set(results.clusters))
-    among = f" in {clusters} clusters" if clusters < count else ""
+    among = f" in {clusters} cluster{'s' * (clusters > 1)}" if clusters < count else ""
     return "targets", f"{count}{among}: {names}{f' and {more} more' if more > 0 else ''}"
 
 

@@ -50,20 +50,24 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     tiles = [(report.layout.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
     if any(tile.picture is not None for _, tile in tiles):
         path, text = report.figures / PICTURES, report.layout.text
+        middle = ", the target in the middle of the ranking by quality" if len(results.targets) > 1 else ""
         draw_rows(path, f"{condition}", (target, thumbnails.targets[target]), [Row("", tuple(tiles))])
         yield (
             path,
-            f"{text.scored.capitalize()}s of {target}, the target in the middle of the ranking by quality, on "
-            f"{condition}. {text.picture}. Left: the {text.truth}.",
+            f"{text.scored.capitalize()}s of {target}{middle}, on {condition}. {text.picture}. Left: the {text.truth}.",
         )
 
 
 def chosen(results: Results, condition: str) -> list[str]:
-    """The best method of each track, those of the question, the baseline and the oracle, as far as they have rows."""
+    """The best method of each track, those of the question, the baseline and the oracle, as far as they have rows.
+
+    Where these are one method, the next in the ranking is another.
+    """
     firsts = [results.ranking(condition, categories=track)[:1] for track in (OFFLINE, (ONLINE,))]
     wanted = [*(label for ranking in firsts for label in ranking), *subjects(results)]
     wanted += [label for label in (results.layout.baseline, results.oracle(condition)) if label]
-    return [label for label in dict.fromkeys(wanted) if label in results.methods(condition)]
+    found = [label for label in dict.fromkeys(wanted) if label in results.methods(condition)]
+    return found if len(found) > 1 else list(dict.fromkeys([*found, *results.ranking(condition)]))[:2]
 
 
 def _has_scores(report: Report) -> bool:

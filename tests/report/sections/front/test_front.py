@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from holobench_eval.report import Description, write_report
+from holobench_eval.report.data.categories import OFFLINE
 from holobench_eval.report.description import Display
+from holobench_eval.report.sections.front import overview
 from tests.support import synthetic_study as synthetic
 
 TARGETS = synthetic.TARGETS[1:4]
@@ -86,3 +91,17 @@ def test_the_first_page_leaves_lists_to_the_details(page: str) -> None:
     assert len(page.splitlines()) <= 200
     for heading in ("Every target", "Paired tests", "Holes", "Results", "Config and environment"):
         assert not re.search(rf"^## {heading}$", page, flags=re.MULTILINE), heading
+
+
+def test_where_the_baseline_is_best_the_next_method_is_shown_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def ranking(_: str, categories: Sequence[str] = OFFLINE) -> list[str]:
+        return ["wirtinger", "mine", "another"] if categories == OFFLINE else []
+
+    monkeypatch.setattr(overview, "subjects", lambda _: [])
+    results: Any = SimpleNamespace(
+        layout=SimpleNamespace(baseline="wirtinger"),
+        ranking=ranking,
+        methods=lambda _: ranking(""),
+        oracle=lambda _: "",
+    )
+    assert overview.chosen(results, "ideal") == ["wirtinger", "mine"]
