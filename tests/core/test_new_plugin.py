@@ -94,5 +94,5 @@ def test_what_is_listed_of_another_package_is_told_by_a_process_that_imports_it(
 ) -> None:
     assert ("flat", "A constant phase.") in list(KINDS["methods"]())
     list_("flat")
-    assert "Its package tells its parameters" in capsys.readouterr().out
+    assert "phase = 0.0   (number)" in capsys.readouterr().out
     assert "made_elsewhere.flat" not in sys.modules
