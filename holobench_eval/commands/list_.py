@@ -56,6 +56,8 @@ def _unknown(name: str) -> str:
     """What to say of a name that is none."""
     names = {entry for kind in KINDS for entry, _ in KINDS[kind]()}
     near = difflib.get_close_matches(name, [*KINDS, *names], n=1)
+    if (within := sorted(entry for entry in names if name in entry)) and not (near and near[0] in KINDS):
+        return f"unknown name '{name}'; names with it: {', '.join(within)}"
     if not near or near[0] in KINDS:
         return f"unknown kind '{name}'; {suggest(name, KINDS)}, or a name that holoeval list shows"
     return f"unknown name '{name}'; did you mean '{near[0]}'? holoeval list shows them all"

@@ -81,6 +81,7 @@ def test_everything_that_is_listed_can_be_explained(capsys: pytest.CaptureFixtur
     [
         ("wirtinker", "unknown name 'wirtinker'; did you mean 'wirtinger'?"),
         ("leto2020", "unknown name 'leto2020'; did you mean 'leto-2020'?"),
+        ("leto", "unknown name 'leto'; names with it: leto-2020, leto-2020-b, "),
         ("condition", "unknown kind 'condition'; did you mean 'conditions'?"),
         ("?", "unknown kind '?'; allowed: conditions, datasets, methods, metrics, profiles, studies, or a name that"),
     ],

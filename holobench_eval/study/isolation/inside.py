@@ -27,7 +27,7 @@ import torch
 from ... import display
 from ...core import plugins
 from ...core.device import find, moved, repeatable
-from ...core.errors import UserError
+from ...core.errors import CellError, UserError
 from ...core.parameters import words
 from ...core.schema import FieldError
 from ..versions import method_version
@@ -169,7 +169,7 @@ def _call(channel: Channel, cls: type[Any], owner: str) -> None:
             _flush()
             channel.send({"result": result})
         except BaseException as error:
-            channel.send(_told(error))
+            channel.send(_told(error, cls))
     with suppress(EOFError, OSError):
         channel.receive()  # until the harness has read what memory this took
 
@@ -192,10 +192,20 @@ def _result(
     return list(result) if function in ("estimates", "files") else result
 
 
-def _told(error: BaseException) -> dict[str, Any]:
+def _told(error: BaseException, cls: type[Any]) -> dict[str, Any]:
     fault = [list(error.where), error.at_key] if isinstance(error, FieldError) else None
     text = "".join(traceback.format_exception(error))
-    return {"error": type(error).__name__, "message": str(error), "fault": fault, "traceback": text}
+    place = "" if isinstance(error, (UserError, CellError)) else _place(error, cls)
+    return {"error": type(error).__name__, "message": f"{error}{place}", "fault": fault, "traceback": text}
+
+
+def _place(error: BaseException, cls: type[Any]) -> str:
+    """`` (mine.py, line 7)``: the last line of the method's own file on the way to an error; empty without one."""
+    with suppress(Exception):  # a stranger's class
+        file = inspect.unwrap(cls.solve).__code__.co_filename
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+        return f" ({Path(file).name}, line {lines[-1]})" if lines else ""
+    return ""
 
 
 def _limit_memory(gib: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import time
@@ -397,3 +398,9 @@ class Deaf:
     script += "if __name__ == '__main__':\n    isolation.find('deaf.py:Deaf', Path('.'))\n"
     (tmp_path / "script.py").write_text(script)
     assert subprocess.run([sys.executable, "script.py"], cwd=tmp_path, timeout=60, check=False).returncode == 0
+
+
+def test_the_reason_of_a_failure_names_the_line_of_the_method_s_file(tmp_path: Path) -> None:
+    record = solved(tmp_path, "torch.zeros(2) + torch.zeros(3)")
+    assert record["state"] == "failed"
+    assert re.search(r"RuntimeError: .* \(one\.py, line \d+\)$", record["reason"])
