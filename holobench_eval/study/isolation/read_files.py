@@ -28,8 +28,8 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
         raise UserError(f"method '{entry.name}' does not say which files it reads: {error}") from error
     read = [(path, sha256) for files in found.values() for path, sha256 in files.items()]
     if read and all(sha256 == MISSING for _, sha256 in read):
-        first = folder / read[0][0]
-        raise UserError(f"method '{entry.name}': none of the files that it reads is there, such as {first}")
+        where = "" if Path(read[0][0]).is_absolute() else ", from the working directory"
+        raise UserError(f"method '{entry.name}': none of the files that it reads is there, such as {read[0][0]}{where}")
     return found
 
 
