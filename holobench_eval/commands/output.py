@@ -54,16 +54,21 @@ def print_headline(console: Console, results: Results) -> None:
 
 
 def headline_table(results: Results, condition: str) -> Table:
-    """A condition's table for a terminal; the report has the other columns. Only names are broken into lines.
+    """A condition's table for a terminal, best first; the report has the other columns. Only names are broken into
+    lines.
 
-    A rank is that among methods which were given as much of the camera, and named by them where there are several such
-    categories.
+    Behind the ranked methods come those without a score for every target, and oracles. A rank is that among methods
+    which were given as much of the camera, and named by them where there are several such categories.
     """
-    from ..report.data.categories import ORACLE
+    from ..report.data.categories import CATEGORIES, ORACLE
     from ..report.data.marks import marked
     from ..report.data.text import FILES, number
 
-    score, layout, methods = results.headline, results.layout, results.methods(condition)
+    score, layout = results.headline, results.layout
+    ranked = results.ranking(condition, categories=[name for name in CATEGORIES if name != ORACLE])
+    oracles = results.ranking(condition, categories=(ORACLE,))
+    holed = [name for name in results.methods(condition) if name not in (*ranked, *oracles)]
+    methods = [*ranked, *holed, *oracles]
     several = len({layout.category(name) for name in methods} - {ORACLE}) > 1
     table = Table(title=escape(f"{condition}: {score.heading}"), title_justify="left")
     table.add_column("method", overflow="fold")

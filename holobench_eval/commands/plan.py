@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ..study.store import Store
 
 FLOOR = "floor"  # the label of the row of floor cells
+LOOK: dict[str, Any] = {"box": box.SIMPLE_HEAD, "padding": 0, "show_edge": False}  # of tables
 
 
 def plan(
@@ -147,8 +148,7 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
 
 def table(study: Study, rows: list[Row]) -> Table:
     """The rows as a table with a line of sums, in 80 columns."""
-    look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "padding": 0, "show_edge": False}
-    result = Table(title=escape(study.title), title_justify="left", show_footer=True, **look)
+    result = Table(title=escape(study.title), title_justify="left", show_footer=True, **LOOK)
     floors = sum(row.cells for row in rows if row.label == FLOOR)
     result.add_column("method", footer=f"all, {floors} of them floors" if floors else "all", overflow="fold")
     numbers = ("conditions", "targets", "cells", "done", "failed", "missing")
@@ -196,14 +196,15 @@ def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
 
 
 def training_table(rows: list[TrainingRow]) -> Table:
-    """What has to be learned, as a table."""
-    result = Table(title="training", title_justify="left")
+    """What has to be learned, as a table in 80 columns; artifacts without the digest in their names."""
+    result = Table(title="training", title_justify="left", **LOOK)
     for name in ("artifact", "needed by", "state"):
         result.add_column(name, overflow="fold")
-    for name in ("captures", "training [s]"):
+    for name in ("captures", "time [s]"):
         result.add_column(escape(name), justify="right")
     for row in rows:
         figures = ("" if math.isnan(value) else f"{value:.4g}" for value in (row.captures, row.seconds))
         state = f"{row.state}: {row.reason}" if row.reason else row.state
-        result.add_row(*map(escape, (row.name, ", ".join(row.needed_by), state)), *figures)
+        name = row.name.rpartition("-")[0]
+        result.add_row(*map(escape, (name, ", ".join(row.needed_by), state)), *figures)
     return result

@@ -88,6 +88,8 @@ def run(
         if study.display.real:
             open_displays(study)
         folder, grid = output_folder(study, output), plan(study)
+        if word := replaced(study, folder):
+            console.print(word, markup=False, highlight=False, soft_wrap=True)
         many = thread_count(threads, where.workers, study)
         options: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "device": device}
         drawings = sheets(study, folder)
@@ -122,6 +124,19 @@ def _is_finished(config: Path, output: Path | None) -> bool:
         return bool(described["ended"] and described["config_sha256"] == text)
     except (OSError, ValueError, TypeError, LookupError):
         return False
+
+
+def replaced(study: Study, folder: Path) -> str:
+    """What to say where a folder has the report of another config, or of another part of this one; else nothing."""
+    from ..study import provenance
+    from ..study.changes import recorded
+
+    before = provenance.read(folder)
+    if not (folder / "report.md").is_file() or before.get("config_sha256") == provenance.text_digest(study.text):
+        return ""
+    earlier = recorded(before)
+    other = f"was run with {earlier}" if earlier != study.changes and earlier else "is of another or an edited config"
+    return f"{folder}: this run replaces the report there, which {other}; with another --output it is kept"
 
 
 @contextmanager

@@ -49,8 +49,21 @@ def score(
     for hole in results.holes.to_dict("records"):
         text = f"{hole['state']}: {hole['method']} · {hole['target']}: {hole['reason']}"
         console.print(text, style="red", markup=False, highlight=False, soft_wrap=True)
+    if word := advice(results):
+        console.print(word, markup=False, highlight=False, soft_wrap=True)
     print(f"{report}\n{output / 'report.html'}\n{output / 'table.csv'}\n{output / 'records.csv'}")
     raise typer.Exit(1 if len(results.holes) else 0)
+
+
+def advice(results: Results) -> str:
+    """How to come to a ranking where no method has a score for every target; nothing where one has."""
+    lacking = [name for name in results.targets if name in set(results.holes["target"])]
+    pairs = [(label, condition) for condition in results.conditions for label in results.methods(condition)]
+    if not lacking or any(results.is_complete(*pair) for pair in pairs):
+        return ""
+    left = len(results.targets) - len(lacking)
+    without = f", or move the targets and captures of {', '.join(lacking)} away and rank by the other {left}"
+    return f"No method is ranked, since none has every target. Take the failed captures again{without * (left > 0)}."
 
 
 def score_folders(

@@ -10,8 +10,9 @@ import pytest
 from rich.console import Console
 
 from holobench_eval.commands import _plain
-from holobench_eval.commands.output import MOST_REASONS, print_headline, print_holes
+from holobench_eval.commands.output import MOST_REASONS, headline_table, print_headline, print_holes
 from holobench_eval.report import Results, records_frame
+from holobench_eval.report.data.marks import marked
 from tests.support.synthetic_study import cell, layout, record, study
 
 LONG = "a method whose label is as long as a label may ever be, sixty"
@@ -70,6 +71,16 @@ def test_a_row_with_a_hole_has_no_rank_and_says_how_many_targets_it_has(records:
     (row, *_) = [line for line in printed(found(records)) if "GS" in line]
     assert "GS (5 of 6 targets)" in row
     assert "not ranked" in row
+
+
+def test_the_best_method_stands_first_and_oracles_last(records: list[dict[str, Any]]) -> None:
+    results = found(records)
+    for condition in results.conditions:
+        names = list(headline_table(results, condition).columns[0].cells)
+        ranked = results.ranking(condition)
+        assert [str(name) for name in names[: len(ranked)]] == [marked(results, name, condition) for name in ranked]
+        assert len(names) == len(results.methods(condition))
+    assert "Oracle" in str(names[-1])
 
 
 def test_reasons_of_holes_are_grouped_and_counted(records: list[dict[str, Any]]) -> None:

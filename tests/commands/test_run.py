@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from holobench_eval.commands.run import Sheet, _is_finished, _panel, draw_sheets, sheets
+from holobench_eval.commands.run import Sheet, _is_finished, _panel, draw_sheets, replaced, sheets
 from holobench_eval.report.charts import sheet as charts
 from holobench_eval.study import opening, provenance
 from holobench_eval.study import plan as planning
@@ -72,3 +73,17 @@ def test_a_study_is_finished_when_its_last_run_ended_and_its_config_is_still_the
     assert _is_finished(study.file, output)
     study.file.write_text(study.text + "# changed\n")
     assert not _is_finished(study.file, output)
+
+
+def test_a_report_of_another_config_is_not_replaced_without_a_word(tmp_path: Path) -> None:
+    study = load_study(write_config(tmp_path))
+    assert replaced(study, tmp_path) == ""
+    (tmp_path / "report.md").write_text("")
+    known = {"config_sha256": provenance.text_digest(study.text), "earlier": []}
+    (tmp_path / "provenance.json").write_text(json.dumps(known))
+    assert replaced(study, tmp_path) == ""
+    (tmp_path / "provenance.json").write_text(json.dumps({**known, "config_sha256": "0"}))
+    assert "is of another or an edited config" in replaced(study, tmp_path)
+    part = {**known, "config_sha256": "0", "changes": {"limit": 2}}
+    (tmp_path / "provenance.json").write_text(json.dumps(part))
+    assert "was run with --limit 2" in replaced(study, tmp_path)

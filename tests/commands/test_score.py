@@ -17,16 +17,17 @@ import typer
 from PIL import Image
 from rich.console import Console
 
+from holobench_eval.commands.score import advice, score_folders
 from holobench_eval.commands.score import score as command
-from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.imaging.align import Alignment
 from holobench_eval.metrics import score
-from holobench_eval.report import read_records
+from holobench_eval.report import Results, read_records, records_frame
 from holobench_eval.study.folders import scoring as scored_pictures
 from holobench_eval.study.folders.files import read_folders
 from tests.support.photographed import captured, photograph, pose, save
 from tests.support.reports import whole
+from tests.support.synthetic_study import layout, study
 
 REAL = Path(__file__).resolve().parents[2] / "../shared/captures/stanford-2021"
 PUBLISHED = {"sgd-asm": 20.94, "citl-asm": 25.16, "sgd-ours": 27.41}
@@ -349,3 +350,15 @@ def test_three_published_captures_keep_their_order_and_their_scores(tmp_path, mo
     assert len(own) == 3
     assert np.linalg.norm(own - crop, axis=2).max() < 1  # capture pixels, at a corner
     assert np.linalg.norm(np.mean(own, axis=0) - crop, axis=1).max() < 0.5
+
+
+def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path: Path) -> None:
+    records = study(tmp_path, size=24)
+    assert advice(Results(records_frame(records, layout()), layout())) == ""  # some methods have all
+    first = records[0]["cell"]["target"]
+    lost = {"state": "failed", "scores": {}, "reason": "cannot be aligned"}
+    holed = [{**one, **lost} if one["cell"]["target"] == first else one for one in records]
+    results = Results(records_frame(holed, layout()), layout())
+    assert f"move the targets and captures of {first}" in advice(results)
+    nothing = [{**one, **lost} for one in records]
+    assert advice(Results(records_frame(nothing, layout()), layout())).endswith("Take the failed captures again.")
