@@ -33,10 +33,10 @@ from ...metrics import match, score
 from ...optics import srgb_encode
 from ...optics.convolution import iris
 from ...study.opening import open_bench
-from .look.medium import DPI
 from .style import METADATA
 
-VERSION = 2  # of the drawing: sheets of another are drawn again
+VERSION = 3  # of the drawing: sheets of another are drawn again
+DPI = 75  # of a PNG: 1275 x 975 pixels, the width of a page of pictures
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GREEN = 1
 MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.045, "top": 0.92, "wspace": 0.66, "hspace": 0.38}
@@ -276,7 +276,7 @@ def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
         return
     passed = float(iris(torch.tensor(up / pitch), torch.tensor(across / pitch), pitch, profile.panel.pupil)) > 0.5
     axis.plot(across, up, marker="o", markersize=14, markerfacecolor="none", markeredgecolor="tab:cyan")
-    axis.set_title(f"zero order, {100 * share:.0f} %: {'passes' if passed else 'stopped by'} the iris")
+    axis.set_title(f"zero order + dead area: {100 * share:.0f} %, {'pass' if passed else 'stopped by'} the iris")
 
 
 def _effects(axis: Axes, bench: SimulatedBench) -> None:

@@ -83,7 +83,6 @@ _ROW = _columns(
     Column("swept_name", "The change where its values are names, such as a prescription"),
 )
 _RECORD = _columns(
-    Column("parameters", "Parameters of the method as JSON, defaults filled in"),
     Column("capture_limit", "The most captures that the display allowed for a target; empty for no limit", "count"),
     Column("panel_height_px", "Rows of the panel", "count", "px"),
     Column("panel_width_px", "Columns of the panel", "count", "px"),
@@ -111,6 +110,7 @@ _RECORD = _columns(
 )
 _INTERVAL = f"{100 * LEVEL:.0f} % interval over clusters of targets"
 _TABLE = _columns(
+    Column("parameters", "Parameters of the method as JSON, defaults filled in"),
     Column("n", "Targets with a score", "count"),
     Column("failed", "Cells without a score", "count"),
     Column("clusters", "Clusters of the targets with a score", "count"),

@@ -44,7 +44,8 @@ IDENTITY_COLUMNS = ("cell", "exposure", "profile", "profile_version", "protocol"
 
 _NUMBER_COLUMNS = ("repeat", *MEASURED_COLUMNS)
 _REQUIRED = frozenset((*TEXT_COLUMNS, *_NUMBER_COLUMNS, *IDENTITY_COLUMNS))
-# Columns of records.csv that say what the study's config says, too; frames do without them.
+# Columns of records.csv that say what the study's config says, too; frames do without them. Earlier versions wrote the
+# parameters here, which stand in table.csv.
 STUDY_COLUMNS = (
     *("study", "measure", "parameters", "capture_limit", "panel_height_px", "panel_width_px"),
     *("swept", "swept_value", "swept_unit", "swept_name", "seed"),

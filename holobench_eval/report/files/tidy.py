@@ -1,4 +1,7 @@
-"""The frames of records.csv, table.csv and tests.csv, each complete without the config and the other files."""
+"""The frames of records.csv, table.csv and tests.csv, each complete without the config.
+
+Parameters of a method stand in table.csv alone: repeated in every record, they were a third of records.csv.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ from ..data.tables import CATEGORY_COLUMN, CLUSTER_COLUMN
 
 _KEYS = ("study", "measure", "display", "condition", "method", "label", "category")
 _SWEPT = ("swept", "swept_value", "swept_unit", "swept_name")
-_CELL = ("parameters", "capture_limit", "panel_height_px", "panel_width_px")
+_CELL = ("capture_limit", "panel_height_px", "panel_width_px")
 _TARGET = ("target", "cluster", "repeat", "seed")
 _Change = tuple[str, float, str, str]  # the columns _SWEPT
 _UNCHANGED: _Change = ("", np.nan, "", "")
@@ -34,7 +37,6 @@ def tidy_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     tidy["display"] = tidy["display"].where(tidy["display"] != "", tidy["condition"])
     if "category" in tidy:
         tidy["category"] = tidy["category"].replace("", FLOOR)
-    tidy["parameters"] = [_json(layout.params.get(label, {})) for label in tidy["label"]]
     tidy["capture_limit"] = [float(layout.capture_limits.get(label, np.nan)) for label in tidy["label"]]
     panels = [layout.panels.get(display, (np.nan, np.nan)) for display in tidy["display"]]
     tidy["panel_height_px"], tidy["panel_width_px"] = ([float(panel[side]) for panel in panels] for side in (0, 1))
@@ -62,9 +64,10 @@ def tidy_table(results: Results) -> pd.DataFrame:
         tidy["category"] = tidy["category"].replace("", FLOOR)
     for index, name in enumerate(_SWEPT):
         tidy[name] = [changes.get(condition, _UNCHANGED)[index] for _, condition in pairs]
+    tidy["parameters"] = [_json(layout.params.get(label, {})) for label in tidy["label"]]
     if "clusters" not in tidy:
         tidy["clusters"] = tidy["n"]
-    return _led(tidy, (*_KEYS, *_SWEPT, "n", "failed", "clusters"))
+    return _led(tidy, (*_KEYS, "parameters", *_SWEPT, "n", "failed", "clusters"))
 
 
 def tidy_tests(results: Results) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from ..data.results import Results
 from ..markdown import heading
 from ..section import Blocks, Figures, Report, Section
 
-TARGETS_SHOWN = 2
+TARGETS_SHOWN = 2  # of focal stacks: the planes of one scene
 TARGETS_A_PAGE = 4
 METHODS_A_PAGE = 4
 PIXELS = 1e6  # of a page, about: of full-panel captures a single target is drawn
@@ -58,7 +58,7 @@ def _comparison(report: Report, condition: str, stem: str) -> Iterator[tuple[Pat
         path = report.figures / f"comparison-{stem}-{number}.jpg"
         title = f"{condition}: {text.truth}s and matched {text.scored}s{page}"
         draw_comparison(path, title, [(row, targets[row]) for row in rows], columns, error_limit(errors), text.truth)
-        yield path, _caption(results, condition, page, len(drawn))
+        yield path, _caption(results, page, condition, drawn)
 
 
 def _best_first(results: Results, condition: str) -> list[str]:
@@ -72,9 +72,14 @@ def _best_first(results: Results, condition: str) -> list[str]:
     return list(dict.fromkeys([*(label for label in first if label in methods), *methods]))
 
 
-def _caption(results: Results, condition: str, page: str, drawn: int) -> str:
-    total, text = len(results.targets), results.layout.text
-    chosen = "every target" if drawn == total else f"{drawn} of {total} targets, evenly spaced from worst to best"
+def _caption(results: Results, page: str, condition: str, drawn: list[str]) -> str:
+    total, planes, text = len(results.targets), results.layout.planes, results.layout.text
+    if planes:
+        chosen = f"every plane of {planes[drawn[0]][0]}"
+    elif len(drawn) == total:
+        chosen = "every target"
+    else:
+        chosen = f"{len(drawn)} of {total} targets, evenly spaced from worst to best"
     return (
         f"{text.scored.capitalize()}s on {condition}{page}: {chosen}. {text.picture}; below, the most detailed window "
         f"of the {text.truth} at {ZOOM} times the scale, and in it the absolute error against the {text.truth} in sRGB."
@@ -82,11 +87,11 @@ def _caption(results: Results, condition: str, page: str, drawn: int) -> str:
 
 
 def pages_of_targets(report: Report, condition: str) -> list[list[str]]:
-    """The targets of each page: of focal stacks every plane, a scene a page; else of one size, as files may differ."""
+    """The targets of each page, all of one size. Of focal stacks: every plane of a scene of medium quality."""
     planes, targets = report.layout.planes, report.thumbnails.targets
     if planes:
-        stacks = _grouped({target: planes[target][0] for target in targets})
-        return [sheet for stack in stacks for sheet in chunks(stack, TARGETS_A_PAGE)]
+        scene = planes[report.thumbnails.middle(condition)][0]
+        return list(chunks([target for target in targets if planes[target][0] == scene], TARGETS_A_PAGE))
     pages = chunks(_selection(report, condition), TARGETS_A_PAGE)
     return [group for page in pages for group in _grouped({target: targets[target].shape for target in page})]
 

@@ -16,7 +16,7 @@ from ...study import provenance
 from ..data.categories import CATEGORIES, FLOOR, OPEN_LOOP
 from ..data.columns import column, file_name
 from ..data.scores import METRICS, parse
-from ..data.tables import CATEGORY_COLUMN, DONE, score_columns
+from ..data.tables import CATEGORY_COLUMN, DONE, STUDY_COLUMNS, score_columns
 from ..data.text import FILES
 
 RECORDS: Final = "records.csv"
@@ -88,8 +88,8 @@ def check_columns(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame, strict: 
     lacking = [name for name in OF_OTHERS if name not in raw]
     if strict and lacking:
         raise UserError(f"{path}: lacks the columns {', '.join(lacking)}; write it with 'holoeval report'")
-    unknown = [name for name in raw if column(RECORDS, str(name)) is None] if "label" in raw else []
-    if unknown:
+    unknown = [name for name in raw if column(RECORDS, str(name)) is None and name not in STUDY_COLUMNS]
+    if unknown and "label" in raw:
         raise UserError(
             f"{path}: unknown column {unknown[0]!r}; expected those of columns.md (docs/results/data.md); take it out"
         )

@@ -30,6 +30,7 @@ from ..data.tables import CATEGORY_COLUMN, clusters_in, score_columns
 from . import checks
 from .checks import LONGEST, NAMES, RECORDS, folded
 
+TABLE: Final = "table.csv"
 TESTS: Final = "tests.csv"
 MOST_BYTES, MOST_FACTS = 64_000_000, 2_000_000  # of a file of numbers, and of a provenance
 BY = "by"  # the key of a provenance that says whose results they are
@@ -103,7 +104,7 @@ def read(folder: Path, own: Path) -> Source:
     _check_file(folder / RECORDS)
     _check_file(folder / provenance.FILE, MOST_FACTS)
     known, text = _known(folder), _text(folder / RECORDS)
-    raw = _raw(folder, text)
+    raw = _raw(folder / RECORDS, text)
     by = _whose(folder, known, own)
     checks.check_names(folder, raw)
     frame = records_of(folder, text)
@@ -120,10 +121,11 @@ def read(folder: Path, own: Path) -> Source:
     headline, baseline = _tested(folder, nominal)
     # A site shows the headline; error budgets are made of further scores.
     spare = [key for key in score_columns(nominal) if key != headline and measure != "error_budget"]
-    results = Results(nominal.drop(columns=spare), _layout(folder, raw, nominal, measure, headline, baseline))
+    parameters = _parameters(folder, raw)
+    results = Results(nominal.drop(columns=spare), _layout(folder, parameters, nominal, measure, headline, baseline))
     changed = frame["condition"].nunique() - nominal["condition"].nunique()
     name, earlier = folder.resolve().name, "label" not in raw
-    return Source(folder, name, by, results, measure, _panels(raw), known, _parameters(raw), changed, earlier)
+    return Source(folder, name, by, results, measure, _panels(raw), known, parameters, changed, earlier)
 
 
 def _check_file(path: Path, most: int = MOST_BYTES) -> None:
@@ -151,15 +153,15 @@ def _text(path: Path) -> str:
         raise UserError(f"{path}: not UTF-8 ({error}); write it with 'holoeval report'") from None
 
 
-def _raw(folder: Path, text: str) -> pd.DataFrame:
-    """Every cell of records.csv as text, under the names of the file, without the apostrophes before formulas."""
+def _raw(path: Path, text: str) -> pd.DataFrame:
+    """Every cell of a file of numbers as text, under the names of the file, without the apostrophes before formulas."""
     try:
         frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     except ValueError as error:
         reason = " ".join(str(error).split())
-        raise UserError(f"{folder / RECORDS}: not a table ({reason}); write it with 'holoeval report'") from None
+        raise UserError(f"{path}: not a table ({reason}); write it with 'holoeval report'") from None
     if frame.empty:
-        raise UserError(f"{folder / RECORDS}: no rows; expected a row a cell")
+        raise UserError(f"{path}: no rows; write it with 'holoeval report'")
     texts = [name for name in TEXTS if name in frame]
     frame[texts] = frame[texts].replace(_FORMULA.pattern, r"\1", regex=True)
     return frame
@@ -222,13 +224,13 @@ def _tested(folder: Path, frame: pd.DataFrame) -> tuple[str, str | None]:
 
 
 def _layout(
-    folder: Path, raw: pd.DataFrame, frame: pd.DataFrame, measure: str, headline: str, baseline: str | None
+    folder: Path, parameters: Mapping[str, str], frame: pd.DataFrame, measure: str, headline: str, baseline: str | None
 ) -> Layout:
     """What the tables need of the study, from its records alone."""
     shown = frame[frame["condition"] != REFERENCE]
     category = shown[CATEGORY_COLUMN] if CATEGORY_COLUMN in shown else pd.Series("", index=shown.index)
     by_category = {name: frozenset(shown.loc[category == name, "method"]) for name in CATEGORIES}
-    identities = [label for label, text in _parameters(raw).items() if _network(text) == "identity"]
+    identities = [label for label, text in parameters.items() if _network(text) == "identity"]
     return Layout(
         title=folder.resolve().name,
         pairs=tuple(dict.fromkeys(zip(shown["method"], shown["condition"], strict=True))),
@@ -261,7 +263,12 @@ def _panels(raw: pd.DataFrame) -> dict[str, str]:
     return {str(name): f"{height} x {width}" for name, height, width in sides if height and width}
 
 
-def _parameters(raw: pd.DataFrame) -> dict[str, str]:
+def _parameters(folder: Path, raw: pd.DataFrame) -> dict[str, str]:
+    """Parameters of every label as JSON, from table.csv; earlier versions wrote them into the records, ``raw``."""
+    path = folder / TABLE
+    if "parameters" not in raw and path.exists():
+        _check_file(path)
+        raw = _raw(path, _text(path))
     if not {"label", "parameters"} <= set(raw):
         return {}
     return {str(label): str(text) for label, text in zip(raw["label"], raw["parameters"], strict=True)}

@@ -9,8 +9,8 @@ from holobench_eval.report.charts.sheet import draw_sheet, drawn_from, save_shee
 def test_the_sheet_of_a_bench_is_drawn_and_not_blank(tmp_path):
     path = draw_sheet("plm-4bit", (128, 128), tmp_path / "deep" / "sheet.png")
     picture = np.asarray(Image.open(path).convert("L"), dtype=float)
-    assert picture.shape[0] > 1000
-    assert path.stat().st_size <= 300_000
+    assert picture.shape[0] > 900
+    assert path.stat().st_size <= 200_000
     cells = [part for row in np.array_split(picture[90:], 4) for part in np.array_split(row, 5, axis=1)]
     assert all(cell.std() > 10 for cell in cells)
 
@@ -18,8 +18,8 @@ def test_the_sheet_of_a_bench_is_drawn_and_not_blank(tmp_path):
 @pytest.mark.parametrize(
     ("name", "ramp", "zero_order"),
     [
-        ("leto-aged", "a test ramp, 0.11 cycles / px (no blaze here)", "zero order, 30 %: passes the iris"),
-        ("leto-2020", "the blaze, 0.25 cycles / px", "zero order, 13 %: stopped by the iris"),
+        ("leto-aged", "a test ramp, 0.11 cycles / px (no blaze here)", "zero order + dead area: 30 %, pass the iris"),
+        ("leto-2020", "the blaze, 0.25 cycles / px", "zero order + dead area: 13 %, stopped by the iris"),
         ("ideal", "a test ramp, 0.11 cycles / px (no blaze here)", "light in the iris plane: no zero order"),
     ],
 )

@@ -85,7 +85,14 @@ def test_a_record_says_what_it_is_without_the_config() -> None:
         "psnr_linear_db": 17.0,
     }
     assert {name: row[name] for name in expected} == expected
-    assert json.loads(row["parameters"]) == PARAMS
+
+
+def test_a_row_of_the_table_has_the_parameters_of_its_method() -> None:
+    found = results()
+    table, records = read(tidy_table(found)), read(tidy_records(found.frame, found.layout))
+    assert json.loads(table.set_index("label").loc["wirtinger, 200", "parameters"]) == PARAMS
+    assert set(table["label"]) <= set(records["label"])
+    assert "parameters" not in records
 
 
 def test_a_limit_of_captures_and_the_floor_are_told_apart() -> None:

@@ -110,8 +110,8 @@ def test_a_sheet_shows_every_plane_of_a_scene(tmp_path: Path) -> None:
     for target in PLANES:
         synthetic.save_picture(report.thumbnails.store.target_thumbnail(target), np.zeros((8, 8, 3)))
     sheets = pages_of_targets(report, "bench")
-    assert [len(sheet) for sheet in sheets] == [3, 3, 3]
-    assert sheets[1] == ["motorcycle@-2mm", "motorcycle@0mm", "motorcycle@2mm"]
+    assert len(sheets) == 1
+    assert {PLANES[target] for target in sheets[0]} == {(PLANES[sheets[0][0]][0], plane) for plane in (-2.0, 0.0, 2.0)}
 
 
 def test_the_words_say_what_the_display_does() -> None:
