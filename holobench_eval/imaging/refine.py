@@ -90,8 +90,9 @@ class Refinement:
         if move is None:
             return Refined(capture, 0.0, 0.0, 0.0)
         where = _coordinates((capture.shape[1], capture.shape[2]), move)
-        frames = capture.detach().to("cpu", torch.float32).numpy()
-        image = torch.from_numpy(np.stack([_resampled(frame, where) for frame in frames])).to(capture.device)
+        image = torch.empty_like(capture, dtype=torch.float32)
+        for channel, moved in zip(capture.detach(), image, strict=True):
+            moved.copy_(torch.from_numpy(_resampled(channel.to("cpu", torch.float32).numpy(), where)))
         return Refined(image, float(move[0]), float(move[1]), math.degrees(move[2]))
 
     def _search(self, seen: Frame) -> Array | None:
@@ -131,16 +132,16 @@ def _amplitude(image: Tensor) -> Frame:
 def _derivatives(wanted: Frame) -> Array:
     """What gain, offset, the shifts and the turn change in a picture, its inner pixels by 5."""
     height, width = wanted.shape
-    wide = wanted.astype(np.float64)
-    slope_y, slope_x = np.gradient(wide)
     x, y = np.arange(width) - (width - 1) / 2, np.arange(height)[:, None] - (height - 1) / 2
-    turning = slope_x * y - slope_y * x
-    columns = (wide, np.float64(1), np.negative(slope_x), np.negative(slope_y), turning)
-    inner = _inner(wide).shape
-    model = np.empty((*inner, len(columns)))
-    for index, column in enumerate(columns):
-        model[..., index] = _inner(column) if column.ndim else column
-    return model.reshape(-1, len(columns))
+    # Written in place: of a large picture every further array of this size counts.
+    model = np.empty((*_inner(wanted).shape, 5))
+    model[..., 0], model[..., 1] = _inner(wanted), 1
+    slope_y, slope_x = (_inner(slope) for slope in np.gradient(wanted.astype(np.float64)))
+    np.negative(slope_x, out=model[..., 2])
+    np.negative(slope_y, out=model[..., 3])
+    np.multiply(slope_x, y[BORDER:-BORDER], out=model[..., 4])
+    model[..., 4] -= slope_y * x[BORDER:-BORDER]
+    return model.reshape(-1, 5)
 
 
 def _within(move: Array, slack: float) -> bool:

@@ -30,7 +30,7 @@ CONTRAST_THRESHOLD = 0.02
 COLOUR_THRESHOLD = 0.1
 SMALLEST_MOFD = 72
 LARGEST_AT_ONCE = 2**21  # pixels, those of 1080 x 1920; larger images are compared in strips, which take less memory
-STRIP = 2**18  # pixels
+STRIP = 2**17  # pixels
 REACH = RADIUS + math.ceil(4 * POOLING_SIGMA)  # rows on which the distance at a pixel depends, each way
 
 # Luma and two opponent colours, for which the eye has half the acuity.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from torch import Tensor
+from torch.nn import functional
 
 from .base import Metric, paired
 
@@ -36,7 +37,7 @@ def psnr(image: Tensor, target: Tensor) -> Tensor:
     20.0
     """
     x, y = paired(image, target)
-    error = (x - y).square().mean(dim=(1, 2, 3))
+    error = functional.mse_loss(x, y, reduction="none").mean(dim=(1, 2, 3))
     return (-10 * (error + FLOOR).log10()).reshape(image.shape[:-3])
 
 

@@ -11,7 +11,6 @@ On a GPU the memory is that of torch's tensors on it, and the clock waits until 
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import json
 import math
@@ -27,6 +26,7 @@ from typing import Any
 
 import torch
 
+from ..core.allocator import give_back_freed_memory
 from ..core.device import CPU
 from ..core.errors import StorageError
 from ..core.hashing import digest
@@ -80,7 +80,7 @@ def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
     Trim the allocator first, so that reused memory shows as growth.
     """
     _collect()
-    _give_back()
+    give_back_freed_memory()
     if device.type == "cuda" and process is None:
         torch.cuda.synchronize(device)
         torch.cuda.reset_peak_memory_stats(device)
@@ -109,15 +109,6 @@ def _set_back(process: int | None) -> bool:
     except OSError:
         return False
     return True
-
-
-def _give_back() -> None:
-    """Return freed memory to the system, where the C library can (glibc)."""
-    try:
-        trim = ctypes.CDLL(None).malloc_trim
-    except (OSError, AttributeError, TypeError):  # TypeError: no main program to look into, on Windows
-        return
-    trim(0)
 
 
 def _process(number: int | None) -> Path:

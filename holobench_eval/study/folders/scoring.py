@@ -24,7 +24,7 @@ from ...imaging.shared_pose import sampled, shared
 from ...imaging.similarity import reduced, similarity
 from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
-from ...metrics.protocol import VERSION
+from ...metrics.protocol import LARGE, VERSION
 from ...optics.colour import srgb_decode, srgb_encode
 from .. import provenance
 from ..plan import FLOORS, REFERENCE
@@ -36,9 +36,8 @@ from .files import Folders, Key
 from .pictures import Values
 from .visible import LEAST, Part, cropped, largest_part, share, shown
 
-LARGE = 2**21  # pixels of a target: above, its floor has no score by metrics that take long
 WIDE = 2048  # pixels of a target's longer side to which the second aligner, of which 0.1 px is asked, reduces it
-SLOW = ("flip", "mofd", "lpips", "haarpsi")  # how their names begin
+SLOW = ("flip", "mofd", "lpips", "haarpsi")  # how their names begin: the floor of a `LARGE` target has none of them
 CONDITION = "photographed display"
 
 Alignments = dict[Key, Alignment | str]  # or the reason of a refusal
@@ -236,15 +235,20 @@ class Scoring:
         capture, target = self.loaded(key)
         warp = alignment.warp if part is None else cropped(alignment.warp, part)
         target = _of(target, part)
-        image = torch.from_numpy(sampled(self.capture_values(capture), warp))
-        reference = torch.from_numpy(self.target_values(target))
-        scores = self.scores(image, reference) | self.second(capture, target, warp)
+        second = self.second(capture, target, warp)
+        # In the precision that scores are computed in, so that there is no second copy of a large picture.
+        image = torch.from_numpy(sampled(self.capture_values(capture), warp)).double()
+        reference = torch.from_numpy(self.target_values(target)).double()
+        full = sampled((capture >= 1).astype(np.float32), warp)
+        saturated = float((full > 0.5).mean())
+        del capture, full  # of a large picture, read again to be drawn
+        scores = self.scores(image, reference) | second
+        capture, _ = self.loaded(key)
         if self.visible:
             scores["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
             scores["share_scored"] = 1.0 if part is None else share(part, alignment.warp.shape)
-        full = sampled((capture >= 1).astype(np.float32), warp)
-        record = Record(cell, "done", method, scores=scores, saturated=float((full > 0.5).mean()))
-        matched, _ = match(image, reference)
+        record = Record(cell, "done", method, scores=scores, saturated=saturated)
+        matched, _ = match(image.float(), reference.float())
         write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
         self.draw(figure, self.viewable(capture), warp, self.encoded(matched), target)
         self.store.write(record)
@@ -292,9 +296,9 @@ class Scoring:
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
         pictures = floor_captures(reference, others, name)
-        quick = self.quick if reference[0].numel() > LARGE else None
+        wide, quick = reference.double(), self.quick if reference[0].numel() > LARGE else None
         records = [
-            Record(cells[row], "done", row, scores=self.scores(pictures[row](), reference, quick)) for row in rows
+            Record(cells[row], "done", row, scores=self.scores(pictures[row]().double(), wide, quick)) for row in rows
         ]
         for record in records:
             self.store.write(record)
