@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import Annotated
@@ -33,16 +34,19 @@ def solve(
     if not picture.is_file() and Path(methods).is_file():
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
     folder = output or RESULTS / picture.stem
-    earlier = before.read_bytes() if (before := folder / STUDY).is_file() else None
+    is_new, before = not folder.exists(), folder / STUDY
+    earlier = before.read_bytes() if before.is_file() else None
     config = write_study(names, picture, display, panel, folder)
     size = f"{panel[0]} x {panel[1]} pixels"
     print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
     try:
         run(config, output=folder, executor="serial", artifacts=artifacts)
-    except UserError:
+    except UserError as error:
         if earlier is not None:  # the report that is there is of this one
             config.write_bytes(earlier)
-        raise
+        elif is_new and not (folder / "records").exists():
+            shutil.rmtree(folder)
+        raise UserError(re.sub(rf"^{re.escape(str(config))}(:\d+)*: ", "", str(error))) from None
     labels = [file_name(name.rpartition(":")[2]) for name in names]
     for path in (
         *sorted(folder.glob("figures/comparison-*.jpg")),
@@ -54,16 +58,23 @@ def solve(
 def write_study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> Path:
     """Copy a picture into a folder and write the study of it there; the path of the config.
 
-    UserError for a picture that is no such file, and for a folder that holds another picture.
+    UserError for a picture that is no such file, and for a folder that holds another picture or other files.
     """
-    from ..datasets.images import decode, opened, read
+    from ..datasets.images import SUFFIXES, decode, opened, read
 
     content = read(picture)
     decode(content, str(picture), gray=True)  # what is wrong with it is said of the file that was named
+    if picture.suffix.lower() not in SUFFIXES or picture.name.startswith("."):
+        raise UserError(
+            f"{picture}: not a picture by its name; expected one that ends in {', '.join(sorted(SUFFIXES))}"
+        )
     pictures = folder / "picture"
-    other = next((file.name for file in pictures.glob("*") if file.name != picture.name), None)
-    if other is not None:
-        raise UserError(f"{pictures}: holds {other}, another picture; choose another --output")
+    same = (picture.name, content)
+    if other := next((file.name for file in pictures.glob("*") if (file.name, file.read_bytes()) != same), None):
+        raise UserError(f"{pictures}: holds another {other}; choose another --output")
+    is_own = pictures.is_dir() or not folder.exists()
+    if not is_own and not (folder.is_dir() and {path.name for path in folder.iterdir()} <= {"phases"}):
+        raise UserError(f"{folder}: is not a folder of solve and not empty; choose another --output")
     pictures.mkdir(parents=True, exist_ok=True)
     if not (pictures / picture.name).exists() or not (pictures / picture.name).samefile(picture):
         shutil.copyfile(picture, pictures / picture.name)

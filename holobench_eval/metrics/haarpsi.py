@@ -51,7 +51,9 @@ def haarpsi(image: Tensor, target: Tensor) -> Tensor:
     ValueError
         Wrong shapes, types or values; see ``base.paired``.
     """
-    x, y = (halved(255 * side) for side in paired(image, target, smallest=2))
+    # A channel at a time: of a large image the scaled values are as large as itself.
+    planes = (side.split(1, dim=1) for side in paired(image, target, smallest=2))
+    x, y = (torch.cat([halved(255 * plane) for plane in side], dim=1) for side in planes)
     if x.shape[1] == 3:
         x, y = mix(x, YIQ), mix(y, YIQ)
     fine = similarity(_haar(x[:, :1], 2), _haar(y[:, :1], 2), C)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -82,5 +83,50 @@ def test_a_refused_method_leaves_the_study_of_the_report_that_is_there(picture: 
 def test_a_folder_holds_one_picture(picture: Path) -> None:
     Path("out", "picture").mkdir(parents=True)
     Path("out", "picture", "other.png").touch()
-    with pytest.raises(UserError, match=r"holds other.png, another picture; choose another --output"):
+    with pytest.raises(UserError, match=r"holds another other\.png; choose another --output"):
         solve("double_phase", picture, output=Path("out"))
+
+
+def test_another_picture_of_the_same_name_is_not_replaced(picture: Path) -> None:
+    Path("out", "picture").mkdir(parents=True)
+    Path("out", "picture", picture.name).write_bytes(b"another")
+    with pytest.raises(UserError, match=r"holds another my picture\.png; choose another --output"):
+        solve("double_phase", picture, output=Path("out"))
+    assert Path("out", "picture", picture.name).read_bytes() == b"another"
+
+
+def test_files_of_others_are_not_replaced(picture: Path) -> None:
+    Path("own").mkdir()
+    Path("own", "study.yaml").write_text("mine")
+    Path("file").write_text("mine")
+    for other in ("own", "own/study.yaml", "file"):
+        with pytest.raises(UserError, match=f"{other}: is not a folder of solve and not empty"):
+            solve("double_phase", picture, output=Path(other))
+    assert Path("own", "study.yaml").read_text() == Path("file").read_text() == "mine"
+    assert [path.name for path in Path("own").iterdir()] == ["study.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("methods", "changes", "message"),
+    [
+        ("wirtinker", {}, "unknown method 'wirtinker'"),
+        ("", {}, "methods"),
+        ("double_phase", {"panel": (20, 20)}, "panel"),
+        ("double_phase", {"display": "leto"}, "leto"),
+    ],
+)
+def test_what_is_refused_is_said_of_the_command_and_leaves_nothing(
+    picture: Path, methods: str, changes: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(UserError, match=message) as refused:
+        solve(methods, picture, output=Path("out"), **changes)
+    assert "study.yaml" not in str(refused.value)
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("name", ["picture", ".hidden.png"])
+def test_a_picture_whose_name_is_not_of_one_is_refused(picture: Path, name: str) -> None:
+    picture.rename(name)
+    with pytest.raises(UserError, match="not a picture by its name"):
+        solve("double_phase", Path(name), output=Path("out"))
+    assert not Path("out").exists()

@@ -125,6 +125,9 @@ def test_a_reader_is_told_when_seconds_were_measured_and_how_busy_the_machine_wa
     kept, layout = minimal(records[1])
     text = whole(write_report(layout, kept, tmp_path, {**PROVENANCE, "load": 1.25}, DESCRIPTION)[0])
     assert "were measured in this study; the machine's load before it was 1.25." in text
+    again = {**PROVENANCE, "load": 1.25, "earlier": [{**PROVENANCE, "load": 3.5}]}
+    text = whole(write_report(layout, kept, tmp_path, again, DESCRIPTION)[0])
+    assert "were measured in the 2 runs of this study; the machine's load before them was from 1.25 to 3.5." in text
 
 
 @pytest.mark.parametrize(("wanted", "missed"), [(None, True), (("psnr", "lpips_alex"), True), (("psnr",), False)])

@@ -47,9 +47,16 @@ def _render(report: Report, _: Figures) -> Blocks:
 def _measured(provenance: Mapping[str, Any], memory: bool) -> str:
     """When the seconds were measured, a sentence; earlier versions showed the first measurement of a machine."""
     what = f"Seconds {'and memory ' * memory}"
-    if "load" not in provenance:
+    runs = [*provenance.get("earlier", ()), provenance]
+    loads = [run["load"] for run in runs if "load" in run]
+    if len(loads) < len(runs):
         return f"{what}are the first measurement on that machine, which may be of an earlier study."
-    return f"{what}were measured in this study; the machine's load before it was {provenance['load']:g}."
+    if len(runs) > 1:
+        spread = f"from {min(loads):g} to {max(loads):g}"
+        return (
+            f"{what}were measured in the {len(runs)} runs of this study; the machine's load before them was {spread}."
+        )
+    return f"{what}were measured in this study; the machine's load before it was {loads[0]:g}."
 
 
 def _light_and_time(results: Results, condition: str) -> Markdown:
