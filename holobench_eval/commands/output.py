@@ -33,7 +33,7 @@ def write_report(
     known: dict[str, object],
     keep_pictures: bool = False,
 ) -> Results:
-    """Write a study's report, print its headline tables and the reasons of holes, and return its numbers.
+    """Write a study's report, print its headline tables, its answer and the reasons of holes, and return its numbers.
 
     known: its provenance; keep_pictures: see build_report.
     """
@@ -41,6 +41,7 @@ def write_report(
 
     written, results = build_report(study, records, output, known, keep_pictures)
     print_headline(console, results)
+    print_answer(console, results)
     print_holes(console, results)
     files = (written, written.with_suffix(".html"), output / "table.csv", output / "records.csv")
     console.print("\n".join(map(str, files)), highlight=False, soft_wrap=True)
@@ -88,6 +89,18 @@ def headline_table(results: Results, condition: str) -> Table:
             *map(escape, (f"{marked(results, name, condition)}{scored}", score.in_row(row), place, *captures))
         )
     return table
+
+
+def print_answer(console: Console, results: Results) -> None:
+    """Print the answer to the question of a study.
+
+    The tables alone do not give it: intervals of means overlap where the paired difference is clear, and a method that is
+    worse than a constant image has a rank, too.
+    """
+    from ..report.answers import kind_of
+
+    for sentence in kind_of(results).answer(results):
+        console.print(f"- {sentence}", markup=False, highlight=False)
 
 
 def print_holes(console: Console, results: Results) -> None:

@@ -148,6 +148,8 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
 
 def table(study: Study, rows: list[Row]) -> Table:
     """The rows as a table with a line of sums, in 80 columns."""
+    from ..study.progress import duration
+
     result = Table(title=escape(study.title), title_justify="left", show_footer=True, **LOOK)
     floors = sum(row.cells for row in rows if row.label == FLOOR)
     result.add_column("method", footer=f"all, {floors} of them floors" if floors else "all", overflow="fold")
@@ -158,11 +160,11 @@ def table(study: Study, rows: list[Row]) -> Table:
     result.add_column("captures", justify="right")
     timed = [row.seconds for row in rows if row.seconds is not None]
     untimed = any(row.seconds is None and row.label != FLOOR for row in rows)
-    solving = f"{'at least ' * untimed}{sum(timed):.3g}" if timed else ""
-    result.add_column(escape("solving [s]"), justify="right", footer=solving)
+    solving = f"{'at least ' * untimed}{duration(sum(timed))}" if timed else ""
+    result.add_column("solving", justify="right", footer=solving)
     for row in rows:
         limit = "" if row.captures is None else str(row.captures)
-        seconds = "" if row.label == FLOOR else "not timed" if row.seconds is None else f"{row.seconds:.3g}"
+        seconds = "" if row.label == FLOOR else "not timed" if row.seconds is None else duration(row.seconds)
         name = "floor images, no method" if row.label == FLOOR else row.label
         result.add_row(escape(name), *(str(getattr(row, name)) for name in numbers), limit, seconds)
     return result
@@ -197,13 +199,18 @@ def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
 
 def training_table(rows: list[TrainingRow]) -> Table:
     """What has to be learned, as a table in 80 columns; artifacts without the digest in their names."""
+    from ..study.progress import duration
+
     result = Table(title="training", title_justify="left", **LOOK)
     for name in ("artifact", "needed by", "state"):
         result.add_column(name, overflow="fold")
-    for name in ("captures", "time [s]"):
-        result.add_column(escape(name), justify="right")
+    for name in ("captures", "time"):
+        result.add_column(name, justify="right")
     for row in rows:
-        figures = ("" if math.isnan(value) else f"{value:.4g}" for value in (row.captures, row.seconds))
+        figures = (
+            "" if math.isnan(value) else words(value)
+            for value, words in ((row.captures, "{:.4g}".format), (row.seconds, duration))
+        )
         state = f"{row.state}: {row.reason}" if row.reason else row.state
         name = row.name.rpartition("-")[0]
         result.add_row(*map(escape, (name, ", ".join(row.needed_by), state)), *figures)

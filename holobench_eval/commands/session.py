@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .options import Config
 from .output import console, write_report
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The session's folde
 
 @session.command("export")
 def export(
-    config: Annotated[Path, typer.Argument(metavar="STUDY", help="A study, such as configs/table3.yaml.")],
+    config: Config,
     folder: Folder,
     bench: Annotated[Path | None, typer.Option(help="File of the bench that will show the patterns.")] = None,
     display: Annotated[str | None, typer.Option(help="Without --bench: the study's display to stand for it.")] = None,

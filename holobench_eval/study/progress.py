@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from datetime import timedelta
 from pathlib import Path
 
 from rich.console import Console
@@ -95,7 +94,7 @@ class Bar:
     follower: Follower = field(default_factory=lambda: Follower(0.5))
 
     def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = _whole) -> None:
-        """Show the time left, ``-:--:--`` where it is not known."""
+        """Show the time left, where it is known."""
         self.progress.update(self.bar, left=seconds_left, whole=is_whole)
 
     def planned(self, cells: int, missing: int, floors: int) -> None:
@@ -184,19 +183,28 @@ class Lines:
     def _left(self) -> str:
         seconds, training = self.seconds_left(), len(self.follower.folders)
         beside = f" besides the {training} in training" * bool(training)
-        about = "about" if self.is_whole() else "at least"
-        return "" if seconds is None else f", {about} {seconds:.0f} s left{beside}"
+        return f", {words} left{beside}" if (words := _expected(seconds, self.is_whole())) else ""
 
 
-def _duration(seconds: float | None, is_whole: bool) -> str:
-    return "-:--:--" if seconds is None else f"{'' if is_whole else 'at least '}{timedelta(seconds=round(seconds))}"
+def duration(seconds: float) -> str:
+    """A time as people say it, to two digits at least: ``45 s``, ``22 min``, ``3.5 h``."""
+    if seconds < 99.5:
+        return f"{seconds:.0f} s" if seconds >= 9.5 else f"{seconds:.2g} s"
+    return f"{seconds / 60:.0f} min" if seconds < 99.5 * 60 else f"{seconds / 3600:.1f} h"
+
+
+def _expected(seconds: float | None, is_whole: bool) -> str:
+    """The time left in words; empty where nothing is known of it, also where less than a second is a lower limit."""
+    if seconds is None or (seconds < 1 and not is_whole):
+        return ""
+    return f"{'about' if is_whole else 'at least'} {duration(round(seconds))}"
 
 
 class _TimeLeft(ProgressColumn):
     """The time left, by what the rows have cost so far."""
 
     def render(self, task: RichTask) -> Text:
-        return Text(_duration(task.fields["left"](), task.fields["whole"]()), style="progress.remaining")
+        return Text(_expected(task.fields["left"](), task.fields["whole"]()), style="progress.remaining")
 
 
 @contextmanager

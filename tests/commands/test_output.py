@@ -10,8 +10,9 @@ import pytest
 from rich.console import Console
 
 from holobench_eval.commands import _plain
-from holobench_eval.commands.output import MOST_REASONS, headline_table, print_headline, print_holes
+from holobench_eval.commands.output import MOST_REASONS, headline_table, print_answer, print_headline, print_holes
 from holobench_eval.report import Results, records_frame
+from holobench_eval.report.answers import kind_of
 from holobench_eval.report.data.marks import marked
 from tests.support.synthetic_study import cell, layout, record, study
 
@@ -54,6 +55,12 @@ def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(
         assert f"{condition}: PSNR, linear light [dB]" in text
         for name in results.methods(condition):
             assert results.headline.in_row(results.row(name, condition)) in text
+
+
+def test_the_answer_of_the_report_stands_below_the_tables(records: list[dict[str, Any]]) -> None:
+    results, file = found(records), io.StringIO()
+    print_answer(Console(file=file, width=80), results)
+    assert " ".join(file.getvalue().split()) == " ".join(f"- {line}" for line in kind_of(results).answer(results))
 
 
 def test_a_rank_is_named_by_its_category_where_there_are_several(records: list[dict[str, Any]]) -> None:
