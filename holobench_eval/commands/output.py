@@ -94,8 +94,8 @@ def headline_table(results: Results, condition: str) -> Table:
 def print_answer(console: Console, results: Results) -> None:
     """Print the answer to the question of a study.
 
-    The tables alone do not give it: intervals of means overlap where the paired difference is clear, and a method that is
-    worse than a constant image has a rank, too.
+    The tables alone do not give it: intervals of means overlap where the paired difference is clear, and a method that
+    is worse than a constant image has a rank, too.
     """
     from ..report.answers import kind_of
 

@@ -115,7 +115,7 @@ def test_a_study_from_run_to_check(
     assert "1 failed (Blind on ideal): " in shown
     assert Path("holoeval-results/toy/report.md").exists()
     tables = [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")]
-    assert b"Blind,open loop,,,,,0,1," in tables[0]
+    assert b"Blind,open loop,{},,,,,0,1," in tables[0]
     assert b"1 values that are NaN" not in tables[1]
     assert b"values that are NaN or infinite" in tables[1]
 
