@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Callable
 from functools import cache
 
-M_TRIM_THRESHOLD, M_MMAP_MAX = -1, -4  # mallopt(3) of glibc
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_MMAP_MAX = -1, -3, -4  # mallopt(3) of glibc
 LARGEST_KEPT = 32 * 2**20  # bytes of the largest array that glibc keeps without ``keep_freed_memory``
 KEPT = 2**30  # bytes
 
@@ -23,6 +23,18 @@ def keep_freed_memory() -> None:
     if mallopt := _of_libc("mallopt"):
         mallopt(M_MMAP_MAX, 0)
         mallopt(M_TRIM_THRESHOLD, KEPT)
+
+
+@cache
+def return_large_arrays() -> None:
+    """Let glibc return every array above 1 MiB to the system when it is freed; does nothing where there is another C
+    library.
+
+    Without it, freed arrays of a few MiB leave gaps, into which those of the next step do not fit: HaarPSI of 2160x3840
+    in three colours took 640 MiB, and takes 420.
+    """
+    if mallopt := _of_libc("mallopt"):
+        mallopt(M_MMAP_THRESHOLD, 2**20)
 
 
 def give_back_freed_memory() -> None:

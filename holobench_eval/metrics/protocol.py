@@ -15,7 +15,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ..core.allocator import give_back_freed_memory
 from ..core.errors import UserError, suggest
 from ..imaging.refine import Refinement
 from ..optics.colour import srgb_encode
@@ -25,7 +24,6 @@ from .speckle import speckle_contrast
 
 VERSION = "v1"
 SMALLEST_SCORED = 16
-LARGE = 2**21  # pixels, those of 1080 x 1920
 
 Image = Tensor | NDArray[np.floating]
 
@@ -144,20 +142,20 @@ def score(
         here = [metric for metric in computed if domain in (("stored",) if stored else metric.domains)]
         if here:
             encoded, reference = _ENCODINGS[domain](image), _encoded_target[domain](wanted)
-            scores |= {f"{metric.name}_{domain}": _value(metric, encoded, reference) for metric in here}
+            scores |= {f"{metric.name}_{domain}": float(metric.function(encoded, reference)) for metric in here}
             del encoded, reference
     del image
     repeated = [metric for metric in chosen if metric.name in _REPEATED]
     if refine and repeated:
         moved = _refinement(wanted)(factors.view(-1, 1, 1) * light)
         again, _ = match(moved.image.to(wanted), wanted)
-        scores |= {f"{metric.name}_{first}_refined": _value(metric, again, wanted) for metric in repeated}
+        scores |= {f"{metric.name}_{first}_refined": float(metric.function(again, wanted)) for metric in repeated}
         scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
         del moved, again  # of a large image, before the blurred ones are made
     for sigma in blur if repeated else ():
         soft_target = _softened(sigma)(wanted)
         soft, _ = match(_blurred(light, sigma), soft_target)
-        scores |= {f"{m.name}_{first}_blur{sigma:g}": _value(m, soft, soft_target) for m in repeated}
+        scores |= {f"{m.name}_{first}_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
         del soft, soft_target
     if "speckle_contrast" in names and not stored:
         contrast = speckle_contrast(light, wanted)
@@ -165,13 +163,6 @@ def score(
     if float(wanted.mean()) > 0:
         scores["brightness_ratio"] = float(light.mean() / wanted.mean())
     return scores | {f"scale_{channel}": float(factor) for channel, factor in enumerate(factors)}
-
-
-def _value(metric: Metric, image: Tensor, target: Tensor) -> float:
-    value = float(metric.function(image, target))
-    if target[0].numel() > LARGE:
-        give_back_freed_memory()  # else it adds up to what the next metric needs
-    return value
 
 
 @lru_cache(maxsize=8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ...core.allocator import return_large_arrays
 from ...core.errors import CellError
 from ...core.hashing import digest
 from ...core.installed import __version__, installed
@@ -24,7 +26,7 @@ from ...imaging.shared_pose import sampled, shared
 from ...imaging.similarity import reduced, similarity
 from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
-from ...metrics.protocol import LARGE, VERSION
+from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
 from .. import provenance
 from ..plan import FLOORS, REFERENCE
@@ -36,6 +38,7 @@ from .files import Folders, Key
 from .pictures import Values
 from .visible import LEAST, Part, cropped, largest_part, share, shown
 
+LARGE = 2**21  # pixels of a target, those of 1080 x 1920
 WIDE = 2048  # pixels of a target's longer side to which the second aligner, of which 0.1 px is asked, reduces it
 SLOW = ("flip", "mofd", "lpips", "haarpsi")  # how their names begin: the floor of a `LARGE` target has none of them
 CONDITION = "photographed display"
@@ -95,6 +98,8 @@ class Scoring:
 
         Old pictures of alignments go.
         """
+        if any(math.prod(target.shape[1:]) > LARGE for target in self.folders.targets.values()):
+            return_large_arrays()
         own = self.alignments(step)
         placements = own if self.aligned else {**own, **self.common(own)}
         parts = self.parts(placements) if self.visible else {}
