@@ -170,6 +170,13 @@ def _symmetries(shape: tuple[int, int]) -> Iterator[Warp]:
             yield _planar(shape, centre @ turn @ np.linalg.inv(centre))
 
 
+def is_same_mirrored(target: NDArray[np.floating]) -> bool:
+    """Whether a target ``(C, h, w)`` looks the same mirrored about some axis, so that its captures do not tell."""
+    reference = gray(target)
+    mirrors = [warp for warp in _symmetries(reference.shape) if np.linalg.det(warp.homography) < 0]
+    return any(similarity(reference, reference, mirror).overall >= SAME for mirror in mirrors)
+
+
 def confirmed(
     capture: NDArray[np.floating], target: NDArray[np.floating], warp: Warp, partly: bool = False
 ) -> Alignment | None:
