@@ -96,7 +96,7 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
         fault = f"a {bits}-bit image"
     if fault is not None:
         raise (GrayImageError if fault == _ONE_CHANNEL else UserError)(f"{name}: {fault}; {RIGHT}")
-    _refuse_other_colours(image, name)
+    refuse_other_colours(image, name)
     turned, stored_upright = _load(image, name)
     if bits == 8:
         return from_srgb(np.asarray(turned))
@@ -177,7 +177,7 @@ def _bits(image: Image.Image, content: bytes) -> int:
     return 8
 
 
-def _refuse_other_colours(image: Image.Image, name: str) -> None:
+def refuse_other_colours(image: Image.Image, name: str) -> None:
     """UserError for an embedded ICC profile that is not sRGB by its description."""
     profile = image.info.get("icc_profile")
     if not profile:
@@ -188,7 +188,7 @@ def _refuse_other_colours(image: Image.Image, name: str) -> None:
     except (OSError, ImageCms.PyCMSError) as error:
         raise UserError(f"{name}: its ICC colour profile cannot be read; {RIGHT}, or without a profile") from error
     if "srgb" not in description.lower():
-        raise UserError(f"{name}: its ICC colour profile is '{description[:60]}'; convert it: {RIGHT}")
+        raise UserError(f"{name}: its ICC colour profile is '{description[:60]}'; convert it to sRGB: {RIGHT}")
 
 
 def _load(image: Image.Image, name: str) -> tuple[Image.Image, bool]:

@@ -87,6 +87,7 @@ def score_folders(
     from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
     from ..study import provenance
+    from ..study.folders.doubts import doubts
     from ..study.folders.files import read_folders
     from ..study.folders.scoring import Scoring, described
     from ..study.store import Store
@@ -111,8 +112,9 @@ def score_folders(
     with scoring.store.locked():
         known = provenance.begin(output, described(folders, values), resumed=True)
         with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
-            records = [asdict(record) for record in scoring.records(step)]
-        notes = [*folders.notes, *_in_part(records)]
+            found = scoring.records(step)
+        records = [asdict(record) for record in found]
+        notes = [*folders.notes, *_in_part(records), *doubts(found, folders, scoring.domain)]
         for note in notes:
             console.print(note, markup=False, highlight=False, soft_wrap=True)
         known = provenance.end(output, known)

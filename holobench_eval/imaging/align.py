@@ -170,6 +170,13 @@ def _symmetries(shape: tuple[int, int]) -> Iterator[Warp]:
             yield _planar(shape, centre @ turn @ np.linalg.inv(centre))
 
 
+def is_same_mirrored(target: NDArray[np.floating]) -> bool:
+    """Whether a target ``(C, h, w)`` looks the same mirrored about some axis, so that its captures do not tell."""
+    reference = gray(target)
+    mirrors = [warp for warp in _symmetries(reference.shape) if np.linalg.det(warp.homography) < 0]
+    return any(similarity(reference, reference, mirror).overall >= SAME for mirror in mirrors)
+
+
 def confirmed(
     capture: NDArray[np.floating], target: NDArray[np.floating], warp: Warp, partly: bool = False
 ) -> Alignment | None:
@@ -181,7 +188,8 @@ def confirmed(
     """
     frame, reference = gray(capture), gray(target)
     alike = similarity(frame, reference, warp)
-    odd = sum(part < PART_ALIKE_IN_POSE for part in alike.parts)
+    # A part counts once: heavy speckle makes the same part of an honest capture both faint and displaced.
+    odd = sum(part < PART_ALIKE_IN_POSE or moved for part, moved in zip(alike.parts, alike.displaced, strict=True))
     enough = alike.overall >= ALIKE_IN_POSE and len(alike.parts) >= FEWEST_PARTS and odd <= len(alike.parts) // 6
     if not enough or is_displaced(frame, reference, warp) or _fault(warp, frame.shape, partly):
         return None
@@ -195,7 +203,7 @@ def gray(picture: NDArray[np.floating]) -> Frame:
 
 def accepted(alike: Similarity) -> bool:
     """Whether two pictures are alike overall and in their parts, of which one in six may be odd."""
-    odd = sum(part < PART_ALIKE for part in alike.parts) + alike.displaced
+    odd = sum(part < PART_ALIKE for part in alike.parts) + sum(alike.displaced)
     return alike.overall >= ALIKE and len(alike.parts) >= FEWEST_PARTS and odd <= len(alike.parts) // 6
 
 

@@ -46,12 +46,12 @@ class View:
 class Similarity:
     """Correlation of a capture with its target under a warp: overall, and of each part that holds structure.
 
-    displaced: how many parts fit clearly better a little elsewhere.
+    displaced: of each such part, whether it fits clearly better a little elsewhere.
     """
 
     overall: float
     parts: tuple[float, ...] = ()
-    displaced: int = 0
+    displaced: tuple[bool, ...] = ()
 
 
 def reduced(picture: Frame, side: int) -> tuple[Frame, Array]:
@@ -101,7 +101,7 @@ def similarity(frame: Frame, reference: Frame, warp: Warp) -> Similarity:
     target, capture = seen.even()
     parts = [part for part in structured(seen.reference) if seen.inside[part].mean() >= SEEN]
     alike = [_masked_correlation(target[part], capture[part], seen.inside[part]) for part in parts]
-    displaced = sum(_displaced(target, capture, part) for part in parts)
+    displaced = tuple(_displaced(target, capture, part) for part in parts)
     return Similarity(_masked_correlation(target, capture, seen.inside), tuple(alike), displaced)
 
 

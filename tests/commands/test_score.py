@@ -294,9 +294,11 @@ def test_what_is_suspicious_is_noted(tmp_path):
     small = photograph("coffee", (48, 64))
     for place in ("captures/a/coffee.png", "captures/b/coffee.jpg", "targets/coffee.png", "targets/unseen.png"):
         save(tmp_path / place, small if "unseen" not in place else small[:, ::-1])
-    notes = " ".join(read_folders(tmp_path / "captures", tmp_path / "targets").notes)
+    found = read_folders(tmp_path / "captures", tmp_path / "targets")
+    notes = " ".join(found.notes)
     assert "not linear in light: coffee.jpg" in notes
-    assert "a/coffee is a target itself" in notes
+    assert "the capture is the target itself" in found.pairings["a", "coffee"].refused
+    assert found.pairings["b", "coffee"].refused == ""
     assert "Without any capture: unseen" in notes
 
 

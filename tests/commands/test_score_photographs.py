@@ -203,3 +203,69 @@ def test_a_target_that_no_capture_shows_has_no_floor_and_alone_it_makes_a_report
     text, _, records = run(tmp_path)
     assert "the target is not found in the capture" in text
     assert list(pd.read_csv(tmp_path / "out" / "records.csv")["category"]) == ["given"]
+
+
+def in_one_pose(root: Path, **methods: Any) -> Path:
+    """Photographs of two targets by one camera; methods: changes of the displayed picture and the photograph."""
+    for name in ("astronaut", "coffee"):
+        target = photograph(name, SHAPE)
+        save(root / "targets" / f"{name}.png", target)
+        for method, (shown, stored) in methods.items():
+            draw = np.random.default_rng(5)
+            where, size = pose(draw, SHAPE, scale=1.3)
+            capture = captured(np.ascontiguousarray(shown(target)), where, size, draw, contrast=0.2)
+            save(root / "captures" / method / f"{name}.png", np.clip(stored(capture), 0, 1))
+    return root
+
+
+def same(picture: Picture) -> Picture:
+    return picture
+
+
+def test_the_target_itself_is_refused_and_what_is_nearly_it_is_named(tmp_path):
+    root = in_one_pose(tmp_path, honest=(same, same))
+    for name in ("astronaut", "coffee"):
+        target = photograph(name, SHAPE)
+        save(root / "captures" / "itself" / f"{name}.png", target)
+        save(root / "captures" / "padded" / f"{name}.png", np.pad(target, ((0, 0), (20, 20), (30, 30))))
+    text, terminal, records = run(root)
+    assert (records.loc["itself", "state"] == "failed").all()
+    assert records.loc["itself", "reason"].str.contains("is the target itself, value for value").all()
+    for said in (text, terminal):
+        names = "padded/astronaut, padded/coffee."
+        assert f"Nearly the target itself, which a photograph with sensor noise is not: {names}" in said
+
+
+def test_a_capture_that_is_mirrored_against_the_others_is_named(tmp_path):
+    root = in_one_pose(tmp_path, a=(same, same), b=(same, same), mirrored=(lambda picture: picture[..., ::-1], same))
+    text, terminal, records = run(root)
+    assert (records["state"] == "done").all()
+    for said in (text, terminal):
+        assert re.search(r"Mirrored against the other captures of \d+ x \d+ pixels", said)
+        assert "so: mirrored/astronaut, mirrored/coffee." in said
+    shutil.rmtree(root / "captures" / "mirrored")
+    assert "Mirrored" not in run(root)[1]
+
+
+def test_clipped_captures_are_named_with_their_share(tmp_path):
+    root = in_one_pose(tmp_path, fair=(same, lambda seen: 0.9 * seen), clipped=(same, lambda seen: 2 * seen))
+    text, terminal, records = run(root)
+    share = records.loc[("clipped", "astronaut"), "saturated"]
+    assert share > 0.05
+    for said in (text, terminal):
+        assert "more than 0.1% of the scored samples at full scale: clipped/astronaut" in said
+        assert f"clipped/astronaut {share:.1%}" in said
+    assert "fair/" not in terminal.partition("Clipped")[2]
+
+
+def test_aligned_captures_that_are_not_alike_are_named_with_their_correlation(tmp_path):
+    for name, other in (("astronaut", "coffee"), ("coffee", "astronaut")):
+        save(tmp_path / "targets" / f"{name}.png", photograph(name, SHAPE))
+        for method, shown in (("right", name), ("wrong", other)):
+            seen = captured(photograph(shown, SHAPE), np.eye(3), SHAPE, np.random.default_rng(3), contrast=0.3)
+            save(tmp_path / "captures" / method / f"{name}.png", 0.9 * seen)
+    text, terminal, records = run(tmp_path, aligned=True)
+    assert (records["state"] == "done").all()
+    for said in (text, terminal):
+        assert "Not alike pixel to pixel, with correlations below 0.25: wrong/astronaut" in said
+    assert "right/" not in terminal.partition("Not alike")[2].partition("\n")[0]

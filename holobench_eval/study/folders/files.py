@@ -108,19 +108,17 @@ def _notes(targets: Mapping[str, Picture], captures: Mapping[Key, Picture]) -> I
     lossy = [picture.path.name for picture in (*targets.values(), *captures.values()) if picture.is_lossy]
     if lossy:
         yield (
-            f"Compressed with loss, and not linear in light: {_named(lossy)}. It removes noise and fine detail, "
+            f"Compressed with loss, and not linear in light: {named(lossy)}. It removes noise and fine detail, "
             "which scores of holograms consist of."
         )
     unseen = [name for name in targets if not any(name == target for _, target in captures)]
     if unseen:
-        yield f"Without any capture: {_named(unseen)}."
+        yield f"Without any capture: {named(unseen)}."
     first: dict[str, Key] = {}
     for key, picture in captures.items():
         same = first.setdefault(picture.pixels_sha256, key)
         if same != key:
             yield f"The capture {'/'.join(key)} is the same picture as {'/'.join(same)}: one of them is misplaced."
-        if picture.pixels_sha256 in {target.pixels_sha256 for target in targets.values()}:
-            yield f"The capture {'/'.join(key)} is a target itself and no photograph."
 
 
 def _conversions(
@@ -129,23 +127,24 @@ def _conversions(
     """Sentences about what of the files is compared, where that is not all of it."""
     opaque = [picture.path.name for picture in (*targets.values(), *captures.values()) if picture.opaque]
     if opaque:
-        yield f"An alpha channel that is opaque everywhere was left out: {_named(opaque)}."
+        yield f"An alpha channel that is opaque everywhere was left out: {named(opaque)}."
     for channel in NAMES:
         alone = _labels(key for key, pairing in pairings.items() if pairing.channel == channel)
         if alone:
             yield (
                 f"Scored on the {channel} channel alone, which has nearly all of the light, as of a single laser: "
-                f"{_named(alone)}."
+                f"{named(alone)}."
             )
     gray = _labels(key for key, pairing in pairings.items() if pairing.channel == "gray")
     if gray:
-        yield f"Scored in gray, since the channels of the capture, or of its target, are equal: {_named(gray)}."
+        yield f"Scored in gray, since the channels of the capture, or of its target, are equal: {named(gray)}."
 
 
 def _labels(keys: Iterable[Key]) -> list[str]:
     return ["/".join(key) for key in keys]
 
 
-def _named(names: list[str]) -> str:
+def named(names: list[str]) -> str:
+    """The first of several names, and how many more there are."""
     more = len(names) - NAMED
     return f"{', '.join(names[:NAMED])}{f' and {more} more' if more > 0 else ''}"

@@ -36,6 +36,8 @@ def paired(capture: Picture, target: Picture) -> Pairing:
     A single laser in a colour photograph: one channel has the light, and the others have noise, which is no error of
     the hologram. Gray and colour go together where nothing is lost and nothing is guessed.
     """
+    if capture.pixels_sha256 == target.pixels_sha256:
+        return Pairing(refused="the capture is the target itself, value for value, and no photograph of it")
     if capture.levels is not None and capture.levels <= FEWEST_LEVELS:
         return Pairing(
             refused=f"the capture is under-exposed: it has {capture.levels} levels of brightness, whose rounding would "

@@ -13,7 +13,7 @@ from PIL import Image
 
 from ...core.errors import UserError
 from ...core.io import decode_levels
-from ...datasets.images import PNG_END, opened, read
+from ...datasets.images import PNG_END, opened, read, refuse_other_colours
 from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
 from ...lab.raw import read_raw
 
@@ -133,6 +133,7 @@ def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:
         raise UserError(f"{path}: an image with a transparent colour; {RIGHT}")
     if image.mode not in MODES and not image.mode.startswith("I;16"):
         raise UserError(f"{path}: an image of mode {image.mode}; {RIGHT}")
+    refuse_other_colours(image, str(path))
     _load(image, content, path)
     pixels = decode_levels(content)
     if pixels is None:

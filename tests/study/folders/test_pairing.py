@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageCms
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.folders.files import Folders, read_folders
@@ -123,6 +123,18 @@ def test_an_opaque_alpha_channel_counts_as_none_and_that_is_said(tmp_path):
     image.putpixel((5, 5), (9, 9, 9, 254))
     image.save(path)
     with pytest.raises(UserError, match="alpha that is not opaque everywhere"):
+        checked(path)
+
+
+def test_a_colour_profile_other_than_srgb_is_refused_as_in_datasets(tmp_path):
+    folders(tmp_path, 0.9 * COLOUR, COLOUR)
+    path = tmp_path / "captures" / "m" / "coffee.png"
+    for space in ("sRGB", "LAB"):
+        profile = ImageCms.ImageCmsProfile(ImageCms.createProfile(space)).tobytes()
+        Image.open(path).save(path, icc_profile=profile)
+        if space == "sRGB":
+            assert checked(path).shape == (3, 48, 64)
+    with pytest.raises(UserError, match=r"ICC colour profile is 'Lab.*convert it to sRGB: expected an 8-bit or 16-bit"):
         checked(path)
 
 

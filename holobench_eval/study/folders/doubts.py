@@ -1,0 +1,63 @@
+"""Sentences about scored captures that a reader of the scores would doubt, had they seen the pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from ...imaging.align import ALIKE_IN_POSE, is_same_mirrored
+from ...lab.photograph import MOST_SATURATED
+from ..store import Record
+from .files import Folders, named
+
+NEARLY_ITSELF = 40.0  # dB: the noise of a good camera alone leaves less
+ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of it has a high PSNR
+
+
+def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator[str]:
+    """Sentences about what the scores of ``records`` do not show. domain: of the PSNR."""
+    done = [record for record in records if record.state == "done"]
+    captures = [record for record in done if record.cell["capture_sha256"]]
+    constant = {_target(record): record.scores for record in done if record.label == "floor_constant"}
+    psnr = f"psnr_{domain}"
+    least = {name: max(NEARLY_ITSELF, scores[psnr] + ABOVE_CONSTANT) for name, scores in constant.items()}
+    near = [_name(record) for record in captures if record.scores[psnr] > least[_target(record)]]
+    if near:
+        yield f"Nearly the target itself, which a photograph with sensor noise is not: {named(near)}."
+    yield from _mirrored(captures, folders)
+    clipped = [record for record in captures if (record.saturated or 0) > MOST_SATURATED]
+    if clipped:
+        shares = named([f"{_name(record)} {record.saturated:.1%}" for record in clipped])
+        yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at full scale: {shares}."
+    given = [record for record in captures if record.cell["geometry"]["kind"] == "given"]
+    unlike = [record for record in given if record.cell["geometry"]["correlation"] < ALIKE_IN_POSE]
+    if unlike:
+        correlations = named([f"{_name(record)} {record.cell['geometry']['correlation']:.2f}" for record in unlike])
+        yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
+
+
+def _mirrored(captures: Sequence[Record], folders: Folders) -> Iterator[str]:
+    """A sentence for each size of capture of which some are mirrored and most are not, or the reverse."""
+    sessions: dict[tuple[int, int], Mapping[bool, list[Record]]] = {}
+    for record in captures:
+        height, width = record.cell["panel"]
+        # The sign of the determinant at any point in front of the camera is that of the whole homography.
+        mirrored = bool(np.linalg.det(np.array(record.cell["geometry"]["homography"])) < 0)
+        sessions.setdefault((width, height), {True: [], False: []})[mirrored].append(record)
+    for (width, height), sides in sessions.items():
+        fewer = sides[len(sides[True]) <= len(sides[False])]
+        odd = [record for record in fewer if not is_same_mirrored(folders.targets[_target(record)].load())]
+        if odd:
+            yield (
+                f"Mirrored against the other captures of {width} x {height} pixels, though one camera sees all "
+                f"or none so: {named([_name(record) for record in odd])}."
+            )
+
+
+def _name(record: Record) -> str:
+    return f"{record.label}/{_target(record)}"
+
+
+def _target(record: Record) -> str:
+    return str(record.cell["target"])
