@@ -140,6 +140,7 @@ def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
 def wrong_files(folder: Path) -> None:
     np.save(folder / "small.npy", PHASE[:, 1:])
     np.save(folder / "int.npy", LEVELS.astype(np.int64))
+    np.save(folder / "float.npy", LEVELS.astype(np.float64))
     np.save(folder / "nan.npy", np.where(PHASE > 3, np.nan, PHASE))
     np.save(folder / "objects.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     np.save(folder / "text.npy", np.array(["phase"]))
@@ -170,6 +171,7 @@ def wrong_files(folder: Path) -> None:
         ("gone.npy", {}, "gone.npy: no such file"),
         ("small.npy", {}, r"3 x 11 x 12 values of type float64; 'small' shows 12 x 12 in 3 colours"),
         ("int.npy", {}, "say which level is a full turn: two_pi_level"),
+        ("float.npy", {"two_pi_level": 256}, "two_pi_level is set, but float64 holds radians; levels need"),
         ("nan.npy", {}, "NaN or infinite"),
         ("objects.npy", {}, "damaged, or no .npy file: Object arrays cannot be loaded"),
         ("text.npy", {}, "holds 1 values of type <U5; expected numbers"),
