@@ -89,8 +89,8 @@ def write_png(path: Path, levels: Tensor, bits: int) -> None:
 def decode_levels(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16] | None:
     """The levels of an encoded picture as they are stored, ``(H, W)`` or ``(H, W, C)`` with red first.
 
-    None for what OpenCV cannot read, for samples of neither 8 nor 16 bits, and for other than 1, 3 or 4 channels.
-    Pillow would give RGB of 16 bits as 8.
+    None for what OpenCV cannot read, for samples of more than 8 bits and not 16, and for other than 1, 3 or 4 channels.
+    Fewer bits come as 8, and of several pages the first. Pillow would give RGB of 16 bits as 8.
     """
     if not content:
         return None  # OpenCV raises

@@ -155,17 +155,23 @@ def _is_function(kind: Kind, found: Any) -> bool:
 
 def _class_of(function: Callable[..., Any], owner: str) -> type[Any]:
     """The dataclass of a method that is a function of target and bench. Its further parameters are the fields; what is
-    set on the function, such as ``camera = True``, is declared by the class."""
+    set on the function, such as ``camera = True``, is declared by the class, functions as static methods."""
+    _, _, *further = inspect.signature(function).parameters.values()
+    for given in further:
+        if given.kind in (given.VAR_POSITIONAL, given.VAR_KEYWORD):
+            raise UserError(f"{owner}: '{given}' takes any parameters; name each of them")
+        if given.annotation is given.empty and given.default is given.empty:
+            raise UserError(f"{owner}: parameter '{given.name}' needs an annotation or a default")
     try:
         hints = get_type_hints(function, include_extras=True)
-        _, _, *further = inspect.signature(function).parameters.values()
         fields = [(given.name, hints.get(given.name, type(given.default)), given.default) for given in further]
 
         @wraps(function)
         def solve(self: Any, target: Any, bench: Any) -> Any:
             return function(target, bench, **{name: getattr(self, name) for name, *_ in fields})
 
-        declared = {**vars(function), "solve": solve, "__doc__": function.__doc__}
+        own = {name: staticmethod(value) if callable(value) else value for name, value in vars(function).items()}
+        declared = {**own, "solve": solve, "__doc__": function.__doc__}
         cls = make_dataclass(function.__name__, fields, frozen=True, namespace=declared)
     except (TypeError, ValueError, NameError) as error:
         raise UserError(f"{owner}: its parameters cannot be taken from a config: {error}") from error

@@ -6,6 +6,7 @@ import io
 import json
 import subprocess
 import sys
+import warnings
 import zipfile
 from collections.abc import Mapping
 from math import prod
@@ -14,13 +15,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
 
 from ...core.errors import CellError
 from ...core.io import decode_levels
 
 PICTURES = (".png", ".tif", ".tiff", ".bmp")
+FORMATS = ("PNG", "TIFF", "BMP")
 SUFFIXES = (*PICTURES, ".npy", ".npz", ".mat")
 SECONDS = 120.0  # that reading a .mat file may take
+BITS_PER_SAMPLE = 258  # TIFF 6.0, section 8
+ORIENTATION = 274  # Exif 2.32, section 4.6.4
 LARGEST_BYTES = 1_000_000_000  # a complex field of three colours on a panel of 4K in double precision takes 400 MB
 
 
@@ -59,7 +64,35 @@ def _picture(content: bytes) -> NDArray[Any]:
         raise CellError("no picture of 8 or 16 bits that can be read, or a damaged one")
     if levels.ndim == 3 and levels.shape[2] == 4:
         raise CellError("a picture with alpha; expected gray or RGB")
+    _refuse_altered(content)
     return levels
+
+
+def _refuse_altered(content: bytes) -> None:
+    """CellError for a picture that OpenCV gives otherwise than it is stored: one page of several, turned by its EXIF
+    orientation (a TIFF, and no PNG), or with fewer than 8 bits stretched to 8."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large panels are no attack
+        try:
+            image = Image.open(io.BytesIO(content), formats=FORMATS)
+        except UnidentifiedImageError:
+            raise CellError(f"no picture of 8 or 16 bits that can be read as {', '.join(FORMATS)}") from None
+    frames, orientation = getattr(image, "n_frames", 1), image.getexif().get(ORIENTATION, 1)
+    if frames != 1:
+        raise CellError(f"{frames} frames or pages; expected a file with one picture")
+    if orientation != 1:
+        raise CellError(f"a picture with EXIF orientation {orientation}; expected one that is stored upright")
+    if (bits := _bits(image, content)) < 8:
+        raise CellError(f"a {bits}-bit picture; expected 8 or 16 bits")
+
+
+def _bits(image: Image.Image, content: bytes) -> int:
+    """Bits a sample, or an index of a palette, in the file."""
+    if image.format == "PNG":
+        return content[24]  # PNG specification, section 11.2.1 (IHDR)
+    if image.format == "TIFF":
+        return int(min(image.tag_v2.get(BITS_PER_SAMPLE, (1,))))  # type: ignore[attr-defined]
+    return min(content[28], 8)  # BITMAPINFOHEADER, biBitCount: of a whole pixel
 
 
 def _numbers(content: bytes, suffix: str, variable: str) -> NDArray[Any]:

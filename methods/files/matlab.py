@@ -15,7 +15,7 @@ import numpy as np
 from scipy.io import loadmat, whosmat
 
 MOST = 16  # bytes of a value: a complex number of double precision
-NUMBERS = {"double", "single", "logical"} | {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
+NUMBERS = {"double", "single"} | {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
 
 
 def main(file: str, name: str, largest: str) -> None:

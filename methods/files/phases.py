@@ -60,7 +60,8 @@ class Phases:
     levels : {"integers", "all"}
         Which real numbers are levels: integers, or all (MATLAB keeps levels as double).
     two_pi_level : float, optional
-        The level that lags a full turn behind level 0; by default 256 or 65536, by the bits of the file.
+        The level that lags a full turn behind level 0; by default 256 or 65536, by the bits of the file. A file of
+        radians is refused with it.
     sign : {1, -1}
         -1 for phases of the opposite convention.
     origin : float
@@ -180,6 +181,8 @@ class Phases:
             if self.two_pi_level is None and (array.dtype.kind != "u" or bits > 16):
                 raise CellError(f"{path}: levels of type {array.dtype}; say which level is a full turn: two_pi_level")
             array = array.astype(np.float64) * (math.tau / (self.two_pi_level or 2**bits))
+        elif self.two_pi_level is not None:
+            raise CellError(f"{path}: two_pi_level is set, but {array.dtype} holds radians; levels need 'levels: all'")
         if self.sign == 1 and not self.origin:
             return array  # to the last bit
         return self.sign * array.astype(np.float64) + self.origin

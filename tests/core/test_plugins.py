@@ -105,3 +105,25 @@ def test_parameters_may_be_lists_and_init_variables_beside_annotations_for_types
 def test_a_file_without_its_class_is_told_what_is_missing() -> None:
     with pytest.raises(UserError, match=r"method 'mine\.py': a file without its class; expected mine\.py:Class"):
         plugins.find("methods", "mine.py")
+
+
+def test_a_function_that_is_set_on_a_method_is_called_without_the_method(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def f(target, bench): ...\nf.files = lambda name: [f'{name}.npy']\n")
+    assert plugins.build("methods", "mine.py:f", {}, tmp_path).files("cat") == ["cat.npy"]
+
+
+@pytest.mark.parametrize(
+    ("parameter", "message"),
+    [
+        ("a", "method 'mine.py:f': parameter 'a' needs an annotation or a default"),
+        ("*args", "method 'mine.py:f': '*args' takes any parameters; name each of them"),
+        ("**kw", "method 'mine.py:f': '**kw' takes any parameters; name each of them"),
+    ],
+)
+def test_a_parameter_that_no_config_can_set_is_refused_in_one_line(
+    tmp_path: Path, parameter: str, message: str
+) -> None:
+    (tmp_path / "mine.py").write_text(f"def f(target, bench, {parameter}): ...\n")
+    with pytest.raises(UserError) as found:
+        plugins.find("methods", "mine.py:f", tmp_path)
+    assert str(found.value) == message

@@ -100,12 +100,12 @@ import numpy as np
 import torch
 
 
-def mine(target, bench, file: str = "mine.npy"):
+def mine(target, bench):
     """A phase from a file of its own."""
-    return torch.from_numpy(np.load(file)).float().expand(len(target), -1, -1, -1)
+    return torch.from_numpy(np.load("mine.npy")).float().expand(len(target), -1, -1, -1)
 
 
-mine.files = lambda method, target: [method.file]
+mine.files = lambda target_name: ["mine.npy"]
 '''
 
 

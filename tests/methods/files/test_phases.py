@@ -15,6 +15,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from scipy.io import savemat
 from scipy.sparse import csc_array
 from torch import Tensor
@@ -140,6 +141,7 @@ def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
 def wrong_files(folder: Path) -> None:
     np.save(folder / "small.npy", PHASE[:, 1:])
     np.save(folder / "int.npy", LEVELS.astype(np.int64))
+    np.save(folder / "float.npy", LEVELS.astype(np.float64))
     np.save(folder / "nan.npy", np.where(PHASE > 3, np.nan, PHASE))
     np.save(folder / "objects.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     np.save(folder / "text.npy", np.array(["phase"]))
@@ -159,6 +161,18 @@ def wrong_files(folder: Path) -> None:
     savemat(folder / "sparse.mat", {"a": csc_array(np.eye(3))})
     (folder / "noise.png").write_bytes(bytes(range(200)))
     cv2.imwrite(str(folder / "alpha.png"), np.zeros((12, 12, 4), np.uint8))
+    pixels = np.ascontiguousarray(np.moveaxis(LEVELS, 0, -1))
+    picture, turned = Image.fromarray(pixels), Image.Exif()
+    turned[274] = 3  # EXIF orientation: upside down
+    for ending in ("png", "tif"):
+        picture.save(folder / f"pages.{ending}", save_all=True, append_images=[picture.rotate(180)])
+        picture.save(folder / f"turned.{ending}", exif=turned)
+    for ending in ("png", "tif", "bmp"):
+        Image.fromarray(pixels[..., 0] > 127).save(folder / f"bit.{ending}")
+    Image.fromarray(pixels[..., 0] // 16).convert("P").save(folder / "four.png", bits=4)
+    picture.save(folder / "photograph.png", "JPEG")
+    np.save(folder / "bool.npy", LEVELS > 127)
+    savemat(folder / "logical.mat", {"a": LEVELS > 127})
     huge = np.lib.format.magic(1, 0) + np.uint16(118).tobytes()
     header = "{'descr': '<f8', 'fortran_order': False, 'shape': (900000, 900000), }"
     (folder / "huge.npy").write_bytes(huge + header.ljust(117).encode() + b"\n")
@@ -170,6 +184,7 @@ def wrong_files(folder: Path) -> None:
         ("gone.npy", {}, "gone.npy: no such file"),
         ("small.npy", {}, r"3 x 11 x 12 values of type float64; 'small' shows 12 x 12 in 3 colours"),
         ("int.npy", {}, "say which level is a full turn: two_pi_level"),
+        ("float.npy", {"two_pi_level": 256}, "two_pi_level is set, but float64 holds radians; levels need"),
         ("nan.npy", {}, "NaN or infinite"),
         ("objects.npy", {}, "damaged, or no .npy file: Object arrays cannot be loaded"),
         ("text.npy", {}, "holds 1 values of type <U5; expected numbers"),
@@ -184,6 +199,17 @@ def wrong_files(folder: Path) -> None:
         ("sparse.mat", {}, "'a' is of class sparse; expected a full array of numbers"),
         ("noise.png", {}, "no picture of 8 or 16 bits that can be read"),
         ("alpha.png", {}, "a picture with alpha"),
+        ("pages.png", {}, "2 frames or pages; expected a file with one picture"),
+        ("pages.tif", {}, "2 frames or pages; expected a file with one picture"),
+        ("turned.png", {}, "EXIF orientation 3; expected one that is stored upright"),
+        ("turned.tif", {}, "EXIF orientation 3; expected one that is stored upright"),
+        ("bit.png", {}, "a 1-bit picture; expected 8 or 16 bits"),
+        ("bit.tif", {}, "a 1-bit picture; expected 8 or 16 bits"),
+        ("bit.bmp", {}, "a 1-bit picture; expected 8 or 16 bits"),
+        ("four.png", {}, "a 4-bit picture; expected 8 or 16 bits"),
+        ("photograph.png", {}, "no picture of 8 or 16 bits that can be read"),
+        ("bool.npy", {}, "holds 432 values of type bool; expected numbers"),
+        ("logical.mat", {}, "'a' is of class logical; expected a full array of numbers"),
         ("huge.npy", {}, "an array of more than 1000 MB"),
         ("small.npy", {"amplitude": "gone.npy"}, "3 x 11 x 12"),
     ],
