@@ -136,7 +136,7 @@ def _derivatives(wanted: Frame) -> Array:
     # Written in place: of a large picture every further array of this size counts.
     model = np.empty((*_inner(wanted).shape, 5))
     model[..., 0], model[..., 1] = _inner(wanted), 1
-    slope_y, slope_x = (_inner(slope) for slope in np.gradient(wanted.astype(np.float64)))
+    slope_y, slope_x = (_inner(np.asarray(slope)) for slope in np.gradient(wanted.astype(np.float64)))
     np.negative(slope_x, out=model[..., 2])
     np.negative(slope_y, out=model[..., 3])
     np.multiply(slope_x, y[BORDER:-BORDER], out=model[..., 4])
