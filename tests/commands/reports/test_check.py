@@ -36,7 +36,7 @@ def test_a_report_that_follows_from_its_records_passes(report: Path) -> None:
 
 def test_a_changed_number_in_a_table_is_found(report: Path) -> None:
     table = report / "table.csv"
-    table.write_text(table.read_text().replace("Toy,open loop,,,,,2,", "Toy,open loop,,,,,3,"))
+    table.write_text(table.read_text().replace("Toy,open loop,{},,,,,2,", "Toy,open loop,{},,,,,3,"))
     assert ["does not follow from records.csv" in problem for problem in problems(report)] == [True]
 
 
