@@ -129,7 +129,7 @@ def test_a_preview_says_what_is_trained_unfinished_failed_and_missing(study, art
     assert "failed: BudgetError:" in text
     assert "[no]" in text
     assert done.name.rpartition("-")[0] in text
-    assert "61.25" in text
+    assert "61 s" in text
 
 
 def test_a_preview_of_a_learned_display_names_the_display(study, artifacts, tmp_path):
