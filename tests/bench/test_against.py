@@ -185,8 +185,10 @@ def test_what_a_version_lacks_is_not_taken_from_another(tmp_path):
     for user, line in (
         ("optics/transfer.py", "LARGEST_KEPT = 2**25"),
         ("core/device.py", "keep_freed_memory = int"),
+        ("study/folders/scoring.py", "return_large_arrays = int"),
+        ("study/cost.py", "give_back_freed_memory = int"),
     ):
-        text, lines = re.subn(r"from \.(\.core\.)?allocator import .*", line, (package / user).read_text())
+        text, lines = re.subn(r"from \.+(core\.)?allocator import .*", line, (package / user).read_text())
         assert lines == 1
         (package / user).write_text(text)
     with against.worker(tmp_path) as worker:
