@@ -20,6 +20,7 @@ from ..core.errors import UserError, out_of_memory
 # the function, or group of functions, in it.
 COMMANDS = {
     "A study": (
+        "configs",
         "list_",
         "plan",
         "run",

@@ -226,7 +226,7 @@ def test_the_help_lists_commands_in_the_order_of_work_a_line_each(
     lines = capsys.readouterr().out.partition("A study:\n")[2].splitlines()
     entries = [line.split(maxsplit=1) for line in lines[:-1] if line.startswith("  ")]
     names = [words[0] for words in entries]
-    assert names[:4] == ["list", "plan", "run", "report"]
+    assert names[:4] == ["configs", "list", "plan", "run"]
     assert sorted(names) == sorted(every_command())
     assert all(len(words) == 2 and words[1].endswith(".") and "..." not in words[1] for words in entries)
     assert max(map(len, lines)) <= 80

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from holobench_eval.commands.configs import configs
 from holobench_eval.commands.list_ import KINDS, list_
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
@@ -30,6 +31,12 @@ def test_parameters_inside_others_have_dotted_names(capsys: pytest.CaptureFixtur
     text = shown(capsys, "hil")
     assert "retrieval.step = 0.06 (number above 0, at most 10) Adam's step [rad]" in text  # HIL's, not the class's own
     assert "hil, one of the methods (is trained first) " in text
+
+
+def test_configs_lists_every_study_that_ships(capsys: pytest.CaptureFixture[str]) -> None:
+    configs()
+    printed = capsys.readouterr().out
+    assert all(f" {file.stem} " in printed for file in Path("configs").glob("*.yaml"))
 
 
 def test_a_function_of_a_file_is_shown_with_its_parameters(
