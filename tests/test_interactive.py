@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 import holobench_eval as hb
 from holobench_eval import interactive
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.report.charts.comparison import GAP, HEADER, SIDE, tile_size
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
@@ -129,9 +131,27 @@ def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:
 
 
 def test_captures_are_compared_in_a_picture(display: hb.OpenDisplay, target: interactive.Array, tmp_path: Path) -> None:
-    ideal = display.ideal(np.zeros((3, 128, 128)))
-    path = hb.compare(target, {"flat": ideal, "perfect": target}, tmp_path / "new" / "compared.jpg")
-    assert path.stat().st_size > 10_000
+    mirrored, turned = target[:, :, ::-1], target[:, ::-1]
+    path = hb.compare(target, {"mirrored": mirrored / 4, "turned": 3 * turned}, tmp_path / "new" / "compared.png")
+    page = np.asarray(Image.open(path)).astype(int)
+    tall, wide = tile_size(target.shape[1:])
+    assert (tall, wide) == (2 * target.shape[1], 2 * target.shape[2])
+    for column, picture in enumerate((target, mirrored, turned)):
+        left = SIDE + column * (wide + GAP)
+        tile = page[HEADER : HEADER + tall, left : left + wide]
+        factors = (picture * target).sum((1, 2)) / np.square(picture).sum((1, 2))  # brightness that fits best
+        light = (factors[:, None, None] * picture).clip(0, 1)
+        levels = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+        wrong = np.abs(tile - levels.transpose(1, 2, 0).repeat(2, axis=0).repeat(2, axis=1)).max(-1) > 1
+        assert wrong.mean() < (0.01 if column == 0 else 1e-9)  # the target has a frame around the enlarged window
+
+
+@pytest.mark.parametrize(("ending", "format"), [(".png", "PNG"), (".PNG", "PNG"), (".jpg", "JPEG"), (".JPEG", "JPEG")])
+def test_the_ending_says_what_a_comparison_is(
+    target: interactive.Array, tmp_path: Path, ending: str, format: str
+) -> None:
+    path = hb.compare(target, {"same": target}, tmp_path / f"compared{ending}")
+    assert Image.open(path).format == format
 
 
 def test_records_of_a_report_are_read() -> None:
