@@ -10,7 +10,7 @@ import io
 import warnings
 import zlib
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +105,29 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
         raise UserError(f"{name}: a 16-bit image with an EXIF orientation; expected one that is stored upright")
     deep = _deep(content, name)
     return planes((deep / np.float32(65535)).astype(np.float32)) if sixteen_bit == "linear" else from_srgb(deep)
+
+
+def from_array(picture: NDArray[Any]) -> Tensor:
+    """An array as ``(3, H, W)`` linear light in [0, 1], float32; gray is replicated.
+
+    picture: ``(H, W)``, ``(H, W, 3)``, ``(3, H, W)`` or ``(1, H, W)``, the first of them that fits; uint8 holds sRGB
+    levels, floating point holds linear light in [0, 1]. UserError, one line, for any other.
+    """
+    shape = picture.shape
+    colour_last = picture.ndim == 2 or (picture.ndim == 3 and shape[2] == 3)
+    if not (colour_last or (picture.ndim == 3 and shape[0] in (1, 3))) or not picture.size:
+        raise UserError(f"a picture of {shape}; expected (H, W), (H, W, 3), (3, H, W) or (1, H, W)")
+    if not colour_last:
+        picture = picture[0] if shape[0] == 1 else picture.transpose(1, 2, 0)
+    if picture.dtype == np.uint8:
+        return from_srgb(picture)
+    right = "a picture holds uint8 sRGB levels, or floating-point linear light in [0, 1]"
+    if picture.dtype.kind != "f":
+        raise UserError(f"{right}; this one is of {picture.dtype}")
+    low, high = float(picture.min()), float(picture.max())
+    if not (low >= 0 and high <= 1):  # nor NaN
+        raise UserError(f"{right}; this one is of {picture.dtype} with values from {low:.4g} to {high:.4g}")
+    return planes(picture.astype(np.float32))
 
 
 def opened(content: bytes, name: str) -> Image.Image:

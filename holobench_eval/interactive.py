@@ -7,7 +7,6 @@ methods of files in processes of their own; what is here is for a notebook, wher
 from __future__ import annotations
 
 import hashlib
-import inspect
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,15 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from torch import Tensor
 
-from .core.errors import CellError, UserError
-from .core.panels import is_small
-from .core.plugins import build, params_of
-from .datasets.base import fit, from_srgb, planes, with_channels
-from .datasets.images import decode, read
-from .display.api import DisplaySpec, ideal_image
+from .core.arrays import Numbers, array_of, as_in_config, tensor_of
+from .core.errors import CellError, UserError, reason
+from .core.objects import method_of
+from .core.panels import is_small, rows_and_columns
+from .core.plugins import build
+from .datasets.base import fit, with_channels
+from .datasets.images import decode, from_array, read
+from .display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_plain
 from .metrics import catalogue, match
 from .metrics import score as _score
 from .optics.colour import srgb_encode
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float32]
-Numbers = ArrayLike | Tensor
+ENDINGS = (".png", ".jpg", ".jpeg")
 
 
 class OpenDisplay:
@@ -53,8 +54,8 @@ class OpenDisplay:
         Parameters
         ----------
         picture
-            A file (8-bit RGB or gray, sRGB), or an array ``(H, W)`` or ``(H, W, 3)``: uint8 holds sRGB levels, floating
-            point holds linear light in [0, 1].
+            A file (8-bit RGB or gray, sRGB), or an array ``(H, W)``, ``(H, W, 3)``, ``(3, H, W)`` or ``(1, H, W)``, the
+            first of them that fits: uint8 holds sRGB levels, floating point holds linear light in [0, 1].
 
         Returns
         -------
@@ -69,7 +70,7 @@ class OpenDisplay:
         if isinstance(picture, str | Path):
             light = decode(read(Path(picture)), str(picture), gray=True)
         else:
-            light = _light(np.asarray(picture))
+            light = from_array(array_of(picture, "a picture"))
         return with_channels(fit(light, self.spec.region.shape), len(self.spec.wavelengths)).numpy()
 
     def solve(self, method: Any, target: Numbers, **params: Any) -> Array:
@@ -78,12 +79,13 @@ class OpenDisplay:
         Parameters
         ----------
         method
-            A registered name, ``path/to/file.py:Name``, a function ``solve(target, bench)``, or an instance of a
-            method. A method that has to be trained needs a study, which keeps what it learned.
+            A registered name, ``path/to/file.py:Name``, a function ``solve(target, bench)`` or a partial of one, or a
+            method's class or an instance of it. It is given tensors of torch, and returns one or an array of NumPy. A
+            method that has to be trained needs a study, which keeps what it learned.
         target
             ``(C, h, w)`` linear light in [0, 1], as ``target`` gives it.
         **params
-            Of the method.
+            Of the method. Paths of files that it reads start in the working directory.
 
         Returns
         -------
@@ -93,7 +95,7 @@ class OpenDisplay:
         Raises
         ------
         UserError
-            An unknown method or parameter, or a method that has to be trained.
+            An unknown method or parameter, a method that has to be trained, or another target.
         CellError
             The method failed, or gave what no display can show.
         """
@@ -102,11 +104,18 @@ class OpenDisplay:
         if getattr(solver, "trains", False):
             raise UserError(f"method '{label}' has to be trained: name it in a study, and use holoeval run")
         handle = self._bench.for_method(solver, label, light, _name(light), 0)
-        with self._threads():
-            phase = solver.solve(light[None].clone(), handle)
-        if not isinstance(phase, Tensor) or tuple(phase.shape) != (1, len(light), *self.spec.shape):
-            found = tuple(phase.shape) if isinstance(phase, Tensor) else type(phase).__name__
+        try:
+            with self._threads():
+                phase = from_numpy(solver.solve(light[None].clone(), handle))
+        except (CellError, UserError):
+            raise
+        except Exception as error:  # whatever a stranger's method does
+            raise CellError(f"{label}: {reason(error)}") from error
+        if not is_plain(phase) or tuple(phase.shape) != (1, len(light), *self.spec.shape):
+            other = f"an array of {phase.dtype}" if isinstance(phase, np.ndarray) else type(phase).__name__
+            found = tuple(phase.shape) if isinstance(phase, Tensor) else other
             raise CellError(f"{label}: solve returned {found}, not a phase {(1, len(light), *self.spec.shape)}")
+        check_phase(phase[0], self.spec, label)
         return phase[0].detach().cpu().numpy()
 
     def capture(self, phase: Numbers, target: Numbers, repeat: int = 0) -> Array:
@@ -128,10 +137,12 @@ class OpenDisplay:
 
         Raises
         ------
+        UserError
+            The display shows no such phase, or another target.
         CellError
-            No display can show the phase, or the camera cannot be registered.
+            The camera cannot be registered.
         """
-        light, shown = self._target(target), _tensor(phase)
+        light, shown = self._target(target), self._phase(phase)
         with self._threads():
             return self._bench.photograph(shown, light, _name(light), repeat).image.cpu().numpy()
 
@@ -142,8 +153,13 @@ class OpenDisplay:
         -------
         ndarray
             ``(C, h, w)`` intensity in the scored region; the mean incident light on the panel is 1.
+
+        Raises
+        ------
+        UserError
+            The display shows no such phase.
         """
-        return ideal_image(_tensor(phase), self.spec).numpy()
+        return ideal_image(self._phase(phase), self.spec).numpy()
 
     @contextmanager
     def _threads(self) -> Iterator[None]:
@@ -156,34 +172,31 @@ class OpenDisplay:
             torch.set_num_threads(before)
 
     def _target(self, target: Numbers) -> Tensor:
-        light, wanted = _tensor(target), (len(self.spec.wavelengths), *self.spec.region.shape)
+        light, wanted = tensor_of(target, "a target"), (len(self.spec.wavelengths), *self.spec.region.shape)
         if tuple(light.shape) != wanted:
             raise UserError(f"a target of {tuple(light.shape)}; expected {wanted}, as OpenDisplay.target gives it")
-        return light
+        low, high = (float(value) for value in light.aminmax())
+        if not (low >= -1e-6 and high <= 1 + 1e-6):  # as the metric protocol; nor NaN
+            raise UserError(f"a target with values from {low:.4g} to {high:.4g}; expected linear light in [0, 1]")
+        return light.clamp_(0, 1)
+
+    def _phase(self, phase: Numbers) -> Tensor:
+        shown, wanted = tensor_of(phase, "a phase", radians=True), (len(self.spec.wavelengths), *self.spec.shape)
+        if tuple(shown.shape) != wanted:
+            raise UserError(f"a phase of {tuple(shown.shape)}; the display shows {wanted}")
+        if not bool(shown.isfinite().all()):
+            raise UserError("a phase with values that are NaN or infinite; expected radians")
+        return shown
 
     def _solver(self, method: Any, params: dict[str, Any]) -> tuple[Any, str]:
-        if isinstance(method, str):
-            return build("methods", method, params, self._folder), method.rpartition(":")[2]
-        if not inspect.isfunction(method):
-            if params:
-                raise UserError(f"{type(method).__name__} has its parameters already: {params_of(method)}")
-            return method, type(method).__name__
-        return _Function(method, params), method.__name__
-
-
-class _Function:
-    """A function as a method; what it declares (``camera = True``) is set on the function."""
-
-    def __init__(self, function: Any, params: Mapping[str, Any]) -> None:
-        vars(self).update(vars(function))
-        self._function, self._params = function, params
-
-    def solve(self, target: Tensor, bench: Any) -> Any:
-        return self._function(target, bench, **self._params)
+        given = {name: as_in_config(value) for name, value in params.items()}
+        if not isinstance(method, str):
+            return method_of(method, given)
+        return build("methods", method, given, self._folder), method.rpartition(":")[2]
 
 
 def open_display(
-    name: str = "leto-2020", panel: tuple[int, int] | None = (256, 256), seed: int = 0, folder: str | Path = "."
+    name: str | Path = "leto-2020", panel: tuple[int, int] | None = (256, 256), seed: int = 0, folder: str | Path = "."
 ) -> OpenDisplay:
     """Open a display, and register its camera.
 
@@ -206,7 +219,7 @@ def open_display(
     Raises
     ------
     UserError
-        There is no such display.
+        There is no such display, or it has no such panel.
     CellError
         Its camera cannot be registered.
 
@@ -220,7 +233,9 @@ def open_display(
     >>> "psnr_linear" in score(display.capture(phase, target), target)
     True
     """
-    return OpenDisplay(condition(name, panel, Path(folder)), seed, Path(folder))
+    if not isinstance(name, str | Path):
+        raise UserError(f"name: expected that of a display profile, or its path; got {type(name).__name__}")
+    return OpenDisplay(condition(str(name), rows_and_columns(panel), Path(folder)), seed, Path(folder))
 
 
 def open_bench(file: str | Path, seed: int = 0) -> OpenDisplay:
@@ -265,10 +280,19 @@ def score(capture: Numbers, target: Numbers, metrics: tuple[str, ...] | None = N
     -------
     dict
         Scores by name; ``psnr_linear`` is the one that reports lead with.
+
+    Raises
+    ------
+    UserError
+        Other shapes or values, or an unknown metric.
     """
     if metrics is None:
         metrics = tuple(metric.name for metric in catalogue() if metric.available() is None)
-    return _score(_tensor(capture), _tensor(target), metrics=metrics)
+    light, wanted = tensor_of(capture, "a capture"), tensor_of(target, "a target")
+    try:
+        return _score(light, wanted, metrics=metrics)
+    except ValueError as error:
+        raise UserError(str(error)) from None
 
 
 def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path = "compared.jpg") -> Path:
@@ -281,28 +305,42 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     captures
         ``(C, h, w)`` linear light, by the names of their columns.
     path
-        Of the picture, a JPEG.
+        Of the picture: a PNG or a JPEG, as it ends in .png, .jpg or .jpeg.
 
     Returns
     -------
     Path
         The picture.
+
+    Raises
+    ------
+    UserError
+        No captures, other shapes or values, or a path that ends otherwise.
     """
     from .report.charts.comparison import draw_comparison
     from .report.charts.gallery import Column, Tile, error_limit, error_map
 
+    place = Path(path)
+    if place.suffix.lower() not in ENDINGS:
+        raise UserError(f"path: '{path}' should end in {', '.join(ENDINGS)}")
+    if not isinstance(captures, Mapping) or not all(isinstance(name, str) for name in captures):
+        raise UserError('captures: expected arrays by their names, such as {"wirtinger": image}')
     if not captures:
         raise UserError("no captures to compare")
-    wanted = _tensor(target)
-    truth = _picture(wanted)
-    columns, errors = [], []
-    for name, capture in captures.items():
-        image = _tensor(capture)
-        shown, scores = _picture(match(image, wanted)[0]), score(image, wanted, ("psnr", "ssim"))
+    wanted = tensor_of(target, "a target")
+    images = {name: tensor_of(capture, f"capture '{name}'") for name, capture in captures.items()}
+    for name, image in images.items():
+        if image.shape != wanted.shape:
+            raise UserError(
+                f"capture '{name}' of {tuple(image.shape)}; expected that of the target, {tuple(wanted.shape)}"
+            )
+    measured = {name: score(image, wanted, ("psnr", "ssim")) for name, image in images.items()}
+    truth, columns, errors = _picture(wanted), [], []
+    for name, scores in measured.items():
+        shown = _picture(match(images[name], wanted)[0])
         note = f"{scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
         columns.append(Column(name, (Tile(shown, note),)))
         errors.append(error_map(shown, truth))
-    place = Path(path)
     place.parent.mkdir(parents=True, exist_ok=True)
     draw_comparison(
         place, "captures, each at the brightness that fits best", [("", truth)], columns, error_limit(errors)
@@ -336,20 +374,6 @@ def load_records(folder: str | Path) -> pd.DataFrame:
 def _name(target: Tensor) -> str:
     """What the noise of a target's captures depends on."""
     return hashlib.sha256(target.numpy().tobytes()).hexdigest()[:16]
-
-
-def _tensor(values: Numbers) -> Tensor:
-    return torch.as_tensor(values if isinstance(values, Tensor) else np.array(values)).detach().cpu().float()
-
-
-def _light(picture: NDArray[Any]) -> Tensor:
-    if picture.ndim not in (2, 3) or (picture.ndim == 3 and picture.shape[2] != 3) or not picture.size:
-        raise UserError(f"a picture of {picture.shape}; expected (H, W) or (H, W, 3)")
-    if picture.dtype == np.uint8:
-        return from_srgb(picture)
-    if picture.dtype.kind != "f" or not bool(((picture >= 0) & (picture <= 1)).all()):
-        raise UserError("a picture holds uint8 sRGB levels, or floating-point linear light in [0, 1]")
-    return planes(picture.astype(np.float32))
 
 
 def _picture(light: Tensor) -> NDArray[np.float64]:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import doctest
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 import holobench_eval as hb
 from holobench_eval import interactive
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.report.charts.comparison import GAP, HEADER, SIDE, tile_size
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
@@ -86,6 +89,77 @@ def test_a_function_an_instance_and_a_file_are_the_same_method(tmp_path: Path, t
     assert all(np.array_equal(phase, np.ones((3, 128, 128), np.float32)) for phase in phases)
 
 
+@dataclass(frozen=True)
+class Random:
+    """A random phase, as a tensor or as an array of NumPy."""
+
+    array: bool = False
+    double: bool = False
+
+    def solve(self, target, bench):
+        phase = 6 * torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("phase"))
+        phase = phase.double() / 3 if self.double else phase
+        return phase.numpy() if self.array else phase
+
+
+@pytest.mark.parametrize("double", [False, True])
+def test_a_phase_of_numpy_scores_what_its_tensor_scores(
+    display: hb.OpenDisplay, target: interactive.Array, double: bool
+) -> None:
+    tensor, array = (display.solve(Random(array, double), target) for array in (False, True))
+    assert array.dtype == tensor.dtype
+    assert np.array_equal(array, tensor)
+    first, second = (hb.score(display.capture(phase, target), target, ("psnr",)) for phase in (tensor, array))
+    assert first == second
+
+
+@pytest.mark.parametrize(
+    ("method", "params"),
+    [
+        (partial(flat, level=2.0), {}),
+        (partial(flat, level=1.0), {"level": 2.0}),
+        (Flat, {"level": np.float32(2)}),
+        (partial(Flat, level=2.0), {}),
+        (partial(Flat, level=1.0), {"level": 2.0}),
+        (Flat(2.0).solve, {}),
+    ],
+)
+def test_a_class_and_a_partial_are_methods(display, target, method, params) -> None:
+    assert np.array_equal(display.solve(method, target, **params), np.full((3, 128, 128), 2, np.float32))
+
+
+def test_what_a_function_declares_holds_for_its_partial(display: hb.OpenDisplay, target: interactive.Array) -> None:
+    def with_camera(target, bench, level):
+        bench.capture(torch.full((3, 128, 128), level))
+        return flat(target, bench)
+
+    with_camera.camera = True
+    assert display.solve(partial(with_camera, level=1.0), target).shape == (3, 128, 128)
+
+
+def test_a_failure_is_one_line_and_has_its_cause(display: hb.OpenDisplay, target: interactive.Array) -> None:
+    def failing(target, bench):
+        raise KeyError("two\nlines")
+
+    with pytest.raises(CellError, match=r"^failing: KeyError: ") as found:
+        display.solve(failing, target)
+    assert "\n" not in str(found.value)
+    assert isinstance(found.value.__cause__, KeyError)
+
+
+def test_a_phase_file_is_shown(
+    display: hb.OpenDisplay, target: interactive.Array, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    levels = np.random.default_rng(0).integers(0, 256, (128, 128, 3), dtype=np.uint8)
+    (tmp_path / "phases").mkdir()
+    Image.fromarray(levels).save("phases/cat.png")
+    phase = display.solve("phases", target, file="phases/cat.png")
+    assert phase == pytest.approx(levels.transpose(2, 0, 1) / 256 * 2 * np.pi, abs=1e-6)
+    np.save("phases/cat.npy", phase)
+    assert np.array_equal(display.solve("phases", target, file=Path("phases/cat.npy")), phase)
+
+
 def test_a_camera_is_for_those_who_declare_it(display: hb.OpenDisplay, target: interactive.Array) -> None:
     def with_camera(target, bench):
         bench.capture(torch.zeros(3, 128, 128))
@@ -105,10 +179,26 @@ def test_levels_and_light_give_the_same_target(display: hb.OpenDisplay, tmp_path
     assert display.target(np.full((50, 70, 3), light)) == pytest.approx(wanted, abs=1e-6)
 
 
+def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
+    light = np.random.default_rng(0).random((50, 60, 3), dtype=np.float32)
+    wanted = display.target(light)
+    assert np.array_equal(display.target(light.transpose(2, 0, 1)), wanted)
+    assert np.array_equal(display.target(torch.tensor(light, requires_grad=True).permute(2, 0, 1)), wanted)
+    assert np.array_equal(display.target(light[None, ..., 0]), display.target(light[..., 0]))
+    narrow = light[:3]  # rows, columns, colours
+    assert np.array_equal(display.target(narrow), display.target(narrow.transpose(2, 0, 1).copy()))
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda d, t: d.target(np.ones((3, 50, 50))), r"a picture of \(3, 50, 50\); expected \(H, W\) or \(H, W, 3\)"),
+        (lambda d, t: d.target(np.ones((2, 50, 50))), r"a picture of \(2, 50, 50\); expected \(H, W\), \(H, W, 3\)"),
+        (
+            lambda d, t: d.target(np.full((50, 50), np.nan)),
+            "linear light in .*; this one is of float64 with values from nan",
+        ),
+        (lambda d, t: d.target(np.ones((50, 50), int)), "linear light in .*; this one is of int64"),
+        (lambda d, t: d.target([[0.1], [0.1, 0.2]]), "a picture whose rows differ in length"),
         (lambda d, t: d.target(np.full((50, 50), 2.0)), r"linear light in \[0, 1\]"),
         (lambda d, t: d.target("gone.png"), "gone.png: no such file"),
         (lambda d, t: d.solve("wirtingre", t), "did you mean 'wirtinger'"),
@@ -117,7 +207,47 @@ def test_levels_and_light_give_the_same_target(display: hb.OpenDisplay, tmp_path
         (lambda d, t: d.solve(Flat(), t, level=1.0), "has its parameters already"),
         (lambda d, t: d.solve("wirtinger", t[:, 1:]), "as OpenDisplay.target gives it"),
         (lambda d, t: d.solve(lambda target, bench: 3, t), r"solve returned int, not a phase \(1, 3, 128, 128\)"),
+        (
+            lambda d, t: d.solve(lambda target, bench: np.ones((1, 3, 128, 128), int), t),
+            "returned an array of int64, not",
+        ),
+        (lambda d, t: d.solve(lambda target, bench: torch.full((1, 3, 128, 128), torch.nan), t), "NaN or infinite"),
+        (lambda d, t: d.solve(lambda target: 3, t), r"lambda>\(target\) cannot be called with target, bench"),
+        (
+            lambda d, t: d.solve(flat, t, levle=1),
+            r"flat\(target, bench, level\) .* unexpected keyword argument 'levle'",
+        ),
+        (lambda d, t: d.solve(partial(flat, levle=1), t), "unexpected keyword argument 'levle'"),
+        (lambda d, t: d.solve(partial(Flat, 1.0), t), "partial of 'Flat' with positional parameters"),
+        (lambda d, t: d.solve(Flat, t, levle=1), "'Flat' has no parameter 'levle'; did you mean 'level'"),
+        (lambda d, t: d.solve(int, t), "class 'int' is not a dataclass with a method 'solve'"),
+        (lambda d, t: d.solve(3, t), "a method of type 'int'; expected a name"),
+        (lambda d, t: d.solve("wirtinger", t * np.nan), r"a target with values from nan to nan; .* in \[0, 1\]"),
+        (lambda d, t: d.solve("wirtinger", t * 2), r"a target with values from 0 to .*; expected .* in \[0, 1\]"),
+        (lambda d, t: d.solve("wirtinger", t + 1j), "a target of complex64; expected real numbers"),
+        (lambda d, t: d.solve("phases", t, file="gone.png"), "gone.png: no such file"),
         (lambda d, t: d.capture(np.zeros((3, 5, 5)), t), "the display shows"),
+        (
+            lambda d, t: d.capture(np.zeros((1, 128, 128)), t),
+            r"phase of \(1, 128, 128\); the display shows \(3, 128, 128\)",
+        ),
+        (lambda d, t: d.capture(np.ones((3, 128, 128), np.complex64), t), "phase of complex64; expected radians"),
+        (lambda d, t: d.ideal(torch.ones((3, 128, 128)) * 1j), "phase of complex64; expected radians"),
+        (lambda d, t: d.capture(np.ones((3, 128, 128), np.uint8), t), "phase of uint8; expected radians"),
+        (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase with values that are NaN or infinite"),
+        (lambda d, t: hb.open_display("ideal", panel=(256.0, 256)), r"rows and columns such as .*; got \(256.0, 256\)"),
+        (lambda d, t: hb.open_display("ideal", panel=256), "rows and columns such as .*; got 256"),
+        (lambda d, t: hb.open_display("ideal", panel=(128, 128, 3)), "rows and columns such as"),
+        (lambda d, t: hb.open_display("ideal", panel=(3, 128)), "a panel has 64 to 8192 pixels a side"),
+        (lambda d, t: hb.open_display(3), "name: expected that of a display profile, or its path; got int"),
+        (lambda d, t: hb.score(t[:, 1:], t), "must both be"),
+        (lambda d, t: hb.score(t, t, ("psrn",)), "did you mean 'psnr'"),
+        (lambda d, t: hb.compare(t, {"a": t[:, 1:]}), r"capture 'a' of \(3, 103, 104\); expected .* \(3, 104, 104\)"),
+        (lambda d, t: hb.compare(t, {"a": t * np.nan}), "not finite"),
+        (lambda d, t: hb.compare(t, {"a": t + 1j}), "capture 'a' of complex64"),
+        (lambda d, t: hb.compare(t, {3: t}), "captures: expected arrays by their names"),
+        (lambda d, t: hb.compare(t, [t]), "captures: expected arrays by their names"),
+        (lambda d, t: hb.compare(t, {"a": t}, "compared.tif"), "'compared.tif' should end in .png, .jpg, .jpeg"),
         (lambda d, t: hb.compare(t, {}), "no captures to compare"),
         (lambda d, t: hb.load_records("gone"), "no records.csv"),
     ],
@@ -129,9 +259,27 @@ def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:
 
 
 def test_captures_are_compared_in_a_picture(display: hb.OpenDisplay, target: interactive.Array, tmp_path: Path) -> None:
-    ideal = display.ideal(np.zeros((3, 128, 128)))
-    path = hb.compare(target, {"flat": ideal, "perfect": target}, tmp_path / "new" / "compared.jpg")
-    assert path.stat().st_size > 10_000
+    mirrored, turned = target[:, :, ::-1], target[:, ::-1]
+    path = hb.compare(target, {"mirrored": mirrored / 4, "turned": 3 * turned}, tmp_path / "new" / "compared.png")
+    page = np.asarray(Image.open(path)).astype(int)
+    tall, wide = tile_size(target.shape[1:])
+    assert (tall, wide) == (2 * target.shape[1], 2 * target.shape[2])
+    for column, picture in enumerate((target, mirrored, turned)):
+        left = SIDE + column * (wide + GAP)
+        tile = page[HEADER : HEADER + tall, left : left + wide]
+        factors = (picture * target).sum((1, 2)) / np.square(picture).sum((1, 2))  # brightness that fits best
+        light = (factors[:, None, None] * picture).clip(0, 1)
+        levels = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+        wrong = np.abs(tile - levels.transpose(1, 2, 0).repeat(2, axis=0).repeat(2, axis=1)).max(-1) > 1
+        assert wrong.mean() < (0.01 if column == 0 else 1e-9)  # the target has a frame around the enlarged window
+
+
+@pytest.mark.parametrize(("ending", "format"), [(".png", "PNG"), (".PNG", "PNG"), (".jpg", "JPEG"), (".JPEG", "JPEG")])
+def test_the_ending_says_what_a_comparison_is(
+    target: interactive.Array, tmp_path: Path, ending: str, format: str
+) -> None:
+    path = hb.compare(target, {"same": target}, tmp_path / f"compared{ending}")
+    assert Image.open(path).format == format
 
 
 def test_records_of_a_report_are_read() -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import Parameter
@@ -368,22 +369,17 @@ def is_plain(value: object) -> bool:
     return type(value) in (Tensor, Parameter)
 
 
+def from_numpy(value: Any) -> Any:
+    """What a method returned: an array of float32 or float64 as the tensor that it stands for, all else as it is."""
+    if type(value) is not np.ndarray or value.dtype.kind != "f" or value.dtype.itemsize not in (4, 8):
+        return value
+    return torch.from_numpy(np.array(value, dtype=value.dtype.newbyteorder("="), order="C"))
+
+
 def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
-    """Refuse what no display can show.
+    """Refuse a phase ``(C, H, W)`` [rad] that no display can show. label: name of the method in the error message.
 
-    Parameters
-    ----------
-    phase
-        ``(C, H, W)`` real numbers [rad].
-    spec
-        The display's nominal optics.
-    label
-        Name of the method in the error message.
-
-    Raises
-    ------
-    CellError
-        Another shape or type, a subclass of ``Tensor`` among them, or values that are not finite.
+    CellError for another shape or type, a subclass of ``Tensor`` among them, and for values that are not finite.
     """
     who = f"{label}: " if label else ""
     if not is_plain(phase):

@@ -20,6 +20,7 @@ from .api import (
     Simulation,
     check_phase,
     efficiency,
+    from_numpy,
     white_irradiance,
 )
 from .metered import MeteredDisplay, MethodHandles
@@ -55,7 +56,7 @@ class LearnedBench(MethodHandles):
         """The predicted capture of ``phase`` ``(C, H, W)`` [rad]; the exposure does not matter without noise."""
         check_phase(phase, self.spec, label)
         handle = MeteredDisplay(self, label, target.to(self.device), (self.seed, item, repeat), learned=self.learned)
-        image = self.method.predict(phase[None].to(self.device), handle)[0].detach().cpu()
+        image = from_numpy(self.method.predict(phase[None].to(self.device), handle))[0].detach().cpu()
         light = tuple(white_irradiance(target, self.spec).tolist())
         capture = Capture(image, dark=0.0, white=float("inf"), gain=(1.0,) * len(image))
         return RectifiedCapture(

@@ -12,7 +12,7 @@ from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
 from ..display import CalibratedBench, MeteredDisplay, load_profile
-from ..display.api import is_plain
+from ..display.api import from_numpy, is_plain
 from ..study.opening import open_bench
 from ..study.versions import method_version
 
@@ -78,7 +78,9 @@ def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, camera:
     name, before = type(method).__name__, target.clone()
     shape = (*target.shape[:2], *bench.spec.shape)
     phase, handle = _solve(method, bench, target)
-    assert is_plain(phase), f"{name}.solve returned {type(phase).__name__}, not a plain torch.Tensor"
+    assert is_plain(phase), (
+        f"{name}.solve returned {type(phase).__name__}, not a plain torch.Tensor or a NumPy array of float32 or float64"
+    )
     assert tuple(phase.shape) == shape, f"{name}.solve returned {tuple(phase.shape)} for {shape}"
     assert phase.is_floating_point(), f"{name}.solve returned {phase.dtype}, not a phase in radians"
     assert bool(phase.isfinite().all()), f"{name}.solve returned a phase with NaN or infinite values"
@@ -94,4 +96,4 @@ def _check_repeatable(method: Any, bench: CalibratedBench, target: Tensor) -> No
 def _solve(method: Any, bench: CalibratedBench, target: Tensor) -> tuple[Any, MeteredDisplay]:
     handle = bench.for_method(method, type(method).__name__, target[0], item="contract", repeat=0)
     torch.seed()  # another one at every call: it shows up a method that draws from the global generator
-    return method.solve(target, handle), handle
+    return from_numpy(method.solve(target, handle)), handle

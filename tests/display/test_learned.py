@@ -45,6 +45,16 @@ def test_a_capture_is_what_the_network_predicts(display):
     assert shot.efficiency == pytest.approx(float((shot.image.mean((1, 2)) / TARGET.mean((1, 2))).mean()))
 
 
+class Array(Shade):
+    def predict(self, phase, bench):
+        return super().predict(phase, bench).detach().numpy()
+
+
+def test_a_prediction_may_be_an_array_of_numpy(display):
+    image = LearnedBench(SPEC, Array(), display.learned, 3).photograph(PHASE, TARGET, "t", 0).image
+    assert torch.equal(image, display.photograph(PHASE, TARGET, "t", 0).image)
+
+
 def test_a_capture_does_not_depend_on_repeat_or_exposure(display):
     first = display.photograph(PHASE, TARGET, "t", 0).image
     assert torch.equal(first, display.photograph(PHASE, TARGET, "t", 1, exposure="matched").image)

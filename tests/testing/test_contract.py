@@ -26,6 +26,18 @@ class Bare(Good):
 
 
 @dataclass(frozen=True)
+class Array(Good):
+    def solve(self, target: Tensor, bench: Any) -> Any:
+        return super().solve(target, bench).double().numpy()
+
+
+@dataclass(frozen=True)
+class Levels(Good):
+    def solve(self, target: Tensor, bench: Any) -> Any:
+        return super().solve(target, bench).byte().numpy()
+
+
+@dataclass(frozen=True)
 class Photographing(Good):
     camera: ClassVar[bool] = True
 
@@ -95,7 +107,7 @@ class Flagged(Good):
     privileged: bool = True
 
 
-@pytest.mark.parametrize("method", [Good, Good(2.0), Bare, Photographing])
+@pytest.mark.parametrize("method", [Good, Good(2.0), Bare, Array, Photographing])
 def test_a_method_that_keeps_the_contract_passes(method: Any) -> None:
     check_method(method)
 
@@ -108,6 +120,7 @@ def test_a_method_that_keeps_the_contract_passes(method: Any) -> None:
         (Unbatched, r"returned \(1, 1, 64, 64\) for \(2, 1, 64, 64\)"),
         (Broken, "NaN or infinite"),
         (Complex, "not a phase in radians"),
+        (Levels, "returned ndarray, not a plain torch.Tensor or a NumPy array of float32 or float64"),
         (Loose, "can be changed after it was made"),
         (Needy, "default for every parameter"),
         (Flagged, "must be a ClassVar"),

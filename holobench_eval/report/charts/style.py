@@ -106,7 +106,7 @@ def save_picture(pixels: NDArray[np.uint8], path: Path) -> None:
     that makes it small enough.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    if path.suffix == ".png":
+    if path.suffix.lower() == ".png":
         Image.fromarray(pixels).save(path, dpi=(DPI, DPI), optimize=True)
         return
     for quality in QUALITIES:

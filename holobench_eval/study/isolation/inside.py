@@ -30,12 +30,14 @@ from ...core.device import find, moved, repeatable
 from ...core.errors import CellError, UserError
 from ...core.parameters import words
 from ...core.schema import FieldError
+from ...display.api import from_numpy
 from ..versions import method_version
 from .handles import SolvingHandle, TrainingHandle
 from .messages import Channel
 
 FLAGS = ("camera", "privileged", "trains", "follows", "planes", "form", "tuned", "version")
 FUNCTIONS = ("solve", "solve_planes", "predict", "prepare", "estimates", "available", "files")
+PICTURES = ("solve", "solve_planes", "predict")  # whose results are arrays of NumPy, too
 HIDDEN = ("display.simulated", "study", "lab", "report", "commands", "testing")  # the bench and the harness
 HANDLES = {"solving": SolvingHandle, "training": TrainingHandle}
 
@@ -189,6 +191,8 @@ def _result(
         for argument in args
     ]
     result = getattr(method, function)(*own)
+    if function in PICTURES:
+        return from_numpy(result)
     return list(result) if function in ("estimates", "files") else result
 
 

@@ -14,7 +14,7 @@ from torch import Tensor
 from ...core.device import moved
 from ...core.hashing import canonical
 from ...display import RectifiedCapture
-from ...display.api import Exposure, is_plain
+from ...display.api import Exposure, from_numpy, is_plain
 from ...metrics import match
 from .. import cost, isolation, opening
 from ..artifacts import Artifact
@@ -72,8 +72,9 @@ def _foresee(job: Job) -> Foreseen:
         watch = cost.start(job.device, process)
         predicted = method.predict(own, handle)
         taken = watch.stop()
+    predicted = from_numpy(predicted)
     if not is_plain(predicted) or tuple(predicted.shape) != (1, *target.shape):
-        raise wrong_output(job, "predict", predicted, f"an image {(1, *target.shape)}")
+        raise wrong_output(task.label, "predict", predicted, f"an image {(1, *target.shape)}")
     return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned)
 
 
@@ -144,8 +145,11 @@ def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch
     item, own = hologram.source[3], target.to(device, copy=True)
     method = isolation.solver(hologram.method, json.loads(hologram.params), folder, *apart)
     handle = bench.for_method(method, hologram.method, own, item=item, repeat=hologram.repeat)
-    phase: Tensor = method.solve(own[None], handle).detach().cpu()[0]
-    return phase
+    phase = from_numpy(method.solve(own[None], handle))
+    if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
+        raise wrong_output(hologram.method, "solve", phase, f"a phase (1, {len(target)}, H, W)")
+    solved: Tensor = phase.detach().cpu()[0]
+    return solved
 
 
 @lru_cache(maxsize=64)

@@ -15,7 +15,7 @@ from ...core.errors import BudgetError, CellError
 from ...core.hashing import digest
 from ...core.io import write_atomically
 from ...display import MeteredDisplay
-from ...display.api import is_plain
+from ...display.api import from_numpy, is_plain
 from .. import cost, isolation
 from ..artifacts import Artifact, read_tensors
 from ..cost import Cost
@@ -71,17 +71,18 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         watch = cost.start(job.device, process)
         phase, stopped = _within_budget(method, solve, handle)
         taken = watch.stop()
+    phase = from_numpy(phase)
     if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
-        raise wrong_output(job, "solve", phase, f"a phase (1, {len(target)}, H, W)")
+        raise wrong_output(task.label, "solve", phase, f"a phase (1, {len(target)}, H, W)")
     cost.keep(job.timing, taken)
     return Solution(phase.detach().cpu()[0], handle.captures, taken, stopped, learned)
 
 
-def wrong_output(job: Job, function: str, output: Any, wanted: str) -> CellError:
+def wrong_output(label: str, function: str, output: Any, wanted: str) -> CellError:
     """The error for an ``output`` that is not what was wanted."""
     named = output.type_name if isinstance(output, isolation.Unsendable) else type(output).__name__
     actual = tuple(output.shape) if is_plain(output) else named
-    return CellError(f"{job.task.label}: {function} returned {actual}, not {wanted}")
+    return CellError(f"{label}: {function} returned {actual}, not {wanted}")
 
 
 def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[Any, str]:

@@ -1,0 +1,52 @@
+"""What a notebook passes as numbers: arrays of NumPy, tensors of torch, lists. What is wrong is told in one line."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+from torch import Tensor
+
+from .errors import UserError
+
+Numbers = ArrayLike | Tensor
+
+
+def array_of(values: Numbers, what: str) -> NDArray[Any]:
+    """The numbers as NumPy has them, on the CPU and without a gradient.
+
+    what: these numbers, in the UserError for lists that are no array. An array comes back as it is, not as a copy.
+    """
+    if isinstance(values, Tensor):
+        values = values.detach().cpu().resolve_conj().resolve_neg()
+        return (values.float() if values.dtype == torch.bfloat16 else values).numpy()  # NumPy has no such type
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise UserError(f"{what} whose rows differ in length; expected an array") from None
+
+
+def tensor_of(values: Numbers, what: str, radians: bool = False) -> Tensor:
+    """Real numbers as a tensor of single precision, in memory of its own.
+
+    what: these numbers, in the UserError for complex ones and for what are none. radians: integers are refused, too,
+    since they would be levels of a panel.
+    """
+    array = array_of(values, what)
+    if array.dtype.kind not in ("f" if radians else "fiub"):
+        right = "radians as floating point, as np.angle gives them" if radians else "real numbers"
+        raise UserError(f"{what} of {array.dtype}; expected {right}")
+    return torch.from_numpy(array.astype(np.float32, order="C"))
+
+
+def as_in_config(value: Any) -> Any:
+    """A parameter as a config would give it: a path as text, a number of NumPy's as one of Python.
+
+    All else stays as it is; what no config could hold is refused where the method is built.
+    """
+    if isinstance(value, PurePath):
+        return str(value)
+    return value.item() if isinstance(value, np.generic) else value

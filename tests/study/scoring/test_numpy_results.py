@@ -1,0 +1,141 @@
+"""A method may give NumPy's arrays: each scores to the last digit what the tensor of the same numbers scores."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from holobench_eval.display.api import from_numpy
+from tests.support.trained_study import compute
+
+METHODS = """
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+
+@dataclass(frozen=True)
+class Tensors:
+    double: bool = False
+
+    def solve(self, target, bench):
+        phase = 6 * torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("start"))
+        return phase.double() / 3 if self.double else phase
+
+    def predict(self, phase, bench):
+        return torch.rand((*phase.shape[:2], *bench.spec.region.shape), generator=bench.generator("light"))
+
+
+@dataclass(frozen=True)
+class Arrays(Tensors):
+    def solve(self, target, bench):
+        return np.asfortranarray(super().solve(target, bench).numpy())
+
+    def predict(self, phase, bench):
+        return super().predict(phase, bench).numpy()[..., ::-1][..., ::-1]
+
+
+def array(target, bench):
+    return Arrays().solve(target, bench)
+
+
+def levels(target, bench):
+    return np.zeros((*target.shape[:2], *bench.spec.shape), np.uint8)
+"""
+
+CONFIG = """\
+title: "NumPy"
+display: {{profiles: [leto-mild], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{count: 1}}}}
+protocol: {{metrics: [psnr]}}
+isolation: {isolation}
+{measure}
+methods: [{methods}]
+"""
+
+
+def records(
+    folder: Path, methods: str, isolation: str = "none", measure: str = "measure: picture"
+) -> dict[str, dict[str, Any]]:
+    """The records of a study by label; one with NumPy's arrays in it as one without."""
+    folder.mkdir(exist_ok=True)
+    (folder / "mine.py").write_text(METHODS)
+    (folder / "study.yaml").write_text(CONFIG.format(isolation=isolation, measure=measure, methods=methods))
+    return {record["label"]: record for record in compute(folder / "study.yaml").records}
+
+
+def named(label: str, name: str, params: str = "{}") -> str:
+    return f'{{name: "mine.py:{name}", label: {label}, params: {params}}}'
+
+
+@pytest.mark.parametrize("isolation", ["none", "files"])
+def test_a_phase_scores_what_its_tensor_scores(tmp_path: Path, isolation: str) -> None:
+    double = "{double: true}"
+    methods = [named("t", "Tensors"), named("a", "Arrays"), named("function", "array")]
+    found = records(
+        tmp_path, ", ".join([*methods, named("t64", "Tensors", double), named("a64", "Arrays", double)]), isolation
+    )
+    assert {record["state"] for record in found.values()} == {"done"}, [r["reason"] for r in found.values()]
+    assert found["t"]["scores"] == found["a"]["scores"] == found["function"]["scores"] != found["t64"]["scores"]
+    assert found["t64"]["scores"] == found["a64"]["scores"]
+
+
+@pytest.mark.parametrize("isolation", ["none", "files"])
+def test_levels_are_no_phase(tmp_path: Path, isolation: str) -> None:
+    record = records(tmp_path, named("levels", "levels"), isolation)["levels"]
+    assert record["state"] == "failed"
+    assert record["reason"] == "CellError: levels: solve returned ndarray, not a phase (1, 3, H, W)"
+
+
+@pytest.mark.parametrize("isolation", ["none", "files"])
+def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path, isolation: str) -> None:
+    found = {}
+    for shown in ("Tensors", "Arrays"):
+        measure = f'measure: prediction\nholograms: {{name: "mine.py:{shown}"}}'
+        found[shown] = records(
+            tmp_path / shown, named("t", "Tensors") + ", " + named("a", "Arrays"), isolation, measure
+        )
+        assert {record["state"] for record in found[shown].values()} == {"done"}
+        assert found[shown]["t"]["scores"] == found[shown]["a"]["scores"]
+    assert found["Tensors"]["t"]["scores"] == found["Arrays"]["t"]["scores"]
+
+
+@pytest.mark.parametrize("isolation", ["none", "files"])
+def test_a_hologram_that_is_no_phase_is_named(tmp_path: Path, isolation: str) -> None:
+    measure = 'measure: prediction\nholograms: {name: "mine.py:levels"}'
+    reason = records(tmp_path, named("t", "Tensors"), isolation, measure)["t"]["reason"]
+    assert reason == "CellError: mine.py:levels: solve returned ndarray, not a phase (1, 3, H, W)"
+
+
+@pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])
+def test_real_numbers_become_a_tensor_of_its_own_memory(dtype: str) -> None:
+    array = np.arange(24, dtype=dtype).reshape(2, 3, 4)[:, ::-1].transpose(2, 0, 1)
+    array.flags.writeable = False
+    tensor = from_numpy(array)
+    assert tensor.dtype == (torch.float32 if dtype[1:] == "f4" else torch.float64)
+    assert tensor.is_contiguous()
+    assert np.array_equal(tensor.numpy(), array)
+    assert not np.shares_memory(tensor.numpy(), array)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.zeros(2, np.float16),
+        np.zeros(2, np.complex64),
+        np.zeros(2, np.uint8),
+        np.ma.zeros(2),
+        np.float32(1),
+        np.array([None]),
+        torch.zeros(2),
+        [1.0],
+        None,
+    ],
+)
+def test_all_else_stays_as_it_is(value: Any) -> None:
+    assert from_numpy(value) is value
