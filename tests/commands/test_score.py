@@ -261,6 +261,11 @@ def spoil_twin(path: Path) -> None:
     Image.open(path).save(path.with_suffix(".tif"))
 
 
+def spoil_name_of_target(path: Path) -> None:
+    target = path.parents[2] / "targets" / "coffee.png"
+    target.rename(target.with_name("coffee.png.png"))
+
+
 @pytest.mark.parametrize(
     ("spoil", "line"),
     [
@@ -272,6 +277,8 @@ def spoil_twin(path: Path) -> None:
         (spoil_twin, "another picture named 'coffee'"),
         (lambda path: path.write_bytes(b""), "not an image"),
         (lambda path: path.rename(path.with_name("coffe.png")), "did you mean 'coffee'"),
+        (lambda path: path.rename(path.with_name("coffee.png.png")), r"m/coffee.png.png; rename it coffee.png$"),
+        (spoil_name_of_target, r"targets/coffee.png.png; rename it coffee.png$"),
         (lambda path: Image.new("RGB", (8, 8)).save(path), "8 x 8 pixels"),
         (lambda path: shutil.rmtree(path.parent), "no folders in it"),
         (lambda path: path.rename(path.parents[1] / "loose.png"), "outside a method's folder"),
