@@ -23,8 +23,15 @@ if TYPE_CHECKING:
     from ..report.data.layout import Layout
     from ..study.folders.files import Folders
 
-# How files are read: as they are; captures and targets as sRGB; captures as linear light and targets as sRGB.
-VALUES = ("stored", "srgb", "linear")
+# How files are read.
+VALUES = {
+    "stored": "captures and targets are compared as they are stored, as pictures that are both sRGB. Captures that "
+    "count light (raw, without a gamma) need --values linear",
+    "srgb": "captures and targets are decoded from sRGB to linear light. Captures that count light (raw, without a "
+    "gamma) need --values linear",
+    "linear": "captures are taken as linear light, and targets are decoded from sRGB to it. Captures that were encoded "
+    "by the camera, as JPEGs are, need --values srgb or stored",
+}
 
 
 def score(
@@ -56,14 +63,10 @@ def score(
 
 
 def advice(results: Results) -> str:
-    """How to come to a ranking where no method has a score for every target; nothing where one has."""
-    lacking = [name for name in results.targets if name in set(results.holes["target"])]
-    pairs = [(label, condition) for condition in results.conditions for label in results.methods(condition)]
-    if not lacking or any(results.is_complete(*pair) for pair in pairs):
-        return ""
-    left = len(results.targets) - len(lacking)
-    without = f", or move the targets and captures of {', '.join(lacking)} away and rank by the other {left}"
-    return f"No method is ranked, since none has every target. Take the failed captures again{without * (left > 0)}."
+    """Which methods are not ranked since they lack targets, and what to do about it; nothing where none does."""
+    from ..report.answers.lacking import lacking
+
+    return lacking(results)
 
 
 def score_folders(
@@ -111,6 +114,7 @@ def score_folders(
     scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned)
     with scoring.store.locked():
         known = provenance.begin(output, described(folders, values), resumed=True)
+        console.print(f"--values {values}: {VALUES[values]}.", markup=False, highlight=False, soft_wrap=True)
         with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
             found = scoring.records(step)
         records = [asdict(record) for record in found]

@@ -39,6 +39,8 @@ FURTHEST_REFINED = 0.15  # of the target's longer side in the capture: how far a
 STEEPEST = 2.5  # between the scales at two corners
 OVERHANG = 2.0  # target pixels that may lie beyond the capture's border
 SCALES = (0.2, 8.0)  # capture pixels a target pixel
+PLAIN = "the target has structure in"  # begins what is refused by a fault of the target alone
+RESIZE = "resize the target"  # ends it
 IMPOSSIBLE = "folded"  # no camera sees a display so
 
 
@@ -273,7 +275,7 @@ def _fault(warp: Warp, frame: tuple[int, ...], partly: bool, around: float = 0.0
     if not SCALES[0] <= scales.min() <= SCALES[1]:
         return (
             f"it takes {scales.min():.3g} capture pixels for each of its own; {SCALES[0]:g} to {SCALES[1]:g} are "
-            "allowed: resize the target"
+            f"allowed: {RESIZE}"
         )
     return "" if partly else _overhang(warp, frame, around)
 
@@ -284,11 +286,11 @@ def _refuse_plain(reference: Frame) -> None:
     rows, columns = ({part[axis].start for part in parts} for axis in (0, 1))
     if len(parts) < FEWEST_PARTS or min(len(rows), len(columns)) < 2:
         share = f"{len(parts)} of its {PARTS * PARTS} parts"
-        raise CellError(f"the target has structure in {share} only, too little to find it by")
+        raise CellError(f"{PLAIN} {share} only, too little to find it by")
     slope_y, slope_x = np.gradient(reduced(reference, SIDE)[0].astype(np.float64))
     spread = np.linalg.eigvalsh(np.cov(slope_x.ravel(), slope_y.ravel()))
     if spread[0] < STRIPES * spread[1]:
-        raise CellError("the target has structure in one direction only, along which its place cannot be found")
+        raise CellError(f"{PLAIN} one direction only, along which its place cannot be found")
 
 
 def _overhang(warp: Warp, frame: tuple[int, ...], around: float) -> str:

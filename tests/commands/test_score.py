@@ -17,17 +17,16 @@ import typer
 from PIL import Image
 from rich.console import Console
 
-from holobench_eval.commands.score import advice, score_folders
 from holobench_eval.commands.score import score as command
+from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.imaging.align import Alignment
 from holobench_eval.metrics import score
-from holobench_eval.report import Results, read_records, records_frame
+from holobench_eval.report import read_records
 from holobench_eval.study.folders import scoring as scored_pictures
 from holobench_eval.study.folders.files import read_folders
 from tests.support.photographed import captured, photograph, pose, save
 from tests.support.reports import whole
-from tests.support.synthetic_study import layout, study
 
 REAL = Path(__file__).resolve().parents[2] / "../shared/captures/stanford-2021"
 PUBLISHED = {"sgd-asm": 20.94, "citl-asm": 25.16, "sgd-ours": 27.41}
@@ -261,6 +260,11 @@ def spoil_twin(path: Path) -> None:
     Image.open(path).save(path.with_suffix(".tif"))
 
 
+def spoil_name_of_target(path: Path) -> None:
+    target = path.parents[2] / "targets" / "coffee.png"
+    target.rename(target.with_name("coffee.png.png"))
+
+
 @pytest.mark.parametrize(
     ("spoil", "line"),
     [
@@ -272,6 +276,8 @@ def spoil_twin(path: Path) -> None:
         (spoil_twin, "another picture named 'coffee'"),
         (lambda path: path.write_bytes(b""), "not an image"),
         (lambda path: path.rename(path.with_name("coffe.png")), "did you mean 'coffee'"),
+        (lambda path: path.rename(path.with_name("coffee.png.png")), r"m/coffee.png.png; rename it coffee.png$"),
+        (spoil_name_of_target, r"targets/coffee.png.png; rename it coffee.png$"),
         (lambda path: Image.new("RGB", (8, 8)).save(path), "8 x 8 pixels"),
         (lambda path: shutil.rmtree(path.parent), "no folders in it"),
         (lambda path: path.rename(path.parents[1] / "loose.png"), "outside a method's folder"),
@@ -354,13 +360,21 @@ def test_three_published_captures_keep_their_order_and_their_scores(tmp_path, mo
     assert np.linalg.norm(np.mean(own, axis=0) - crop, axis=1).max() < 0.5
 
 
-def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path: Path) -> None:
-    records = study(tmp_path, size=24)
-    assert advice(Results(records_frame(records, layout()), layout())) == ""  # some methods have all
-    first = records[0]["cell"]["target"]
-    lost = {"state": "failed", "scores": {}, "reason": "cannot be aligned"}
-    holed = [{**one, **lost} if one["cell"]["target"] == first else one for one in records]
-    results = Results(records_frame(holed, layout()), layout())
-    assert f"move the targets and captures of {first}" in advice(results)
-    nothing = [{**one, **lost} for one in records]
-    assert advice(Results(records_frame(nothing, layout()), layout())).endswith("Take the failed captures again.")
+@pytest.mark.parametrize(
+    ("values", "line"),
+    [
+        ("stored", "--values stored: captures and targets are compared as they are stored"),
+        ("srgb", "--values srgb: captures and targets are decoded from sRGB to linear light"),
+        ("linear", "--values linear: captures are taken as linear light, and targets are decoded from sRGB"),
+    ],
+)
+def test_a_line_says_how_values_are_read(tmp_path, quick, values, line):
+    plain = np.full((1, 40, 50), 0.5, dtype=np.float32)  # refused at once
+    save(tmp_path / "captures" / "m" / "plain.png", plain[:, 5:])
+    save(tmp_path / "targets" / "plain.png", plain)
+    terminal = Console(file=io.StringIO(), width=80)
+    score_folders(tmp_path / "captures", tmp_path / "targets", tmp_path / "out", values, None, None, terminal)
+    said = [text for text in terminal.file.getvalue().splitlines() if text.startswith("--values")]
+    assert len(said) == 1
+    assert said[0].startswith(line)
+    assert ("need --values linear" in said[0]) == (values != "linear")

@@ -11,9 +11,10 @@ from ..data.marks import marked
 from ..data.phrases import difference, relation, tested, value, verdict
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES
-from ..data.text import number, p_value, percent, words
+from ..data.text import FILES, number, p_value, percent, words
 from ..markdown import Markdown, blocks, table
 from .kind import Kind, subjects
+from .lacking import lacking
 
 
 def sentences(results: Results) -> Iterator[str]:
@@ -22,6 +23,8 @@ def sentences(results: Results) -> Iterator[str]:
     if not subjects(results) and len(results.conditions) == 1:
         yield from everybody(results, results.conditions[0])
     yield best(results)
+    if results.layout.measure == FILES:
+        yield lacking(results)
     yield from online(results)
     yield from floor(results)
     yield from oracle(results)
@@ -66,7 +69,8 @@ def best(results: Results) -> str:
     track = " without a capture of the scored image" if ONLINE in results.categories else ""
     if not any(parts):
         ranked = any(results.ranking(name, categories=(ONLINE,)) for name in results.conditions)
-        return "" if ranked else "No method that competes has a score for every target, so none is ranked."
+        told = ranked or results.layout.measure == FILES  # by `lacking`
+        return "" if told else "No method that competes has a score for every target, so none is ranked."
     score, domain = results.headline, DOMAIN_NAMES.get(results.headline.domain)
     metric = f"{score.title} ({domain})" if domain else score.title
     return f"The best mean {metric}{track}: {'; '.join(filter(None, parts))}."
@@ -77,13 +81,22 @@ def _first(results: Results, condition: str) -> str:
     if not ranking:
         return ""
     first, score = ranking[0], results.headline
-    own = f"on {condition} {first}, {value(results, first, condition)}"
+    own = f"on {condition} {first}, {value(results, first, condition)}{_among(results, ranking, condition)}"
     if first == results.layout.baseline:
         test = tested(results, ranking[1], condition) if len(ranking) > 1 else None
         return f"{own}{f', followed by {ranking[1]}, {relation(score, test)}' if test else ''}"
     test = tested(results, first, condition)
     against = f", {relation(score, test)}" if test and first not in subjects(results) else ""
     return f"{own}{_spent(results, first, condition)}{against}{_ahead(results, ranking, condition)}"
+
+
+def _among(results: Results, ranking: Sequence[str], condition: str) -> str:
+    """Among how many methods one is the best, where others lack a target and are not ranked."""
+    rivals = [label for label in results.methods(condition) if results.layout.category(label) in OFFLINE]
+    if len(rivals) == len(ranking):
+        return ""
+    which = "the only one" if len(ranking) == 1 else f"among the {len(ranking)}"
+    return f", {which} of {len(rivals)} methods with a score for every target"
 
 
 def _spent(results: Results, label: str, condition: str) -> str:

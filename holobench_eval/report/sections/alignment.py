@@ -19,7 +19,7 @@ from ..section import Blocks, Figures, Report, Section
 
 AGREE = 0.2  # dB of the headline PSNR by which two aligners may differ before the report warns
 UNKNOWN = "–"
-FIGURES = 8  # pictures of alignments in the report; the others are beside it
+FIGURES = 8  # pictures of alignments in the report, of the worst; the others are beside it
 
 Records = Sequence[Mapping[str, Any]]
 
@@ -169,19 +169,30 @@ def _pose(geometry: Mapping[str, Any]) -> tuple[float, bool, float]:
 
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
-    """The first pictures of captures that were aligned with their targets; they were drawn when these were scored."""
+    """Pictures of the captures that are least like their targets; they were drawn when these were scored."""
+    found = {
+        (record["label"], record["cell"]["target"]): record["cell"]["geometry"].get("correlation", np.nan)
+        for record in _captures(report.records)
+    }
     done = report.results.frame[report.results.frame["state"] == DONE]
     drawn = [
-        (path, method, target)
+        (found[method, target], path, method, target)
         for method, target in zip(done["method"], done["target"], strict=True)
         if (path := report.figures / alignment_name(method, target)).is_file()
     ]
-    more = f" {len(drawn) - FIGURES} more are in the folder {report.figures.name}." if len(drawn) > FIGURES else ""
-    for path, method, target in drawn[:FIGURES]:
+    drawn.sort(key=lambda one: one[0])
+    more = (
+        f" Shown are the {FIGURES} of {len(drawn)} captures with the lowest correlation, the lowest first; the others "
+        f"are in the folder {report.figures.name}."
+        if len(drawn) > FIGURES
+        else ""
+    )
+    for correlation, path, method, target in drawn[:FIGURES]:
         yield (
             path,
-            f"{method}, {target}: the outline of the target on the capture, a dot at the target's upper left corner; "
-            f"and squares of the target and of the aligned, matched capture in turn.{more}",
+            f"{method}, {target}, correlation {correlation:.3f}: the outline of the target on the capture, a dot at "
+            "the target's upper left corner; and squares of the target and of the aligned, matched capture in "
+            f"turn.{more}",
         )
 
 

@@ -52,14 +52,30 @@ def read_folders(captures: Path, targets: Path) -> Folders:
     }
     for (_, name), path in capture_paths.items():
         if name not in target_paths:
-            raise UserError(
-                f"{path}: no target of this name in {targets}; {suggest(name, target_paths)}; rename it or take it away"
-            )
+            twice = _twice(path, target_paths.values())
+            right = twice or f"{suggest(name, target_paths)}; rename it or take it away"
+            raise UserError(f"{path}: no target of this name in {targets}; {right}")
     pictures = {name: checked(path) for name, path in target_paths.items()}
     photographs = {key: checked(path) for key, path in capture_paths.items()}
     pairings = {key: paired(picture, pictures[key[1]]) for key, picture in photographs.items()}
     notes = (*_notes(pictures, photographs), *_conversions(pictures, photographs, pairings))
     return Folders(pictures, photographs, pairings, notes)
+
+
+def _twice(capture: Path, targets: Iterable[Path]) -> str:
+    """What to rename where a capture and a target differ by an ending that stands there twice, as in my.png.png."""
+    for target in targets:
+        if _bare(target) == _bare(capture):
+            longer = max(capture, target, key=lambda path: len(path.stem))
+            return f"an ending stands twice in the name of {longer}; rename it {_bare(longer)}{longer.suffix}"
+    return ""
+
+
+def _bare(path: Path) -> str:
+    """A file's name without all endings of pictures."""
+    while path.suffix.lower() in CAPTURE_SUFFIXES:
+        path = path.with_suffix("")
+    return path.name
 
 
 def _methods(captures: Path) -> list[Path]:

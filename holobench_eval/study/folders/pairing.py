@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .pictures import Picture
+from .pictures import FEWEST_LEVELS, Picture
 
 NAMES = ("red", "green", "blue")
+DARK = 0.1  # of full scale
 LASER = 0.3  # of the strongest channel: what filters of a colour camera let through of a laser that is not theirs
-FEWEST_LEVELS = 8  # rounding to so many leaves an error of 29 dB, as large as that of a good hologram
 
-UNKNOWN = "which gray picture was shown is not known; save the target as it was shown, in gray"
+SAVE_TARGET = "save the target as it was shown, in gray"  # ends what is refused by a fault of the target
+UNKNOWN = f"which gray picture was shown is not known; {SAVE_TARGET}"
+NEARLY = "whose channels differ by a few levels of 255, as those of a gray picture that was saved as a JPEG in colour"
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,17 @@ def paired(capture: Picture, target: Picture) -> Pairing:
     """
     if capture.pixels_sha256 == target.pixels_sha256:
         return Pairing(refused="the capture is the target itself, value for value, and no photograph of it")
-    if capture.levels is not None and capture.levels <= FEWEST_LEVELS:
-        return Pairing(
-            refused=f"the capture is under-exposed: it has {capture.levels} levels of brightness, whose rounding would "
-            f"decide the score; more than {FEWEST_LEVELS} are needed, and a bright capture has a hundred"
-        )
     laser = _single_laser(capture, target)
+    levels = max(capture.levels) if laser is None else capture.levels[laser]
+    # A bright picture of few levels may be an honest one of a target that has no more, such as black and white.
+    if levels <= FEWEST_LEVELS and (capture.bright <= DARK or max(target.levels) > FEWEST_LEVELS):
+        return Pairing(
+            refused=f"the capture is under-exposed: it has {levels} levels of brightness, to which an offset or a "
+            f"stretch adds none, and whose rounding would decide the score; more than {FEWEST_LEVELS} are needed, and "
+            "a well exposed capture has a hundred"
+        )
+    if laser is not None and target.nearly_gray:
+        return Pairing(refused=f"the target is nearly gray, {NEARLY}; {SAVE_TARGET}")
     if laser is not None and not target.gray:
         return Pairing(
             refused=f"the capture has light in its {NAMES[laser]} channel alone and the target is in colour: {UNKNOWN}"
@@ -54,8 +61,12 @@ def paired(capture: Picture, target: Picture) -> Pairing:
         return Pairing()
     if capture.gray and target.gray:
         return Pairing("gray")
+    if capture.gray and target.nearly_gray:
+        return Pairing(refused=f"the capture is gray and the target nearly so, {NEARLY}; {SAVE_TARGET}")
     if capture.gray:
         return Pairing(refused=f"the capture is gray and the target in colour: {UNKNOWN}")
+    if capture.nearly_gray:
+        return Pairing(refused=f"the target is gray and the capture nearly so, {NEARLY}; save the capture in gray")
     shares = ", ".join(
         f"{value / max(capture.structure):.2f} in {name}" for name, value in zip(NAMES, capture.structure, strict=True)
     )

@@ -89,9 +89,76 @@ def test_a_capture_of_a_few_dark_levels_is_refused(tmp_path, offset, scale):
     assert "under-exposed: it has 4 levels" in refused
 
 
-@pytest.mark.parametrize("capture", [EQUAL, EQUAL * 20 / 255, (EQUAL > 0.5).astype(np.float32)])
-def test_a_dark_capture_of_enough_levels_and_a_bright_one_of_few_are_no_fault(tmp_path, capture):
+def dark_with_hot_pixels() -> Picture:
+    """Four levels, and 0.3 % of the pixels hot, each as bright as it likes."""
+    draw = np.random.default_rng(3)
+    capture = np.round(np.kron(EQUAL, np.ones((8, 8))) * 3) / 255
+    hot = draw.random(capture.shape[1:]) < 0.003
+    capture[:, hot] = draw.uniform(0.1, 1, hot.sum())
+    return capture.astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    "capture",
+    [
+        pytest.param((np.round(EQUAL * 3) + 30) / 255, id="pedestal"),
+        pytest.param(np.round(EQUAL * 3) / 3, id="stretched"),
+        pytest.param(dark_with_hot_pixels(), id="hot pixels"),
+    ],
+)
+def test_few_levels_are_few_with_an_offset_a_stretch_or_hot_pixels(tmp_path, capture):
+    refused = folders(tmp_path, capture, GRAY).pairings["m", "coffee"].refused
+    assert "under-exposed: it has 4 levels" in refused
+
+
+def test_the_levels_of_a_single_laser_are_those_of_its_channel(tmp_path):
+    capture = np.random.default_rng(4).integers(0, 12, EQUAL.shape).astype(np.float32) / 255
+    capture[0] = np.round(EQUAL[0] * 3) * 40 / 255
+    assert "under-exposed: it has 4 levels" in folders(tmp_path, capture, GRAY).pairings["m", "coffee"].refused
+
+
+@pytest.mark.parametrize("capture", [EQUAL, EQUAL * 20 / 255])
+def test_a_dark_capture_of_enough_levels_is_no_fault(tmp_path, capture):
     assert folders(tmp_path, capture, GRAY).pairings["m", "coffee"].refused == ""
+
+
+@pytest.mark.parametrize(("brightness", "is_refused"), [(0.8, False), (0.05, True)])
+def test_a_bright_capture_of_few_levels_is_no_fault_of_a_black_and_white_target_alone(tmp_path, brightness, is_refused):
+    two = (EQUAL > 0.5).astype(np.float32)
+    assert bool(folders(tmp_path / "two", brightness * two, two[:1]).pairings["m", "coffee"].refused) == is_refused
+    assert "it has 2 levels" in folders(tmp_path / "many", brightness * two, GRAY).pairings["m", "coffee"].refused
+
+
+@pytest.mark.parametrize("scene", [np.s_[:, 100:116, 200:220], np.s_[:, 100, 50:250]])
+def test_a_scene_that_is_nearly_all_black_is_judged_by_what_is_bright_in_it(tmp_path, scene):
+    black = np.zeros((1, 300, 400), dtype=np.float32)
+    black[scene] = photograph("coffee", (300, 400))[:1][scene]
+    assert (black > 0).mean() < 0.01
+    noise = np.abs(np.random.default_rng(5).normal(0, 0.6, black.shape)) / 255
+    seen = np.clip(0.9 * black + noise, 0, 1)
+    assert folders(tmp_path / "fair", seen, black).pairings["m", "coffee"].refused == ""
+    dim = np.clip(0.02 * black + noise, 0, 1)
+    assert "under-exposed" in folders(tmp_path / "dim", dim, black).pairings["m", "coffee"].refused
+
+
+def nearly_gray() -> Picture:
+    """A gray picture in colour, the channels apart by one level or two."""
+    apart = np.random.default_rng(6).integers(0, 3, EQUAL.shape)
+    return ((np.round(EQUAL * 240) + apart) / 255).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("capture", "target", "whose", "remedy"),
+    [
+        (nearly_gray(), GRAY, "the target is gray and the capture nearly so", "save the capture in gray"),
+        (0.9 * GRAY, nearly_gray(), "the capture is gray and the target nearly so", "save the target as it was shown"),
+        (laser(0), nearly_gray(), "the target is nearly gray", "save the target as it was shown"),
+    ],
+)
+def test_nearly_gray_is_called_so_with_its_remedy(tmp_path, capture, target, whose, remedy):
+    refused = folders(tmp_path, capture, target).pairings["m", "coffee"].refused
+    assert refused.startswith(f"{whose}, whose channels differ by a few levels of 255")
+    assert remedy in refused
 
 
 @pytest.mark.parametrize("name", ["coffee.bmp", "coffee.webp", "coffee.tiff"])

@@ -1,0 +1,59 @@
+"""Given pictures: which methods are not ranked since they lack targets, and how to rank them all."""
+
+from __future__ import annotations
+
+from ...study.folders.remedies import remedies
+from ..data.results import Results
+
+NAMED = 10  # methods, or targets of all of them
+NAMED_EACH = 3  # targets of a method
+
+
+def lacking(results: Results) -> str:
+    """Who lacks which targets, and what to do about it; empty where every method has a score for every target."""
+    pairs = [(label, condition) for condition in results.conditions for label in results.methods(condition)]
+    lacks = {pair: missing for pair in pairs if (missing := _missing(results, *pair))}
+    if not lacks:
+        return ""
+    ranked, total = len(pairs) - len(lacks), len(results.targets)
+    several = len(results.conditions) > 1
+    who = [
+        f"{label}{f' on {condition}' * several} lacks {_of(missing, total)}"
+        for (label, condition), missing in lacks.items()
+    ]
+    if ranked:
+        have = "1 method that has every target is" if ranked == 1 else f"{ranked} methods that have every target are"
+        said = f"Only the {have} ranked"
+    else:
+        said = "No method is ranked, since none has every target"
+    holes = results.holes[["state", "method", "target", "reason"]].itertuples(index=False, name=None)
+    way = remedies((str(state), str(method), str(target), str(reason)) for state, method, target, reason in holes)
+    return f"{said}: {_first(who, NAMED)}. {_with_fewer(results, lacks, way)}"
+
+
+def _missing(results: Results, label: str, condition: str) -> list[str]:
+    values = results.values(label, condition)
+    return [name for name, value in zip(results.targets, values, strict=True) if value != value]
+
+
+def _of(missing: list[str], total: int) -> str:
+    if len(missing) == total:
+        return f"all {total} targets" if total > 1 else "the target"
+    return f"{len(missing)} of {total} targets ({_first(missing, NAMED_EACH)})"
+
+
+def _with_fewer(results: Results, lacks: dict[tuple[str, str], list[str]], way: str) -> str:
+    """The remedies, and the targets by which all that have any score can be ranked as they are."""
+    some = [missing for missing in lacks.values() if len(missing) < len(results.targets)]
+    away = [name for name in results.targets if any(name in missing for missing in some)]
+    left = len(results.targets) - len(away)
+    if not away or not left:
+        return way
+    who = "all" if len(some) == len(lacks) else "all that have any score"
+    moved = f"move the targets and captures of {_first(away, NAMED)} away"
+    return f"{way[:-1]}, or {moved} and rank {who} by the {left} target{'s' * (left > 1)} left."
+
+
+def _first(names: list[str], most: int) -> str:
+    more = len(names) - most
+    return f"{', '.join(names[:most])}{f' and {more} more' if more > 0 else ''}"
