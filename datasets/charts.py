@@ -25,9 +25,11 @@ SAMPLES = 6  # samples a pixel and axis where the covered area of a pixel has no
 class Charts:
     """Charts of lines, bars, spokes, gray levels, squares and circles, for resolution, tone and geometry.
 
-    names: which, in which order; all by default. Charts are gray, in linear light from 0 to 1, the same in every
-    channel. They are drawn for the shape asked for, not resized: circles stay circles and the finest lines stay
-    one pixel wide. Edges within a pixel give the mean over its area.
+    Charts are gray, in linear light from 0 to 1, the same in every channel. They are drawn for the shape asked for, not
+    resized: circles stay circles and the finest lines stay one pixel wide. Edges within a pixel give the mean over its
+    area.
+
+    names: which, in which order; all by default.
     """
 
     names: tuple[str, ...] = ("tv_lines", "siemens_star", "usaf_bars", "gray_ramp", "checkerboard", "circle_grid")

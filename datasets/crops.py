@@ -41,14 +41,14 @@ class Crops:
     """Square crops, at native resolution, of the photographs inside scikit-image and matplotlib; and renderings.
 
     A centred grid of as many disjoint squares of ``size`` pixels as fit is laid over each photograph. Its crops are
-    the ``each`` squares nearest to its middle, the upper or left one of two equally near ones, without those whose
-    contrast is below ``FLAT``. A crop is named by its place in the grid: ``astronaut-2`` is the second square, row by
-    row. Crops of one photograph are one cluster; so are the renderings, still lifes of one generator. The photographs
-    are decoded as sRGB.
+    those nearest to its middle, as many as ``each`` says and the upper or left one of two equally near ones, without
+    those whose contrast (rms difference from the mean colour, in linear light) is below 0.05. A crop is named by its
+    place in the grid: ``astronaut-2`` is the second square, row by row. Crops of one photograph are one cluster; so are
+    the renderings, still lifes of one generator. The photographs are decoded as sRGB.
 
     size: pixels a side; 208 is the region that is scored on a panel of 256 x 256. A smaller region shows the middle
     of a crop, a larger one is refused: nothing is resized. each: crops of a photograph, at most. names: the
-    photographs, in this order (default: all of ``NAMES``). renderings: how many.
+    photographs, in this order; by default all that have such crops. renderings: how many.
     """
 
     size: Annotated[int, Interval(ge=32, le=4096)] = 208

@@ -38,14 +38,15 @@ SAMPLES = 2  # samples a pixel and axis, so that edges are smooth
 class DeadLeaves:
     """Generated images for training: discs that cover one another, of all sizes and colours.
 
-    The dead-leaves model of Lee, Mumford & Huang, "Occlusion models for natural images", Int. J. Comput. Vis.
-    41, 35-59 (2001): discs fall at random places, the later ones in front; radii have the density r^-3, under which
-    the image is scale invariant, from 2 px to 0.3 of the short side. A disc has one colour: a gray level and a
-    deviation of each channel from it, since the channels of photographs go mostly together.
+    The dead-leaves model of Lee, Mumford & Huang, "Occlusion models for natural images", Int. J. Comput. Vis. 41, 35-59
+    (2001): discs fall at random places, the later ones in front; radii have the density r^-3, under which the image is
+    scale invariant, from 2 px to 0.3 of the short side. A disc has one colour: a gray level and a deviation of each
+    channel from it, since the channels of photographs go mostly together. They are drawn for the shape asked for, not
+    resized.
 
     count: how many images; seed: another number gives other images; colours: "uniform", gray levels uniform in sRGB,
     with more contrast than photographs have, or "natural", with the mean and standard deviation of the photographs in
-    ImageNet, before clipping. Drawn for the shape asked for, not resized.
+    ImageNet, before clipping.
     """
 
     count: Annotated[int, Interval(ge=1, le=100_000)] = 24

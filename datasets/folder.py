@@ -31,11 +31,11 @@ class Folder:
     other files, hidden files and subfolders are left alone. A link that leads out of the folder is refused.
     manifest: a file as ``sha256sum *.png > SHA256SUMS`` writes it, from the working directory where relative. Only the
     files it lists are taken then, they may lie in subfolders, and each must have the sum given for it.
-    count: the first so many; None for all. gray: take one-channel images, replicated. sixteen_bit: take 16-bit PNG
+    count: the first so many; null for all. gray: take one-channel images, replicated. sixteen_bit: take 16-bit PNG
     and TIFF, as ``srgb`` levels or as ``linear`` light.
 
-    Every image must be an 8-bit RGB image in sRGB unless these say otherwise; see ``images.decode``. All are decoded
-    before a study begins, once for as long as their size and time of change stay the same.
+    Every image must be an 8-bit RGB image in sRGB unless these say otherwise. All are decoded before a study begins,
+    once for as long as their size and time of change stay the same.
 
     The validation set of DIV2K (Agustsson & Timofte, "NTIRE 2017 challenge on single image super-resolution",
     CVPR Workshops 2017; for academic research only) is ``DIV2K_valid_HR.zip`` at https://data.vision.ee.ethz.ch/cvl/DIV2K/.

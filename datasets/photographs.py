@@ -24,10 +24,12 @@ class Photographs:
 
     van der Walt et al., "scikit-image: image processing in Python", PeerJ 2:e453, 2014.
 
-    count: the first so many of ``NAMES``; None for all. names: these instead, in this order (``count`` is then not
-    used). From ``camera`` on the photographs are gray and replicated to three channels. All are decoded as sRGB:
-    ``rocket`` carries an Adobe RGB profile, which is ignored, as ``skimage.data`` does. Most have 400 to 512 rows,
-    ``chelsea`` 300 and ``text`` 172; a larger region enlarges them.
+    In this order: astronaut, coffee, chelsea, rocket, hubble_deep_field and retina, in colour; camera, brick, grass,
+    gravel and text, gray and replicated to three channels. All are decoded as sRGB: rocket carries an Adobe RGB
+    profile, which is ignored, as scikit-image does. Most have 400 to 512 rows, chelsea 300 and text 172; a larger
+    region enlarges them.
+
+    count: the first so many of them; null for all. names: these instead, in this order (count is then not used).
     """
 
     count: Annotated[int, Interval(ge=1, le=len(NAMES))] | None = 8

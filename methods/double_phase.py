@@ -29,7 +29,8 @@ class DoublePhase:
         The amplitude at the panel that is encoded as 1; larger ones are cut to 1. 1 is the maximum, as published; a
         lower quantile gives a brighter image and more clipping.
     offset : {"none", "centre"}
-        Global phase offset, see `common.with_offset`.
+        Constant phase that is added in the end. none: zero; centre: the one that brings the phase of the fewest pixels
+        to the wrap between 0 and 2 pi, whose edges a panel blurs.
     """
 
     quantile: Annotated[float, Interval(gt=0, le=1)] = 1.0
@@ -75,7 +76,7 @@ class AntiAliasedDoublePhase(DoublePhase):
 
     The complex field at the panel is blurred by a small Gaussian before encoding, so that neighbours in the
     checkerboard encode nearly the same value and fast phase changes do not alias. The other parameters are those of
-    `DoublePhase`.
+    double_phase.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ class BandLimitedDoublePhase(DoublePhase):
 
     The checkerboard of the encoding repeats the spectrum around the corners of the band (half a cycle per pixel
     in both directions). The field is limited to a band before encoding, so that those copies keep clear of it. The
-    other parameters are those of `DoublePhase`.
+    other parameters are those of double_phase.
 
     Parameters
     ----------

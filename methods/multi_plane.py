@@ -33,13 +33,17 @@ class MultiPlane:
     iterations : int
         Evaluations of the loss, with one forward and one adjoint propagation a plane.
     loss : str
-        See `losses`.
+        Error in the region, at the best brightness and as a share of the target's own size. intensity_l2, amplitude_l2:
+        squared, of intensity (Eq. 12 of Chakravarthula et al. 2020) or amplitude; intensity_l1: absolute, of intensity;
+        huber: squared up to 0.1 and linear above; ms_ssim: 0.84 (1 - MS-SSIM) and 0.16 of the absolute error.
     step : float
         Adam's step [rad].
     initial_phase : str
-        See `initial_phase.initial_phase`, of the first plane.
+        Where the descent starts. random: uniform over 2 pi; narrow: uniform over 1 rad; constant: zero; quadratic: the
+        lens that gathers the light of the panel in the region; dpe: the double phase hologram, both of the first plane.
     offset : {"none", "centre"}
-        Global phase offset, see `common.with_offset`.
+        Constant phase that is added in the end. none: zero; centre: the one that brings the phase of the fewest pixels
+        to the wrap between 0 and 2 pi, whose edges a panel blurs.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200

@@ -32,9 +32,11 @@ class AmplitudeSGD:
     step : float
         Adam's step [rad], constant as published.
     initial_phase : str
-        See `initial_phase.initial_phase`.
+        Where the descent starts. random: uniform over 2 pi; narrow: uniform over 1 rad; constant: zero; quadratic: the
+        lens that gathers the light of the panel in the region; dpe: the double phase hologram.
     offset : {"none", "centre"}
-        Global phase offset, see `common.with_offset`.
+        Constant phase that is added in the end. none: zero; centre: the one that brings the phase of the fewest pixels
+        to the wrap between 0 and 2 pi, whose edges a panel blurs.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200

@@ -58,7 +58,9 @@ class Wirtinger:
         Evaluations of loss and gradient, one forward and one adjoint propagation each (the last line search of L-BFGS
         may end a few later).
     loss : str
-        See `losses`; "intensity_l2" is Eq. 12.
+        Error in the region, at the best brightness and as a share of the target's own size. intensity_l2, amplitude_l2:
+        squared, of intensity (Eq. 12 of Chakravarthula et al. 2020) or amplitude; intensity_l1: absolute, of intensity;
+        huber: squared up to 0.1 and linear above; ms_ssim: 0.84 (1 - MS-SSIM) and 0.16 of the absolute error.
     optimiser : {"adam", "lbfgs"}
         Adam, or L-BFGS with a strong Wolfe line search (image by image).
     step : float
@@ -66,9 +68,11 @@ class Wirtinger:
     schedule : {"constant", "cosine"}
         Of Adam's step; "cosine" decays to zero.
     initial_phase : str
-        See `initial_phase.initial_phase`.
+        Where the descent starts. random: uniform over 2 pi; narrow: uniform over 1 rad; constant: zero; quadratic: the
+        lens that gathers the light of the panel in the region; dpe: the double phase hologram.
     offset : {"none", "centre"}
-        Global phase offset, see `common.with_offset`.
+        Constant phase that is added in the end. none: zero; centre: the one that brings the phase of the fewest pixels
+        to the wrap between 0 and 2 pi, whose edges a panel blurs.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200

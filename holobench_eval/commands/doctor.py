@@ -24,6 +24,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from ..core.errors import reason
 from ..core.installed import installed, pinned, shipped
 from .output import console
 
@@ -125,8 +126,7 @@ def examine() -> list[Finding]:
         try:
             findings += check()
         except Exception as error:  # a check that fails says nothing about what it checks
-            reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            findings.append(Finding(name, "warning", f"could not be looked at: {reason}"))
+            findings.append(Finding(name, "warning", f"could not be looked at: {reason(error)[:200]}"))
     return findings
 
 
@@ -277,8 +277,8 @@ def _ask(code: str, seconds: float, *arguments: str) -> Any:
     try:
         return json.loads(done.stdout.splitlines()[-1])
     except (IndexError, ValueError):
-        reason = (done.stderr.strip() or "without a word").splitlines()[-1][:200]
-        return f"ends with {done.returncode}: {reason}"
+        last = (done.stderr.strip() or "without a word").splitlines()[-1][:200]
+        return f"ends with {done.returncode}: {last}"
 
 
 def _install(package: str) -> str:

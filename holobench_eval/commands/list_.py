@@ -23,6 +23,7 @@ from .output import console
 if TYPE_CHECKING:
     from ..core import plugins
     from ..display.simulated.changes.kind import Kind as Change
+    from ..metrics.base import Metric
 
 Entries = Iterator[tuple[str, str]]  # names and descriptions
 
@@ -83,6 +84,7 @@ def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
     marks: what is noted of a class that has the flag of that name.
     """
     from ..core import plugins
+    from ..core.parameters import summary
 
     for name in plugins.names(kind):
         try:
@@ -90,9 +92,8 @@ def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
         except UserError as error:
             yield name, str(error)
             continue
-        summary = str(cls.__doc__ or "").strip().partition("\n")[0]
         marked = [word for flag, word in marks.items() if getattr(cls, flag, False) is True]
-        yield name, summary + (f" ({', '.join(marked)})" if marked else "")
+        yield name, summary(cls).partition("\n\n")[0] + (f" ({', '.join(marked)})" if marked else "")
 
 
 def _declared(kind: plugins.Kind, name: str) -> type[Any]:
@@ -114,13 +115,26 @@ def profiles() -> Entries:
 
 
 def metrics() -> Entries:
-    """Every metric, with the domains of its columns and the reason where it cannot be computed here."""
+    """Every metric, with its unit, the domains of its columns and the reason where it cannot be computed here."""
     from ..metrics import catalogue
 
     for metric in catalogue():
-        text = f"{', '.join(metric.domains)}; {metric.direction} is better; version {metric.version}"
-        reason = metric.available()
-        yield metric.name, text if reason is None else f"{text}; not available: {reason}"
+        yield metric.name, f"{_paragraphs(metric)[0].rstrip('.')}; {_facts(metric)}"
+
+
+def _facts(metric: Metric) -> str:
+    """What the columns of a metric are."""
+    unit = f" [{metric.unit}]" if metric.unit else ""
+    text = f"{', '.join(metric.domains)}{unit}; {metric.direction} is better; version {metric.version}"
+    reason = metric.available()
+    return text if reason is None else f"{text}; not available: {reason}"
+
+
+def _paragraphs(metric: Metric) -> list[str]:
+    """What a metric is and its source, by the text of its file."""
+    function: Any = getattr(metric.function, "func", metric.function)  # one of a family is a partial function
+    text = inspect.cleandoc(sys.modules[function.__module__].__doc__ or "").replace("`", "")
+    return [" ".join(paragraph.split()) for paragraph in text.split("\n\n")]
 
 
 def conditions() -> Entries:
@@ -136,7 +150,7 @@ def _values_of(kind: Change) -> str:
     if kind.counted:
         return "values: whole numbers from 1, or a count"
     if not kind.numeric:
-        return "values: names"
+        return f"values: {kind.names}"
     unit = f" [{kind.unit}]" if kind.unit else ""
     return f"values{unit} from {kind.low:g} to {kind.high:g}; {kind.nominal:g} changes nothing"
 
@@ -146,7 +160,8 @@ def explain_study(screen: Console, name: str) -> None:
     file = shipped_configs()[name]
     _heading(screen, "studies", name, [])
     for key, text in {**_words(file), "config": str(file), "run": f"holoeval run {name}"}.items():
-        screen.print(escape(f"{key}: {text}"), highlight=False, soft_wrap=key == "config")
+        said = key.replace("would_change", "would change the answer")
+        screen.print(escape(f"{said}: {text}"), highlight=False, soft_wrap=key == "config")
 
 
 def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
@@ -192,11 +207,8 @@ def explain_metric(screen: Console, name: str) -> None:
 
     metric = next(metric for metric in catalogue() if metric.name == name)
     _heading(screen, "metrics", name, [])
-    function: Any = getattr(metric.function, "func", metric.function)  # one of a family is a partial function
-    text = inspect.cleandoc(sys.modules[function.__module__].__doc__ or "")
-    paragraphs = (" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
-    screen.print(escape("\n\n".join(paragraphs)), highlight=False)
-    screen.print(f"\n{escape(dict(metrics())[name])}\ncolumns: {', '.join(metric.columns)}", highlight=False)
+    screen.print(escape("\n\n".join(_paragraphs(metric))), highlight=False)
+    screen.print(f"\n{escape(_facts(metric))}\ncolumns: {', '.join(metric.columns)}", highlight=False)
 
 
 def explain_condition(screen: Console, name: str) -> None:

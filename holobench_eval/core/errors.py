@@ -18,6 +18,10 @@ class BudgetError(CellError):
     """A method asked the display for more captures than it may use."""
 
 
+class ForeignError(CellError):
+    """What a method raised in its process, under the name of a class that is not of this package."""
+
+
 class StopError(UserError):
     """The run cannot go on, whatever cell comes next; once its cause is mended, the same command resumes."""
 
@@ -38,9 +42,15 @@ class Pending(BaseException):
 
 
 def reason(error: BaseException) -> str:
-    """What failed, in one line of at most 300 characters that any file can hold."""
-    text = f"{type(error).__name__}: {error}".encode("utf-8", "backslashreplace").decode()  # names of files
-    return " ".join(text.split())[:300]
+    """What failed, in one line of at most 300 characters that any file can hold.
+
+    The name of its class stands before an error of Python, of a library or of a user's code. Errors of this package
+    are sentences, and go without.
+    """
+    own = isinstance(error, UserError | CellError) and not isinstance(error, ForeignError)
+    text = str(error) if own else f"{type(error).__name__}: {error}"
+    text = text.encode("utf-8", "backslashreplace").decode()  # names of files
+    return " ".join(text.split())[:300] or "no reason given"
 
 
 def out_of_memory(error: BaseException) -> bool:

@@ -10,8 +10,8 @@ import inspect
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, is_dataclass
+from typing import Any, get_args, get_type_hints
 
 from pydantic import TypeAdapter
 
@@ -75,14 +75,24 @@ def _entries(
     known = meanings(cls) if cls else {}
     for name, entry in schema.get("properties", {}).items():
         default = given[name] if isinstance(given, Mapping) and name in given else entry.get("default", _NONE_GIVEN)
-        inner = _resolved(entry, definitions)
+        inner = _mapping(entry, definitions)
         meaning = entry.get("description") or known.get(name, "")
         if "properties" in inner:
-            yield Parameter(f"{prefix}{name}", "", "mapping of:", meaning)
+            optional = "anyOf" in entry
+            null = "null" if optional and default is None else ""
+            yield Parameter(f"{prefix}{name}", null, "null or a mapping of:" if optional else "mapping of:", meaning)
             yield from _entries(_nested(cls, name), inner, definitions, f"{prefix}{name}.", default)
         else:
             text = default if isinstance(default, str) else json.dumps(default)
             yield Parameter(f"{prefix}{name}", text, allowed(entry, definitions), meaning)
+
+
+def _mapping(entry: Schema, definitions: Schema) -> Schema:
+    """The schema of a value that is a mapping, or may be one beside null; else that of the value."""
+    parts = [_resolved(part, definitions) for part in entry.get("anyOf", ())]
+    mappings = [part for part in parts if "properties" in part]
+    others = [part for part in parts if part not in mappings and part.get("type") != "null"]
+    return mappings[0] if len(mappings) == 1 and not others else _resolved(entry, definitions)
 
 
 def _resolved(entry: Schema, definitions: Schema) -> Schema:
@@ -92,8 +102,10 @@ def _resolved(entry: Schema, definitions: Schema) -> Schema:
 
 
 def _nested(cls: type[Any] | None, name: str) -> type[Any] | None:
-    """The dataclass that a field's default is an instance of."""
-    return type(getattr(cls, name)) if hasattr(cls, name) else None
+    """The dataclass that a field's default is an instance of, or the one that its annotation names."""
+    hint = get_type_hints(cls).get(name) if cls else None
+    candidates = (type(getattr(cls, name, None)), hint, *get_args(hint))
+    return next((one for one in candidates if isinstance(one, type) and is_dataclass(one)), None)
 
 
 def allowed(entry: Schema, definitions: Schema) -> str:
@@ -153,7 +165,8 @@ def source(cls: type[Any]) -> str:
 
 
 def _plain(text: str) -> str:
-    return " ".join(text.replace("`", "").split())
+    """A text in one line, without signs of markup."""
+    return re.sub(r"::$", ":", " ".join(text.replace("`", "").split()))
 
 
 def _numpy(text: str) -> dict[str, str]:
@@ -168,13 +181,14 @@ def _numpy(text: str) -> dict[str, str]:
 
 
 def _inline(text: str, fields: list[str]) -> dict[str, str]:
-    """Meanings as ``name: meaning; other, another: meaning``."""
+    """Meanings as ``name: meaning; other, another: meaning``, each at most to the end of its paragraph."""
     if not fields:
         return {}
     name = rf"(?:{'|'.join(fields)})"
-    flat = " ".join(text.split())
-    parts = re.split(rf"(?:^|(?<=[.;:)] )|(?<=^))({name}(?:, {name})*): ", flat)
     found = {}
-    for names, meaning in zip(parts[1::2], parts[2::2], strict=True):
-        found.update(dict.fromkeys(names.split(", "), _plain(meaning).rstrip(".; ")))
+    for paragraph in text.split("\n\n"):
+        flat = " ".join(paragraph.split())
+        parts = re.split(rf"(?:^|(?<=[.;:)] ))({name}(?:, {name})*): ", flat)
+        for names, meaning in zip(parts[1::2], parts[2::2], strict=True):
+            found.update(dict.fromkeys(names.split(", "), _plain(meaning).rstrip(".; ")))
     return found

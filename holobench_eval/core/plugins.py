@@ -17,7 +17,7 @@ from typing import Any, Literal, get_type_hints
 
 from pydantic import TypeAdapter
 
-from .errors import UserError, suggest
+from .errors import UserError, reason, suggest
 from .hashing import canonical
 from .schema import checked
 
@@ -130,7 +130,7 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     try:
         module = import_file(path)
     except (Exception, SystemExit) as error:
-        raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {type(error).__name__}: {error}") from error
+        raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {reason(error)}") from error
     cls = getattr(module, attribute, None)
     if cls is None:
         own = {key: value for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__}
@@ -222,8 +222,8 @@ def made(cls: type[Any], owner: str, params: dict[str, Any], adapter: TypeAdapte
     except UserError:
         raise
     except Exception as error:  # whatever a stranger's class does when it is built
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise UserError(f"{owner} cannot be built: {reason}") from error
+        first = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise UserError(f"{owner} cannot be built: {first}") from error
 
 
 def params_of(plugin: Any) -> dict[str, Any]:

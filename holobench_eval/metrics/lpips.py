@@ -96,10 +96,10 @@ def available(network: Network = "alex", location: Path | None = None) -> str | 
     """None when LPIPS can be computed with this network, else one line: what is missing and where to get it."""
     heads = _heads_file(network)
     if heads is None or not heads.is_file():
-        return f"lpips_{network}: the linear heads are missing; install torchmetrics"
+        return "the linear heads are missing; install torchmetrics"
     if find_weights(network, location) is None:
         target = location or Path(torch.hub.get_dir()) / "checkpoints"
-        return f"lpips_{network}: no trunk weights; put {_TRUNKS[network].url} into {target}"
+        return f"no trunk weights; put {_TRUNKS[network].url} into {target}"
     return None
 
 
@@ -174,7 +174,7 @@ def lpips(image: Tensor, target: Tensor, network: Network = "alex", weights: Pat
     reason = available(network, weights)
     path = find_weights(network, weights)
     if reason is not None or path is None:
-        raise UserError(str(reason))
+        raise UserError(f"lpips_{network}: {reason}")
     trunk, heads = _model(network, path, path.stat().st_mtime, image.device)
     shift = torch.tensor(SHIFT, device=image.device).view(3, 1, 1)
     scale = torch.tensor(SCALE, device=image.device).view(3, 1, 1)

@@ -201,7 +201,7 @@ def _chosen(names: Collection[str] | None, weights: str | Path | None) -> tuple[
         raise UserError(f"unknown metric '{name}'; {suggest(name, allowed)}")
     chosen = [metric for metric in known if metric.name in wanted]
     reasons = {metric.name: metric.available() for metric in chosen}
-    missing = [reason for name, reason in reasons.items() if name.startswith("lpips") and reason is not None]
+    missing = [f"{name}: {why}" for name, why in reasons.items() if name.startswith("lpips") and why is not None]
     if weights is not None and missing and len(missing) == sum(name.startswith("lpips") for name in reasons):
         raise UserError(missing[0])
     return wanted, [metric for metric in chosen if reasons[metric.name] is None]

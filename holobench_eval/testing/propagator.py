@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..core.errors import UserError, suggest
+from ..core.errors import UserError, reason, suggest
 from ..core.plugins import import_file
 from .propagation_reference import Physics, Setting
 
@@ -59,8 +59,7 @@ def load_subject(source: str) -> Subject:
     try:
         module = import_file(path)
     except (Exception, SystemExit) as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise UserError(f"propagator '{source}': the file fails to import: {reason}") from error
+        raise UserError(f"propagator '{source}': the file fails to import: {reason(error)}") from error
     make = getattr(module, name, None)
     if not callable(make):
         own = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]

@@ -69,7 +69,7 @@ class CNNPropCNN(Calibrated):
 
     As in the paper, a pair for each colour. Its networks are U-Nets and give the field itself; here, where a few dozen
     captures have to do, they are three convolutions at full resolution, add to the field, and begin with nothing. The
-    other parameters are those of `Calibrated`. SI units throughout.
+    other parameters are those of all calibrated methods. SI units throughout.
 
     Parameters
     ----------

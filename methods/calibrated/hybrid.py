@@ -53,7 +53,7 @@ class Residual(nn.Module):
 class HybridModel(Diagnosed, Calibrated):
     """The parametric model, a map of the panel pixel by pixel and a residual network, learned from the same captures.
 
-    Map and network begin with nothing. The other parameters are those of `Calibrated`. SI units throughout.
+    Map and network begin with nothing. The other parameters are those of all calibrated methods. SI units throughout.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ class LearnedKernel(Calibrated):
 
     As in the paper, captures are of natural holograms alone, and only of those of the ideal model. The paper learns the
     kernel's values; here they are those of its Fourier transform, which is the same family of kernels. The parameters
-    are those of `Calibrated`. SI units throughout.
+    are those of all calibrated methods. SI units throughout.
     """
 
     training: OneRound = OneRound()

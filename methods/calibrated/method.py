@@ -47,18 +47,18 @@ class ThroughModel(ABC):
     Parameters
     ----------
     training : Schedule
-        Algorithm 1.
+        How the display is learned: Algorithm 1.
     retrieval : LargeSteps
-        Eq. 22, of which the squared error alone is used.
+        Of every hologram, through what was learned: Eq. 22, of which the squared error alone is used.
     search : SearchRetrieval
-        Retrieval in the rounds.
+        The same while the display is learned, in the rounds after the first.
     start : Wirtinger
         Wirtinger holography, stopped while its phase is still smooth: a converged phase is full of wraps that descent
         does not get out of.
     seed : int
         Of the model's first weights, where it has any.
     fallback : bool
-        Solve by plain Wirtinger holography where the loop made the captures of held-out images worse, see `fallback`.
+        Solve by plain Wirtinger holography where the loop made the captures of held-out images worse.
     """
 
     training: Schedule = Schedule()

@@ -71,7 +71,7 @@ class Phases:
     order : {"rgb", "bgr"}
         Order of the colours in an array.
     encoder : {"double_phase", "phase_only"}
-        Of a complex field: double-phase encoding (`double_phase.encode`), or its phase alone.
+        How a complex field becomes a phase: by double-phase encoding, or by its phase alone.
     """
 
     file: Annotated[str, MinLen(1)] = "phases/{target}.npy"

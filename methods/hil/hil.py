@@ -39,12 +39,13 @@ class HIL:
     network : Network
         The approximator D (Section 4.3.1) or a baseline of Table 1.
     loss : ApproximatorLoss, optional
-        Eq. 20; None: the loss the network is published with.
+        Eq. 20; by default the loss that the network is published with.
     training : Schedule
-        Algorithm 1.
+        How the display is learned: Algorithm 1.
     retrieval : PhaseRetrieval
-        Eq. 22. From a converged phase, steps of 0.06 rad gained twice as much on captures of dead leaves as steps of
-        0.0075 rad, which take it as far as the paper's 300 steps of 0.001 rad.
+        Of every hologram, through what was learned: Eq. 22. From a converged phase, steps of 0.06 rad gained twice as
+        much on captures of dead leaves as steps of 0.0075 rad, which take it as far as the paper's 300 steps of 0.001
+        rad.
     start : Wirtinger
         Wirtinger holography, where Algorithm 1 and every retrieval begin.
     rates : LearningRates
@@ -52,8 +53,7 @@ class HIL:
     seed : int
         Of the weights, besides the study's.
     fallback : bool
-        Not in the paper: solve by plain Wirtinger holography where the loop made the captures of held-out images worse,
-        see `fallback`.
+        Not in the paper: solve by plain Wirtinger holography where the loop made the captures of held-out images worse.
     """
 
     network: Network = Network()

@@ -54,14 +54,21 @@ class Network:
         "paper" is what is published; "small" (not in the paper) has a quarter of the filters and fewer levels, for
         small panels and a CPU.
     levels : int, optional
-        Halvings of the resolution; None: 5 or 8 by preset, and 4 for U-Net and Pix2PixHD.
+        Halvings of the resolution; by default 5 in "small" and 8 in "paper", and 4 for U-Net and Pix2PixHD.
     width : int, optional
-        Filters of the first level, doubled from level to level; None: 16 or 64 by preset. U-Net and Pix2PixHD have half
-        of them, as in Section 6.1.
+        Filters of the first level, doubled from level to level; by default 16 in "small" and 64 in "paper". U-Net and
+        Pix2PixHD have half of them, as in Section 6.1.
     conditional : bool
         The discriminator sees the ideal image too. For the proposed network only, as are the next four.
-    dropout, full_resolution_stage, plain_ends, skip_after_activation : bool
-        The four changes to Pix2Pix, each of which can be undone, see `Generator`.
+    dropout : bool
+        Drop half the features of the three innermost decoding layers while training, as Pix2Pix does.
+    full_resolution_stage : bool
+        Make the image in a convolution at full resolution; Pix2Pix makes it in the last transposed convolution.
+    plain_ends : bool
+        Leave instance normalisation out of the first two encoding and the last two decoding layers; Pix2Pix leaves it
+        out of the first, and where the image is made.
+    skip_after_activation : bool
+        Branch skip connections off after the encoder's activation; Pix2Pix does before.
 
     Raises
     ------

@@ -48,7 +48,7 @@ class HILNH3D:
     seed : int
         Of the weights, besides the study's.
     fallback : bool
-        Solve by plain Wirtinger holography where the loop made the captures of held-out images worse, see `fallback`.
+        Solve by plain Wirtinger holography where the loop made the captures of held-out images worse.
     """
 
     network: Network = Network(name="unet")

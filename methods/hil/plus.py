@@ -38,8 +38,8 @@ def residual_network(spec: DisplaySpec, network: Network, seed: int) -> nn.Modul
 class HILPlus(Diagnosed, ThroughModel):
     """The loop of `hil` with a physical model of the display, learned from captures, in the place of its network.
 
-    The aberration field is a field; see this file's first lines. It is that of Eq. 13. The other parameters are those
-    of `ThroughModel`; `training` is Algorithm 1. SI units throughout.
+    The aberration field of Eq. 13 stays a complex field. The parameters but for the network are those of all calibrated
+    methods. SI units throughout.
 
     Parameters
     ----------

@@ -21,12 +21,12 @@ from .start import SmoothStart
 class HILTuned(HIL):
     """HIL from a Wirtinger phase that is stopped early, and moved by a constant that was chosen with captures.
 
-    The other parameters are those of `HIL`.
+    The other parameters are those of `hil`.
 
     Parameters
     ----------
     retrieval : PhaseRetrieval
-        Eq. 22, nearer to the start than in `HIL`.
+        Of every hologram, through what was learned: Eq. 22, nearer to the start than in `hil`.
     start : SmoothStart
         Where Algorithm 1 and every retrieval begin. Of the tolerances 0.2, 0.1, 0.04 and 0.02 the default was best on
         captures of dead leaves, and within 0.3 dB of the best on darkened ones (their cube).

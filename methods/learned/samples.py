@@ -24,18 +24,18 @@ class Schedule:
     Parameters
     ----------
     rounds : int
-        K.
+        How many times captures are taken and learned from: K of Algorithm 1.
     images : int, optional
-        How many of the training images are used; None: all.
+        How many of the training images are used; null: all.
     refine_images : int, optional
         Not in the paper: how many of these are retrieved and captured in each round after the first, in turn. A
-        retrieval takes far longer than the first round's start. None: all, as in the paper.
+        retrieval takes far longer than the first round's start. Null: all, as in the paper.
     steps : int
         Optimiser steps of the first round, which learns the display. The paper's network sees 40000 in all.
     refine_steps : int
         Optimiser steps of each later round.
     keep_captures : bool
-        Refine with the captures of all rounds so far; False: with the most recent ones alone, as in the paper.
+        Refine with the captures of all rounds so far; else with the most recent ones alone, as in the paper.
     """
 
     rounds: Annotated[int, Interval(ge=1, le=100)] = 3

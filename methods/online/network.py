@@ -55,15 +55,16 @@ class OnlineCameraNetwork:
     steps : int
         Of the network's training in a round.
     network : Network
-        D, with fresh weights for every image.
+        What learns the display, with fresh weights for every image: D of the paper.
     loss : ApproximatorLoss, optional
-        Eq. 20, of which the L1 term alone is worth its time in so few steps; None: the network's published loss.
+        Eq. 20, of which the L1 term alone is worth its time in so few steps; null: the network's published loss.
     retrieval : ShortRetrieval
         Eq. 22, of which the squared error alone is used.
     start : CameraStart
-        See `OnlineCamera`.
+        Not in the paper: the holograms that are tried first.
     checks : int
-        See `OnlineCamera`.
+        Not in the paper: new captures in the end of each of the converged Wirtinger hologram, the one of the least
+        captured error and the last, between which they decide.
     """
 
     captures: Annotated[int, Interval(ge=1, le=100_000)] = 100

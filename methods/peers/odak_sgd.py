@@ -25,14 +25,14 @@ from .loading import load, unavailable
 class OdakSGD:
     """odak: Adam on the phase through odak's own propagation (needs the extra 'peers').
 
-    odak compares the intensity of a panel lit with 1 with the image in [0, 1] as it is, without a factor between
-    them, and starts from a normally distributed phase; both are kept, as is its band-limited angular spectrum on twice
-    the panel's size. Handed over is odak's ``loss_function``: the mean squared error of the region, so that light
-    outside of it is free as it is for every other method. odak is not told of an iris, and gives back the phase of
-    its last iteration. Its transfer function is sampled half a sample of frequency off, so that its picture lies
-    ``wavelength * distance / (4 * side)`` metres aside on each axis, otherwise for each colour (side: that of the
-    panel); and the light between the pixels of a picture with a random start is speckle. On a GPU torch draws
-    its start there, so that it is another one than on the CPU.
+    odak compares the intensity of a panel lit with 1 with the image in [0, 1] as it is, without a factor between them,
+    and starts from a normally distributed phase; both are kept, as is its band-limited angular spectrum on twice the
+    panel's size. Handed over is a loss: the mean squared error of the region, so that light outside of it is free as it
+    is for every other method. odak is not told of an iris, and gives back the phase of its last iteration. Its transfer
+    function is sampled half a sample of frequency off, so that its picture lies ``wavelength * distance / (4 * side)``
+    metres aside on each axis, otherwise for each colour (side: that of the panel); and the light between the pixels of
+    a picture with a random start is speckle. On a GPU torch draws its start there, so that it is another one than on
+    the CPU.
 
     Parameters
     ----------

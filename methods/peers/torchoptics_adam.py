@@ -31,8 +31,17 @@ class TorchOpticsAdam:
 
     Parameters
     ----------
-    iterations, loss, step, initial_phase
-        See `Wirtinger`.
+    iterations : int
+        Evaluations of loss and gradient.
+    loss : str
+        Error in the region, at the best brightness and as a share of the target's own size. intensity_l2, amplitude_l2:
+        squared, of intensity (Eq. 12 of Chakravarthula et al. 2020) or amplitude; intensity_l1: absolute, of intensity;
+        huber: squared up to 0.1 and linear above; ms_ssim: 0.84 (1 - MS-SSIM) and 0.16 of the absolute error.
+    step : float
+        Adam's step [rad].
+    initial_phase : str
+        Where the descent starts. random: uniform over 2 pi; narrow: uniform over 1 rad; constant: zero; quadratic: the
+        lens that gathers the light of the panel in the region; dpe: the double phase hologram.
     propagation : str
         A method of torchoptics; its angular spectrum has neither a band limit nor an iris.
     padding : float

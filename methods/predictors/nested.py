@@ -120,7 +120,7 @@ class NestedPrediction(ThroughModel):
 
 @dataclass(frozen=True)
 class ImageTermsModel(NestedPrediction):
-    """A few numbers on the ideal intensity, see `ImageTerms`."""
+    """A few numbers on the ideal intensity, learned from captures: shading, blur, haze and tone."""
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
@@ -129,7 +129,7 @@ class ImageTermsModel(NestedPrediction):
 
 @dataclass(frozen=True)
 class ImageNetwork(NestedPrediction):
-    """`ImageTermsModel` and a U-Net that sees the ideal intensity and adds to the prediction."""
+    """A few numbers on the ideal intensity, and a U-Net that sees it and adds to what they predict."""
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
@@ -138,7 +138,7 @@ class ImageNetwork(NestedPrediction):
 
 @dataclass(frozen=True)
 class FieldNetwork(NestedPrediction):
-    """`ImageNetwork` on a field that interferes: `DisplayModel` in the place of the ideal model."""
+    """A few numbers and a U-Net, both on a field that interferes: that of a physical model of the display."""
 
     form: ClassVar[frozenset[str]] = FORM
 

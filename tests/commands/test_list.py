@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 from pathlib import Path
 
@@ -81,6 +83,72 @@ def test_everything_that_is_listed_can_be_explained(capsys: pytest.CaptureFixtur
     for kind in KINDS.values():
         for name, _ in kind():
             assert f"{name}, one of the " in shown(capsys, name)
+
+
+@pytest.fixture(scope="module")
+def pages() -> dict[str, str]:
+    """All that ``holoeval list`` and ``holoeval list NAME`` print, in one line each, without links and paths."""
+    found = {}
+    for name in (None, *(name for kind in KINDS.values() for name, _ in kind())):
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            list_(name)
+        found[name or "overview"] = " ".join(word for word in printed.getvalue().split() if word.count("/") < 2)
+    return found
+
+
+def keys() -> set[str]:
+    """The names of parameters, which a config writes with dots where one lies inside another."""
+    kinds: tuple[plugins.Kind, ...] = ("methods", "datasets")
+    classes = [plugins.find(kind, name) for kind in kinds for name in plugins.names(kind)]
+    return {entry.name for cls in classes for entry in parameters(cls)}
+
+
+# What a reader of the field knows, or meets outside this package: abbreviations, names of networks, values of a key.
+KNOWN = """
+PSNR SSIM LPIPS MOFD FLIP LDR GMSD MDSI FSIM VSI SDSP HIL SLM BFGS RGB CPU GPU IEEE ACM CVPR GCPR ICIP CNN VGG DIV2K
+PNG TIFF EXIF MATLAB NTIRE Pix2Pix Pix2PixHD HaarPSI ImageNet AlexNet CNNpropCNN PeerJ SHA256SUMS DIV2K_valid_HR
+AUTO ASM DIM ASM_FRESNEL DIM_FRESNEL
+"""
+
+
+@pytest.mark.parametrize(
+    ("what", "pattern"),
+    [
+        ("marks of markup", r"`|::"),
+        ("classes of errors", r"\b\w+Error\b"),
+        ("names of constants", r"\b[A-Z][A-Z_]+[A-Z0-9_]+\b"),
+        ("names of classes", r"\b[A-Z][a-z0-9]+[A-Z]\w*"),
+        ("names of functions", r"(?<![\w.])[a-z]\w*(?:\.[a-z_]\w*)+(?!\w)|\b\w+\(\)"),
+        ("pointers into the code", r"\b[Ss]ee (?!through)\w+"),
+    ],
+)
+def test_what_is_listed_says_things_without_names_of_the_code(pages: dict[str, str], what: str, pattern: str) -> None:
+    file = re.compile(r".*\.(?:png|tif|bmp|np[yz]|mat|jpg|zip|yaml)")
+    said = {
+        f"{page}: {word}"
+        for page, text in pages.items()
+        for word in re.findall(pattern, text)
+        if word not in KNOWN.split() and word not in keys() and not file.fullmatch(word)
+    }
+    assert said == set(), what
+
+
+def test_a_list_says_all_of_the_first_paragraph_units_and_names(pages: dict[str, str]) -> None:
+    text = pages["overview"]
+    assert "complex modulated" in text  # behind the first line of a docstring
+    assert "linear, amplitude, srgb [dB]; higher is better" in text
+    assert "values: canon-t6i or fujifilm-s5-pro" in text
+    assert "such as '-2' or '-2 / -1 x 30', of at most 10 dioptres" in text
+    assert "lpips_alex: no" not in text
+
+
+def test_a_mapping_beside_null_is_shown_with_its_keys(pages: dict[str, str]) -> None:
+    assert "loss = null (null or a mapping of:)" in pages["hil"]
+    assert "loss.l1 = 10.0 (number from 0 to 1e+06)" in pages["online_camera_network"]
+    assert (
+        "take 16-bit PNG and TIFF, as srgb levels or as linear light" in pages["folder"].partition("sixteen_bit =")[2]
+    )
+    assert pages["folder"].endswith("linear light")  # not the paragraphs that follow it in the docstring
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,7 @@ def test_lpips_is_missed_only_where_it_was_wanted(records, tmp_path, wanted, mis
 
 
 def test_a_hole_is_listed_with_its_reason(report):
-    assert "| GS | leto-aged | coffee | 0 | failed | CellError: registration residual 1.32 px" in report
+    assert "| GS | leto-aged | coffee | 0 | failed | registration residual 1.32 px" in report
     assert "| GS | 2 of 3 |" in report
 
 

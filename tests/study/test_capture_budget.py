@@ -123,7 +123,7 @@ def test_a_method_that_kept_nothing_fails_when_its_budget_ends(tmp_path: Path) -
     config = study_of(tmp_path, "Greedy, captures: 2, params: {keeps: false}")
     (record,) = records(config, tmp_path / "out")
     assert record["state"] == "failed"
-    assert record["reason"] == "BudgetError: Greedy has used its 2 captures"
+    assert record["reason"] == "Greedy has used its 2 captures"
 
 
 def test_a_budget_makes_another_cell_and_no_budget_leaves_its_name_as_it_was(tmp_path: Path) -> None:

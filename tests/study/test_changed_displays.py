@@ -78,7 +78,7 @@ def test_a_count_of_siblings_is_a_list_of_names(tmp_path: Path) -> None:
     ("sweep", "message"),
     [
         ("{condition: drfit, values: [1]}", "unknown condition 'drfit'; did you mean 'drift'?"),
-        ("{condition: drift, values: [-1]}", "drift is a number from 0 to 3650, got -1"),
+        ("{condition: drift, values: [-1]}", "drift is a number [days] from 0 to 3650, got -1"),
         ("{condition: drift, values: [1, 2, 1.0]}", "drift 1.0 is listed twice"),
         ("{condition: drift}", "a sweep has values"),
         ("{condition: drift, count: 3}", "a sweep has values"),

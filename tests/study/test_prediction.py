@@ -111,7 +111,7 @@ def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path: Path, no_physi
     config.write_text(CONFIG.replace(*PREDICTION).replace("trained.py:Gain", "narrow.py:Even"))
     (tmp_path / "narrow.py").write_text(plugins.replace("*bench.spec.region.shape)", "5, 5)"))
     reason = compute(config).records[-1]["reason"]
-    assert reason == "CellError: Even: predict returned (1, 3, 5, 5), not an image (1, 3, 104, 104)"
+    assert reason == "Even: predict returned (1, 3, 5, 5), not an image (1, 3, 104, 104)"
 
 
 @pytest.mark.parametrize("measure", ["picture", "prediction"])

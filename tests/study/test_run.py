@@ -137,7 +137,7 @@ def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch
     monkeypatch.setattr("holobench_eval.study.scoring.picture.score", lambda *_, **__: {"psnr_linear": float("nan")})
     outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"failed"}
-    assert outcome.records[0]["reason"] == "CellError: the score psnr_linear is nan"
+    assert outcome.records[0]["reason"] == "the score psnr_linear is nan"
 
 
 def test_displays_of_equal_nominal_optics_share_one_solution(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def test_a_spent_budget_leaves_failed_cells_with_the_reason_and_all_other_cells(
     outcome = compute(config)
     assert states(outcome.records) == [("Even", "done"), ("Gain", "failed")]
     reason = outcome.records[-1]["reason"]
-    assert reason.endswith("BudgetError: trained.py:Gain has used its 3 captures for training")
+    assert reason.endswith("not trained: trained.py:Gain has used its 3 captures for training")
     assert "\n" not in reason
     table = pd.read_csv(tmp_path / "out" / "table.csv").query("category != 'floor'")
     assert table[["label", "condition", "n", "failed"]].values.tolist() == [
@@ -82,7 +82,7 @@ def test_a_training_that_fails_is_told_with_its_reason_and_tried_again_when_aske
     config = write(tmp_path, BESIDE, gain(fail="no\n light"))
     outcome = compute(config, write=lines.append)
     assert states(outcome.records) == [("Even", "done"), ("Gain", "failed")]
-    assert outcome.records[-1]["reason"].startswith("CellError: not trained: ValueError: no light (trained.py, line ")
+    assert outcome.records[-1]["reason"].startswith("not trained: ValueError: no light (trained.py, line ")
     assert any(line.startswith("failed: training") and "ValueError: no light (trained.py, " in line for line in lines)
     assert "Traceback" in (artifact_of(config) / "failure.log").read_text()
     assert compute(config).computed == 0
@@ -119,7 +119,7 @@ def test_a_lost_worker_is_the_reason_of_a_training_that_fails(tmp_path: Path) ->
     study = load_study(write(tmp_path))
     watch = Lines(lambda line: None)
     outcome = run(study, plan(study), tmp_path / "out", Losing(), watch, 1, tmp_path / "artifacts")
-    assert outcome.records[-1]["reason"] == "CellError: not trained: ConnectionError: the worker is gone"
+    assert outcome.records[-1]["reason"] == "not trained: ConnectionError: the worker is gone"
 
 
 def test_held_out_images_are_the_last_ones(tmp_path: Path) -> None:

@@ -165,7 +165,7 @@ def study(output: Path, size: int = 48, targets: tuple[str, ...] = TARGETS) -> l
             for condition, severity in SEVERITY.items():
                 described = cell(NAMES[label], name, condition)
                 if (label, name, condition) == ("GS", "coffee", "leto-aged"):
-                    reason = "CellError: registration residual 1.32 px is above the bound of 0.30 px"
+                    reason = "registration residual 1.32 px is above the bound of 0.30 px"
                     records.append(record(label, described, {}, state="failed", reason=reason))
                     continue
                 image = capture(target, label, severity, rng)

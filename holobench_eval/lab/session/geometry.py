@@ -47,8 +47,8 @@ def look(bench: RealBench, photographer: FolderPhotographer, output: Path, say: 
     say(f"drift: {moved:.2f} px and {dimmed:.1%} of the light, at most, between the repeats of one hologram")
     if moved > FURTHEST_DRIFT:
         raise UserError(
-            f"the camera or the picture moved by {moved:.1f} px between repeats, more than {FURTHEST_DRIFT:g}; fix the "
-            "bench and photograph a new session"
+            f"the camera or the picture moved by {moved:.1f} px between repeats, more than {FURTHEST_DRIFT:g} px; "
+            "fix the bench and photograph a new session"
         )
     faults, alike = misplaced(bench, photographer)
     if faults:

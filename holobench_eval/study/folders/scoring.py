@@ -230,7 +230,7 @@ class Scoring:
         if alignment is None:
             return Record(cell, "missing", method, f"no capture of '{name}' in the folder of {method}")
         if isinstance(alignment, str):
-            record = Record(cell, "failed", method, f"CellError: {alignment}")
+            record = Record(cell, "failed", method, alignment)
             self.store.write(record)
             return record
         figure = self.store.output / "figures" / alignment_name(*key)

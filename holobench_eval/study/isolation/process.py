@@ -18,7 +18,7 @@ from typing import Any
 import torch
 
 from ...core.device import moved
-from ...core.errors import BudgetError, CellError, Pending, StopError, UserError
+from ...core.errors import BudgetError, CellError, ForeignError, Pending, StopError, UserError
 from ...core.schema import FieldError
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
@@ -167,7 +167,8 @@ def _raised(told: dict[str, Any]) -> Exception:
         return FieldError(tuple(where), message, bool(at_key))
     if name == "UserError":
         return UserError(message)
-    kind = BudgetError if name == "BudgetError" else type(name if name.isidentifier() else "Error", (CellError,), {})
+    own = {cls.__name__: cls for cls in (CellError, BudgetError)}
+    kind = own.get(name) or type(name if name.isidentifier() else "Error", (ForeignError,), {})
     error = kind(message)
     error.add_note(f"In the method's process:\n{told.get('traceback', '')}")
     return error

@@ -21,7 +21,7 @@ class Kind:
     nothing (None: values are names, or draws, and there is none); low, high: what a number may be; moves: whether the
     camera's view moves, so that it is registered anew (else it stays as it was before the change); per: the loss is
     stated for so much (0: not at all); counted: whether values are whole numbers from 1 that name one of many; read:
-    the one form of a name, UserError for one without a meaning.
+    the one form of a name, UserError for one without a meaning; names: what a name may be, in words.
     """
 
     words: str
@@ -36,6 +36,7 @@ class Kind:
     per: float = 1.0
     counted: bool = False
     read: Callable[[str], str] = str
+    names: str = "names"
 
     @property
     def numeric(self) -> bool:

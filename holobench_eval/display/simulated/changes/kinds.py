@@ -119,7 +119,7 @@ KINDS: Mapping[str, Kind] = {
     ),
     "sensor": Kind(
         "another camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)),
-        camera.SENSOR_MODEL, nominal=None, moves=True,
+        camera.SENSOR_MODEL, nominal=None, moves=True, names=" or ".join(camera.SENSORS),
     ),
     "distance": Kind(
         "error of the propagation distance", "%", ("propagation",), number(_distance),
@@ -174,17 +174,17 @@ KINDS: Mapping[str, Kind] = {
         "eye that needs glasses", "", ("eye",), _eye,
         f"relaxed, behind an eyepiece of {1e3 * vision.EYEPIECE:g} mm (assumed); sphere / cylinder x axis in dioptres "
         "and degrees",
-        nominal=None, read=vision.one_form,
+        nominal=None, read=vision.one_form, names=vision.NAMES,
     ),
     "corrected_eye": Kind(
         "the same eye, corrected by the hologram", "", ("eye", "lens"), _corrected_eye,
         "paper 4.2: a phase of the prescription's sphere and cylinder added to the same hologram",
-        nominal=None, read=vision.one_form, moves=True,
+        nominal=None, read=vision.one_form, names=vision.NAMES, moves=True,
     ),
     "known_eye": Kind(
         "the same eye, known to the methods", "", ("eye",), _known_eye,
         "the eye is part of the nominal optics that holograms are computed for",
-        nominal=None, read=vision.one_form,
+        nominal=None, read=vision.one_form, names=vision.NAMES,
     ),
     "draw": Kind(
         "random draw of the bench's parameters", "", draws.STAGES, _draw, draws.MODEL, nominal=None, moves=True,
@@ -207,7 +207,8 @@ def checked(kind: str, value: Value) -> Value:
     if not limits.numeric:
         return limits.read(str(value))
     if not isinstance(value, int | float) or isinstance(value, bool) or not limits.low <= value <= limits.high:
-        raise UserError(f"{kind} is a number from {limits.low:g} to {limits.high:g}, got {value!r}")
+        unit = f" [{limits.unit}]" if limits.unit else ""
+        raise UserError(f"{kind} is a number{unit} from {limits.low:g} to {limits.high:g}, got {value!r}")
     return float(value)
 
 

@@ -12,6 +12,7 @@ from ..profile import Profile
 
 EYEPIECE = 0.05  # focal length [m] of the eyepiece through which the image is seen; assumed, usual in near-eye displays
 STRONGEST = 10.0  # dioptres, of a prescription's sphere and cylinder
+NAMES = f"prescriptions, such as '-2' or '-2 / -1 x 30', of at most {STRONGEST:g} dioptres"
 WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?)(?:\s*/\s*([+-]?\d+(?:\.\d+)?)\s*x\s*(\d+(?:\.\d+)?))?")
 
 

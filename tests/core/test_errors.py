@@ -1,0 +1,25 @@
+"""The one line that a failure is told in."""
+
+from __future__ import annotations
+
+import pytest
+
+from holobench_eval.core.errors import BudgetError, CellError, ForeignError, StorageError, UserError, reason
+
+
+@pytest.mark.parametrize("kind", [BudgetError, CellError, StorageError, UserError])
+def test_an_error_of_this_package_is_told_without_the_name_of_its_class(kind: type[Exception]) -> None:
+    assert reason(kind("registration residual of 1.3 px")) == "registration residual of 1.3 px"
+
+
+def test_any_other_error_keeps_the_name_of_its_class() -> None:
+    assert reason(ValueError("no light")) == "ValueError: no light"
+    told = type("LinAlgError", (ForeignError,), {})
+    assert reason(told("singular matrix")) == "LinAlgError: singular matrix"
+
+
+def test_a_reason_is_one_short_line_and_never_empty() -> None:
+    assert reason(CellError("two\n  lines \udcff")) == "two lines \\udcff"
+    assert len(reason(CellError("x" * 400))) == 300
+    assert reason(CellError()) == reason(UserError(" \n")) == "no reason given"
+    assert reason(KeyboardInterrupt()) == "KeyboardInterrupt:"
