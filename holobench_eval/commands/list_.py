@@ -6,7 +6,7 @@ import difflib
 import inspect
 import sys
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -70,6 +70,7 @@ def studies() -> Entries:
         yield name, _words(file)["title"]
 
 
+@cache
 def _words(file: Path) -> dict[str, str]:
     """What a config says in words."""
     import yaml
