@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -180,6 +181,11 @@ def known(kind: str, item: str, allowed: Sequence[str]) -> str:
     if item not in allowed:
         raise UserError(f"unknown {kind} '{item}'; {suggest(item, allowed)}")
     return item
+
+
+def looked_from(path: Path) -> str:
+    """Where the search for a relative path of a dataset began, for the error of one that is not there."""
+    return "" if path.is_absolute() else f" in the working directory {Path.cwd()}, where paths of images start"
 
 
 def chosen(kind: str, names: Sequence[str], allowed: Sequence[str]) -> list[str]:

@@ -13,7 +13,7 @@ from annotated_types import Interval, MinLen
 from torch import Tensor
 
 from ..core.errors import UserError, suggest
-from .base import fit, with_channels
+from .base import fit, looked_from, with_channels
 from .images import RIGHT, SUFFIXES, GrayImageError, SixteenBit, decode, read
 
 LARGEST_MANIFEST = 10_000_000  # bytes; a hundred thousand lines
@@ -86,7 +86,7 @@ class Folder:
     def _root(self) -> Path:
         root = Path(self.path)
         if not root.is_dir():
-            what = "not a folder" if root.exists() else "no such folder"
+            what = "not a folder" if root.exists() else f"no such folder{looked_from(root)}"
             raise UserError(f"{root}: {what}; dataset 'folder' needs a folder of images as path")
         return root
 
@@ -110,7 +110,9 @@ class Folder:
             return {}
         path = Path(self.manifest)
         if not path.is_file():
-            raise UserError(f"{path}: no such manifest; write one with: sha256sum *.png > SHA256SUMS")
+            raise UserError(
+                f"{path}: no such manifest{looked_from(path)}; write one with: sha256sum *.png > SHA256SUMS"
+            )
         return _manifest(path, _version(path))
 
     def _file(self, item: str) -> Path:

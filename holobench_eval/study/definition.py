@@ -70,8 +70,8 @@ class DisplayGrid:
 class Targets:
     """The images that are scored.
 
-    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset; only: some of its images
-    (none: all).
+    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset, whose paths start in the
+    working directory; only: some of its images (none: all).
     """
 
     dataset: Text

@@ -88,6 +88,16 @@ def test_a_missing_or_empty_folder_is_one_line(tmp_path):
     assert "not a folder" in refusal(Folder(str(save(tmp_path / "file.png"))))
 
 
+def test_a_message_says_where_a_relative_path_was_looked_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    looked = f"in the working directory {Path.cwd()}, where paths of images start; "
+    assert refusal(Folder("my/images")).startswith(f"my/images: no such folder {looked}dataset 'folder' needs")
+    save(tmp_path / "my" / "file.png")
+    assert refusal(Folder("my", manifest="none")).startswith(f"none: no such manifest {looked}write one with")
+    for line in (refusal(Folder(str(tmp_path / "nowhere"))), refusal(Folder("my/file.png"))):
+        assert "working directory" not in line
+
+
 def test_one_bad_image_stops_before_anything_is_computed(pictures):
     content = (pictures / "0002.png").read_bytes()
     (pictures / "0002.png").write_bytes(content[: len(content) // 2])

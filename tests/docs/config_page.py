@@ -19,8 +19,7 @@ INTRODUCTION = """\
 
 A study is a YAML file: which methods, on which displays, for which targets.
 [configs/quick.yaml](../configs/quick.yaml) is the smallest one. Only `title`, `display`, `targets` and `methods` are
-needed. Relative paths start in the folder of the config. A mistake is one line with its place, and nothing is
-computed:
+needed. A mistake is one line with its place, and nothing is computed:
 
 ```text
 holoeval: mine.yaml:4:14: unknown profile 'idel'; did you mean 'ideal'? allowed: ...
@@ -30,6 +29,16 @@ The YAML is that of the core schema of YAML 1.2: `yes` is text, `1e-3` is a numb
 aliases and no duplicate keys. `null` stands for a value that is not there. `holoeval list` shows the names that a
 config may use, `holoeval list NAME` the parameters of a method or dataset, which `params` sets. `--set` gives a value
 of a run on the [command line](start/first-run.md#a-part-of-a-study-or-a-variant).
+
+## Where paths start
+
+| path | starts in |
+|---|---|
+| `mine.py:Name` of a method or dataset, a profile's YAML file | the folder of the config; where it is not there, the working directory |
+| `display.bench`, `protocol.lpips_weights` | the folder of the config |
+| `params` of a dataset (`path` and `manifest` of `folder`, folders among `scenes` of `focal_stacks`) and of a method (`file` and `amplitude` of `phases`) | the working directory, where `holoeval` is called |
+
+So a config that has its pictures or phases beside it is run from its own folder, or names them from where it is run.
 
 ## In an editor
 
