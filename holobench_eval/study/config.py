@@ -33,8 +33,8 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     Parameters
     ----------
     path
-        A YAML file; relative paths of code, profiles, benches and weights in it start in its folder, those in ``params``
-        in the working directory.
+        A YAML file; relative paths of code, profiles, benches and weights in it start in its folder, those in
+        ``params`` in the working directory.
     changes
         What the command line changes in it; a fault of such a value is told at its option.
 

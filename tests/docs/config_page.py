@@ -32,11 +32,11 @@ of a run on the [command line](start/first-run.md#a-part-of-a-study-or-a-variant
 
 ## Where paths start
 
-| path | starts in |
-|---|---|
-| `mine.py:Name` of a method or dataset, a profile's YAML file | the folder of the config; where it is not there, the working directory |
-| `display.bench`, `protocol.lpips_weights` | the folder of the config |
-| `params` of a dataset (`path` and `manifest` of `folder`, folders among `scenes` of `focal_stacks`) and of a method (`file` and `amplitude` of `phases`) | the working directory, where `holoeval` is called |
+- Code, `mine.py:Name`, and YAML files of profiles: in the folder of the config, and where it has none, in the working
+  directory.
+- `display.bench` and `protocol.lpips_weights`: in the folder of the config.
+- What `params` hold, `path` and `manifest` of the dataset `folder`, folders in `scenes` of `focal_stacks`, `file` and
+  `amplitude` of the method `phases`: in the working directory, where `holoeval` is called.
 
 So a config that has its pictures or phases beside it is run from its own folder, or names them from where it is run.
 
