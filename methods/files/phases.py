@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Protocol
@@ -22,6 +23,8 @@ from ..double_phase import encode
 from .arrays import SUFFIXES, read_array
 
 COLOURS = ("red", "green", "blue")
+BEYOND_RADIANS = 20.0  # whole numbers of radians that reach this far do not occur
+HIGHEST_LEVEL = 65536.0
 
 
 class NamedBench(Bench, Protocol):
@@ -47,9 +50,10 @@ class Phases:
     ----------
     file : str
         Path from the working directory: .png, .tif, .bmp, .npy, .npz or .mat. ``{target}`` in it stands for the name of
-        the target (anything but letters, digits, ``.``, ``-`` and ``_`` in a name becomes ``_``, with a part of its
-        hash behind), ``{stem}`` for that name without its ending (``cat`` for ``cat.jpg``), ``{channel}`` for the
-        colour, where each has a file of its own.
+        the target, ``{stem}`` for that name up to its last dot (``cat`` for ``cat.jpg``), ``{channel}`` for the
+        colour, where each has a file of its own. Anything but letters, digits, ``.``, ``-`` and ``_`` in a name becomes
+        ``_``, and ``{target}`` then has a part of the name's hash behind; ``{stem}`` has it only for a name without a
+        dot. Two targets with the same file are refused.
     amplitude : str
         Path of the amplitudes in the same manner, where amplitude and phase of a field lie in two files; empty for
         none.
@@ -58,7 +62,8 @@ class Phases:
     variable : str
         Name of the array in a .npz or .mat file; empty where there is only one.
     levels : {"integers", "all"}
-        Which real numbers are levels: integers, or all (MATLAB keeps levels as double).
+        Which real numbers are levels: integers, or all (MATLAB keeps levels as double). Floating point that is whole
+        throughout and goes beyond 20 is no file of radians, and is refused unless all are levels.
     two_pi_level : float, optional
         The level that lags a full turn behind level 0; by default 256 or 65536, by the bits of the file. A file of
         radians is refused with it.
@@ -87,6 +92,7 @@ class Phases:
     order: Literal["rgb", "bgr"] = "rgb"
     encoder: Literal["double_phase", "phase_only"] = "double_phase"
 
+    version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 
@@ -104,6 +110,20 @@ class Phases:
         """The files that hold the phase of a target; those of all colours where each has its own."""
         patterns = [pattern for pattern in (self.file, self.amplitude) if pattern]
         return [path for pattern in patterns for path in self._paths(pattern, target_name)]
+
+    def refuse_shared(self, target_names: Iterable[str]) -> None:
+        """UserError where a pattern with ``{target}`` or ``{stem}`` gives several targets the same file."""
+        names, owners = list(target_names), dict[str, str]()
+        for pattern in (self.file, self.amplitude):
+            if not _names_targets(pattern):
+                continue  # one file for all
+            paths = [(path, name) for name in names for path in self._paths(pattern, name)]
+            for path, owner in paths:
+                if (other := owners.setdefault(path, owner)) != owner:
+                    raise UserError(
+                        f"'{pattern}' is the same file, {path}, for the targets '{other}' and '{owner}'; "
+                        "{target} in the place of {stem} tells them apart"
+                    )
 
     def solve(self, target: Tensor, bench: NamedBench) -> Tensor:
         """The phase that the target's file holds.
@@ -139,16 +159,16 @@ class Phases:
     def _read(self, pattern: str, target_name: str, spec: DisplaySpec, colours: int, phases: bool = True) -> Tensor:
         """What the files of a pattern hold, ``(C, H, W)``: phases [rad], complex fields, or amplitudes."""
         paths = self._paths(pattern, target_name)
+        if len(paths) > 1 and len(paths) != colours:
+            raise CellError(f"channels: {len(paths)} names for the {colours} colours of '{spec.name}'")
+        if (missing := next((path for path in paths if not Path(path).is_file()), None)) is not None:
+            raise CellError(f"{missing}: no such file{self._altered(pattern, target_name)}{self._hint(missing)}")
         if len(paths) > 1:
-            if len(paths) != colours:
-                raise CellError(f"channels: {len(paths)} names for the {colours} colours of '{spec.name}'")
             planes = [self._planes(path, spec, 1, phases) for path in paths]
             return torch.cat(planes)
         return self._planes(paths[0], spec, colours, phases)
 
     def _planes(self, path: str, spec: DisplaySpec, colours: int, phases: bool) -> Tensor:
-        if not Path(path).is_file():
-            raise CellError(f"{path}: no such file{self._hint(path)}")
         array = read_array(Path(path), self.variable)
         if array.ndim == 3 and array.shape[-1] == colours and array.shape[:2] == spec.shape:
             array = np.moveaxis(array, -1, 0)
@@ -167,6 +187,12 @@ class Phases:
             raise CellError(f"{path}: holds values that are NaN or infinite")
         return torch.from_numpy(np.ascontiguousarray(values))
 
+    @staticmethod
+    def _altered(pattern: str, target_name: str) -> str:
+        """Which target a file is for, where the name of the file does not say so."""
+        is_altered = _names_targets(pattern) and file_name(target_name) != target_name
+        return f" for the target '{target_name}'" if is_altered else ""
+
     def _hint(self, path: str) -> str:
         """The remedy where a pattern repeats the ending of a target's name, as in ``cat.png.png``."""
         short = Path(path).with_suffix("").with_suffix(Path(path).suffix)
@@ -183,9 +209,23 @@ class Phases:
             array = array.astype(np.float64) * (math.tau / (self.two_pi_level or 2**bits))
         elif self.two_pi_level is not None:
             raise CellError(f"{path}: two_pi_level is set, but {array.dtype} holds radians; levels need 'levels: all'")
+        elif _are_levels(array):
+            raise CellError(
+                f"{path}: {array.dtype}, but whole numbers up to {np.abs(array).max():g}, so levels, not radians; set "
+                "'levels: all' and two_pi_level (radians that are whole: store them modulo 2 pi)"
+            )
         if self.sign == 1 and not self.origin:
             return array  # to the last bit
         return self.sign * array.astype(np.float64) + self.origin
+
+
+def _names_targets(pattern: str) -> bool:
+    return "{target}" in pattern or "{stem}" in pattern
+
+
+def _are_levels(array: NDArray[Any]) -> bool:
+    """Whether real numbers are levels beyond doubt: all are whole, and some go beyond three turns in radians."""
+    return bool(BEYOND_RADIANS < np.abs(array).max() <= HIGHEST_LEVEL and (array == np.rint(array)).all())
 
 
 def _real(array: NDArray[Any], path: str) -> NDArray[Any]:

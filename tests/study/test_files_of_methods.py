@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
@@ -93,6 +94,56 @@ def test_a_file_that_changed_after_planning_is_not_taken_for_the_planned_one(
     reasons = {record["reason"] for record in found if record["label"] == "phases"}
     assert len(reasons) == 1
     assert "has changed since the study was planned" in reasons.pop()
+
+
+FOLDER = """
+title: "Names"
+display: {profiles: [ideal], panel: [128, 128]}
+targets: {dataset: folder, params: {path: pictures}}
+protocol: {metrics: [psnr]}
+methods: [%s]
+"""
+
+
+@pytest.fixture
+def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("pictures").mkdir()
+    for seed, name in enumerate(("a.jpg", "a.png", "red cup.png")):
+        pixels = np.random.default_rng(seed).integers(0, 256, (16, 16, 3)).astype(np.uint8)
+        Image.fromarray(pixels).save(Path("pictures", name))
+    np.save("a.npy", np.zeros((3, 128, 128)))
+    return Path("pictures")
+
+
+def named(pictures: Path, file: str, amplitude: str = "") -> Path:
+    path = pictures.parent / "names.yaml"
+    path.write_text(FOLDER % f'{{name: phases, params: {{file: "{file}", amplitude: "{amplitude}"}}}}')
+    return path
+
+
+@pytest.mark.parametrize("files", [("{stem}.npy",), ("{target}.npy", "{stem}.npy"), ("{stem}-{channel}.npy",)])
+def test_two_targets_with_the_same_file_are_refused_when_the_study_is_planned(
+    pictures: Path, files: tuple[str, ...]
+) -> None:
+    message = r"method 'phases': '\{stem\}.*\.npy' is the same file, a.*\.npy, for the targets 'a\.jpg' and 'a\.png'; "
+    with pytest.raises(UserError, match=message) as refused:
+        planned(named(pictures, *files))
+    assert "\n" not in str(refused.value)
+    (pictures / "a.jpg").unlink()
+    assert len(ids(planned(named(pictures, "{stem}.npy")))) == 2
+
+
+def test_one_file_for_all_targets_is_no_mistake(pictures: Path) -> None:
+    assert len(set(ids(planned(named(pictures, "a.npy"))).values())) == 3
+
+
+def test_where_no_file_is_there_the_target_with_an_altered_name_is_named(pictures: Path) -> None:
+    for name in ("a.jpg", "a.png"):
+        (pictures / name).unlink()
+    message = r"is there, such as p/red_cup\.npy for the target 'red cup\.png', from the working directory"
+    with pytest.raises(UserError, match=message):
+        planned(named(pictures, "p/{stem}.npy"))
 
 
 METHOD = '''

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import CellError, UserError
+from ...core.io import file_name
 from ..definition import MethodEntry
 from . import build
 
@@ -17,8 +18,10 @@ MISSING = "missing"
 def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str]) -> dict[str, Mapping[str, str]]:
     """What ``digests`` gives for every target of a method of a study. folder: of the config.
 
-    UserError where not one of the files is there; a few that lack are holes of the table.
+    UserError where not one of the files is there, and where the method refuses that targets share a file; a few that
+    lack are holes of the table.
     """
+    targets = list(targets)
     if not hasattr(cls, "files"):
         return {target: {} for target in targets}
     method = build(entry.name, entry.params, folder)
@@ -26,10 +29,19 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
         found: dict[str, Mapping[str, str]] = {target: digests(method, target) for target in targets}
     except (CellError, OSError) as error:
         raise UserError(f"method '{entry.name}' does not say which files it reads: {error}") from error
-    read = [(path, sha256) for files in found.values() for path, sha256 in files.items()]
-    if read and all(sha256 == MISSING for _, sha256 in read):
-        where = "" if Path(read[0][0]).is_absolute() else ", from the working directory"
-        raise UserError(f"method '{entry.name}': none of the files that it reads is there, such as {read[0][0]}{where}")
+    if hasattr(method, "refuse_shared"):
+        try:
+            method.refuse_shared(targets)
+        except UserError as error:
+            raise UserError(f"method '{entry.name}': {error}") from None
+    read = [(target, path, sha256) for target, files in found.items() for path, sha256 in files.items()]
+    if read and all(sha256 == MISSING for *_, sha256 in read):
+        target, path, _ = read[0]
+        which = "" if file_name(target) == target else f" for the target '{target}'"
+        where = "" if Path(path).is_absolute() else ", from the working directory"
+        raise UserError(
+            f"method '{entry.name}': none of the files that it reads is there, such as {path}{which}{where}"
+        )
     return found
 
 

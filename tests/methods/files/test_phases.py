@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -184,6 +185,12 @@ def wrong_files(folder: Path) -> None:
         ("gone.npy", {}, "gone.npy: no such file"),
         ("small.npy", {}, r"3 x 11 x 12 values of type float64; 'small' shows 12 x 12 in 3 colours"),
         ("int.npy", {}, "say which level is a full turn: two_pi_level"),
+        (
+            "float.npy",
+            {},
+            "float64, but whole numbers up to 25[0-9], so levels, not radians; set 'levels: all' and two_pi",
+        ),
+        ("float.npy", {"sign": -1, "origin": 1.0}, r"\(radians that are whole: store them modulo 2 pi\)"),
         ("float.npy", {"two_pi_level": 256}, "two_pi_level is set, but float64 holds radians; levels need"),
         ("nan.npy", {}, "NaN or infinite"),
         ("objects.npy", {}, "damaged, or no .npy file: Object arrays cannot be loaded"),
@@ -256,6 +263,31 @@ def test_a_doubled_ending_is_told_with_its_remedy(tmp_path: Path) -> None:
     np.save(tmp_path / "cat.npy", PHASE)
     with pytest.raises(CellError, match=r"cat\.jpg\.npy: no such file; \{stem\} in the place of .*cat\.npy"):
         solved(tmp_path / "{target}.npy")
+
+
+@pytest.mark.parametrize("radians", [np.arange(12) - 6.0, np.arange(12) * 30.5, np.arange(12) * 1e6])
+def test_radians_that_may_be_are_taken(tmp_path: Path, radians: Any) -> None:
+    np.save(tmp_path / "a.npy", np.broadcast_to(radians, SHAPE))
+    assert turns_apart(solved(tmp_path / "a.npy"), np.broadcast_to(np.float32(radians), SHAPE)) < 1e-3
+
+
+def test_a_missing_file_names_the_target_whose_name_was_altered(tmp_path: Path) -> None:
+    message = r"red_cup\.npy: no such file for the target 'red cup\.png'"
+    with pytest.raises(CellError, match=message):
+        solved(tmp_path / "{stem}.npy", Bench("red cup.png"))
+    for pattern, name in (("{stem}.npy", "cup.png"), ("gone-{channel}.npy", "red cup.png")):
+        with pytest.raises(CellError, match=r"no such file$"):
+            solved(tmp_path / pattern, Bench(name))
+
+
+def test_the_name_of_a_target_gives_a_hash_where_it_is_altered_and_a_stem_none() -> None:
+    def first(pattern: str, name: str) -> str:
+        return str(plugins.build("methods", "phases", {"file": pattern}).files(name)[0])
+
+    assert first("{stem}.png", "red cup.png") == "red_cup.png"
+    assert re.fullmatch(r"red_cup\.png-[0-9a-f]{8}\.npy", first("{target}.npy", "red cup.png"))
+    assert first("{target}.npy", "cup.png") == "cup.png.npy"
+    assert re.fullmatch(r"red_cup-[0-9a-f]{8}\.png", first("{stem}.png", "red cup"))
 
 
 def test_the_files_of_a_target_are_those_that_are_read() -> None:
