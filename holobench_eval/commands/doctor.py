@@ -25,7 +25,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..core.errors import reason
-from ..core.installed import installed, pinned, shipped
+from ..core.installed import installed, installing, pinned, shipped
 from .output import console
 
 State = Literal["ok", "missing", "warning"]
@@ -146,13 +146,12 @@ def _packages() -> Iterator[Finding]:
     modules = {MODULES.get(name, name.replace("-", "_")): name for name in names}
     seen = _ask(LIBRARIES, IMPORTING, *modules)
     if isinstance(seen, str):
-        remedy = "pip install -c constraints.txt -e ."
-        yield Finding("packages", "missing", f"importing them all {seen}", remedy, core=True)
+        yield Finding("packages", "missing", f"importing them all {seen}", installing(), core=True)
         return
     for module, name in modules.items():
         wrong = seen["errors"].get(module)
         if wrong is not None:
-            yield Finding(name, "missing", wrong, _install(name), core=True)
+            yield Finding(name, "missing", wrong, installing(name), core=True)
         elif name in ("torch", "numpy"):
             yield Finding(name, "ok", version(name), core=True)
     complete = len(modules) - len(seen["errors"])
@@ -167,13 +166,13 @@ def _packages() -> Iterator[Finding]:
 
 def _versions(names: list[str]) -> Finding:
     """Whether the packages that the core needs are those that the committed results were made with."""
-    wanted, remedy = pinned(), f"pip install -c {shlex.quote(str(shipped() / 'constraints.txt'))} holobench_eval"
+    wanted = pinned()
     if not wanted:
         return Finding("versions", "warning", f"cannot be compared: {shipped() / 'constraints.txt'} names none")
     there = {name: found.partition("+")[0] for name in names if (found := installed(name))}
     other = {name: found for name, found in there.items() if found != wanted.get(name, found)}
     told = ", ".join(f"{name} {found} (not {wanted[name]})" for name, found in other.items())
-    return _either("versions", None if other else "those of the committed results", told, remedy, "warning")
+    return _either("versions", None if other else "those of the committed results", told, installing(), "warning")
 
 
 def _kernel(fault: str | None) -> Finding:
@@ -181,7 +180,7 @@ def _kernel(fault: str | None) -> Finding:
     if fault is None:
         return Finding("propagation", "ok", "compiled for this processor")
     why = f"by torch, at half the speed: the compiled kernel cannot be had ({fault})"
-    return Finding("propagation", "missing", why, _install("numba"))
+    return Finding("propagation", "missing", why, installing("numba"))
 
 
 def _required() -> list[str]:
@@ -200,7 +199,7 @@ def _opencv() -> Iterator[Finding]:
         yield Finding("OpenCV", "ok", text)
     elif there:
         why = f"{text}: not the headless wheel alone, which the results are tested with"
-        remedy = f"pip uninstall -y {' '.join(there)} && pip install opencv-python-headless"
+        remedy = f"pip uninstall -y {' '.join(there)} && {installing('opencv-python-headless')}"
         yield Finding("OpenCV", "warning", why, remedy)
 
 
@@ -231,7 +230,7 @@ def _weights() -> Iterator[Finding]:
     for name, file, url, without in (
         ("LPIPS weights (AlexNet)", find_weights("alex"), _TRUNKS["alex"].url, "no column lpips_alex"),
         ("LPIPS weights (VGG-16)", find_weights("vgg"), _TRUNKS["vgg"].url, "no column lpips_vgg"),
-        ("perceptual loss (VGG-19)", vgg19(), URL, "fixed filters in their place, see docs/learned.md"),
+        ("perceptual loss (VGG-19)", vgg19(), URL, "fixed filters in their place, and reports say so"),
     ):
         target = Path(torch.hub.get_dir()) / "checkpoints" / url.rpartition("/")[2]
         command = f"curl -L --create-dirs -o {shlex.quote(str(target))} {url}"
@@ -240,12 +239,12 @@ def _weights() -> Iterator[Finding]:
 
 def _peers() -> Iterator[Finding]:
     for name in ("odak", "torchoptics"):
-        yield _either(f"peer {name}", installed(name), "not installed", _install("holobench_eval[peers]"))
+        yield _either(f"peer {name}", installed(name), "not installed", installing(extra="peers"))
 
 
 def _drivers() -> Iterator[Finding]:
     raw = installed("rawpy")
-    remedy = _install("holobench_eval[raw]")
+    remedy = installing(extra="raw")
     yield _either("camera RAW files", raw and f"rawpy {raw}", "rawpy: not installed", remedy)
     seen = _ask(DRIVERS, ASKING)
     if isinstance(seen, str):
@@ -279,7 +278,3 @@ def _ask(code: str, seconds: float, *arguments: str) -> Any:
     except (IndexError, ValueError):
         last = (done.stderr.strip() or "without a word").splitlines()[-1][:200]
         return f"ends with {done.returncode}: {last}"
-
-
-def _install(package: str) -> str:
-    return f"pip install {shlex.quote(package)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -22,6 +23,24 @@ def installed(package: str) -> str | None:
 def shipped() -> Path:
     """The folder of the studies that ship, and of ``constraints.txt``."""
     return Path(str(files(f"{__package__.partition('.')[0]}.configs")))
+
+
+def clone() -> Path | None:
+    """The clone of the repository that this package runs from, with ``pip install -e``; None for an installed wheel."""
+    root = shipped().parent
+    return root if (root / "pyproject.toml").is_file() and (root / "constraints.txt").is_file() else None
+
+
+def installing(package: str = "", extra: str = "") -> str:
+    """The command that installs a package, or without its name this one and an extra of it, in the versions that the
+    committed results were made with: from the folder of a clone as its documentation has it, from anywhere else with
+    whole paths. What is installed already need not be on an index to get its extras."""
+    root = clone()
+    relative = root is not None and root == Path.cwd()
+    constraints = "constraints.txt" if relative else str((root or shipped()) / "constraints.txt")
+    own = ("." if relative else str(root or "holobench_eval")) + (f"[{extra}]" if extra else "")
+    editable = "-e " if root is not None and not package else ""
+    return f"pip install -c {shlex.quote(constraints)} {editable}{shlex.quote(package or own)}"
 
 
 @cache

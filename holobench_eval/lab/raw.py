@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import UserError
+from ..core.installed import installing
 
 LARGEST = 512 * 2**20  # bytes; the RAW files of medium-format cameras have 200 MB
 
@@ -40,7 +41,7 @@ def read_raw(source: Path | bytes, name: str = "") -> RawFrame:
     try:
         import rawpy
     except ImportError as error:
-        raise UserError("RAW files need the package rawpy: pip install 'holobench_eval[raw]'") from error
+        raise UserError(f"RAW files need the package rawpy: {installing(extra='raw')}") from error
 
     where = name or (str(source) if isinstance(source, Path) else "the RAW file")
     if (source.stat().st_size if isinstance(source, Path) else len(source)) > LARGEST:

@@ -11,7 +11,7 @@ import typer
 
 from holobench_eval.commands import doctor as module
 from holobench_eval.commands.doctor import Finding, _ask, doctor, examine
-from holobench_eval.core.installed import installed, pinned
+from holobench_eval.core.installed import installed, installing, pinned
 
 DEVICES = [
     {"kind": "slm", "driver": "monitor", "version": "2.1", "devices": ["HDMI-2, 1920x1080"], "why": ""},
@@ -65,7 +65,7 @@ def test_a_machine_without_the_compiler_gets_one_line_and_is_not_broken(quick):
     quick.setattr(module, "_ask", lambda code, *_: DEVICES if "drivers" in code else fault)
     lines = [each for each in examine() if "numba" in each.what + each.found + each.remedy]
     assert [(each.what, each.state, each.remedy, each.broken) for each in lines] == [
-        ("propagation", "missing", "pip install numba", False)
+        ("propagation", "missing", installing("numba"), False)
     ]
 
 
@@ -77,6 +77,18 @@ def test_versions_that_differ_from_the_pinned_ones_are_told_with_the_constraints
     assert Path(shlex.split(found.remedy)[3]).is_file()
     quick.setattr(module, "pinned", dict)
     assert "cannot be compared" in named(examine(), "versions").found
+
+
+def test_what_pip_gets_is_in_the_pinned_versions(quick):
+    quick.setattr(module, "installed", lambda name: None)
+    findings = examine()
+    commands = [named(findings, what).remedy for what in ("peer odak", "peer torchoptics", "camera RAW files")]
+    assert commands == [installing(extra="peers")] * 2 + [installing(extra="raw")]
+    assert all(Path(shlex.split(command)[3]).is_file() for command in commands)
+
+
+def test_nothing_refers_to_pages_that_a_wheel_lacks(quick):
+    assert not [each for each in examine() if "docs/" in each.found + each.remedy]
 
 
 def test_everything_missing_has_something_to_do(quick):
@@ -102,7 +114,7 @@ def test_commands_are_printed_whole_for_copying(quick, capsys):
 def test_a_package_that_cannot_be_imported_is_broken_and_exits_1(quick, capsys):
     errors = {"kornia": "ImportError: no symbol"}
     quick.setattr(module, "_ask", lambda code, *_: DEVICES if "drivers" in code else {"errors": errors})
-    assert named(examine(), "kornia") == Finding("kornia", "missing", errors["kornia"], "pip install kornia", core=True)
+    assert named(examine(), "kornia") == Finding("kornia", "missing", errors["kornia"], installing("kornia"), core=True)
     assert exit_code() == 1
     assert capsys.readouterr().out.splitlines()[-1] == "broken: kornia"
 
@@ -112,7 +124,7 @@ def test_the_wheel_with_windows_is_a_warning_since_it_overwrites_the_headless_on
     quick.setattr(module, "installed", versions.get)
     found = named(examine(), "OpenCV")
     assert found.state == "warning"
-    assert found.remedy.startswith("pip uninstall -y opencv-python-headless opencv-python && pip install")
+    assert found.remedy.startswith("pip uninstall -y opencv-python-headless opencv-python && pip install -c ")
 
 
 def test_a_full_disk_and_no_git_are_told(quick):

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any
 
 from ...core.errors import UserError, suggest
-from ...core.installed import installed
+from ...core.installed import installed, installing
 from ...core.schema import checked
 from ..devices import Camera, DeviceError, Slm
 from .driver import Driver, Kind
@@ -75,8 +75,8 @@ def survey() -> list[Survey]:
 def _survey(driver: Driver[Any]) -> Survey:
     version = installed(driver.package)
     if version is None:
-        extra = f"pip install 'holobench_eval[{driver.extra}]'" if driver.extra else f"pip install {driver.package}"
-        return Survey(driver.kind, driver.name, None, (), extra)
+        remedy = installing(extra=driver.extra) if driver.extra else installing(driver.package)
+        return Survey(driver.kind, driver.name, None, (), remedy)
     devices: tuple[str, ...] = ()
     try:
         devices = tuple(driver.answering())

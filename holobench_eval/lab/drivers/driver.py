@@ -10,6 +10,7 @@ from typing import Any, Generic, Literal, TypeVar
 import numpy as np
 
 from ...core.errors import UserError
+from ...core.installed import installing
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
 from .worker import line
@@ -43,7 +44,7 @@ def import_package(driver: str, module: str, package: str, extra: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        hint = f"pip install 'holobench_eval[{extra}]'"
+        hint = installing(extra=extra)
         raise UserError(f"driver '{driver}' needs {package}: {hint} ({line(error)})") from error
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ...core.errors import UserError
+from ...core.installed import installing
 from .processes import ONE_THREAD
 
 J = TypeVar("J")
@@ -56,9 +57,7 @@ class Slurm:
         try:
             from dask_jobqueue.slurm import SLURMCluster
         except ImportError:
-            raise UserError(
-                "the executor slurm needs dask-jobqueue: pip install -c constraints.txt 'holobench_eval[cluster]'"
-            ) from None
+            raise UserError(f"the executor slurm needs dask-jobqueue: {installing(extra='cluster')}") from None
         from distributed import Client
 
         with _settings():

@@ -2,6 +2,7 @@
 
 import builtins
 import importlib.metadata
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.core.installed import installing
 from holobench_eval.lab.drivers import catalogue as drivers
 from holobench_eval.lab.drivers.catalogue import (
     CAMERA_DRIVERS,
@@ -94,7 +96,7 @@ def test_a_missing_package_is_told_with_the_command_that_installs_it(
     _hide(monkeypatch, package)
     if package == "rawpy":
         pytest.importorskip("gphoto2")
-    with pytest.raises(UserError, match=rf"pip install 'holobench_eval\[{extra}\]'"):
+    with pytest.raises(UserError, match=re.escape(installing(extra=extra))):
         _open(kind, driver, params)
 
 
