@@ -179,6 +179,9 @@ def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
         screen.print(f"\nSource: {escape(said.source)}", highlight=False)
     if hasattr(cls, "tuned"):
         screen.print(f"\nTuned: {escape(cls.tuned)}", highlight=False)
+    if not said.parameters:
+        screen.print("\nIt has no parameters.", highlight=False)
+        return
     screen.print("\nIts parameters (params: in a config), each with its default and what it may be:", highlight=False)
     for entry in said.parameters:
         default = f" = {entry.default}" if entry.default else ""

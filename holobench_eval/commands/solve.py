@@ -28,6 +28,9 @@ def solve(
 ) -> None:
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from ..core.io import file_name
+    from ..study.config import load_study
+    from ..study.displays import displays
+    from ..study.plan import plan
     from .run import run
 
     names = [name.strip() for name in methods.split(",") if name.strip()]
@@ -38,8 +41,10 @@ def solve(
     earlier = before.read_bytes() if before.is_file() else None
     config = write_study(names, picture, display, panel, folder)
     size = f"{panel[0]} x {panel[1]} pixels"
-    print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
     try:
+        study = load_study(config)
+        plan(study)
+        print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
         run(config, output=folder, executor="serial", artifacts=artifacts)
     except UserError as error:
         if earlier is not None:  # the report that is there is of this one
@@ -47,12 +52,21 @@ def solve(
         elif is_new and not (folder / "records").exists():
             shutil.rmtree(folder)
         raise UserError(re.sub(rf"^{re.escape(str(config))}(:\d+)*: ", "", str(error))) from None
-    labels = [file_name(name.rpartition(":")[2]) for name in names]
+    labels = [file_name(label) for label in study.labels]
+    made = {(label, file_name(shown.title)) for label in labels for shown in displays(study).values()}
     for path in (
         *sorted(folder.glob("figures/comparison-*.jpg")),
         *(folder / what / label for what in ("phases", "captures") for label in labels),
     ):
         print(path)
+    for path in _earlier(folder, made):
+        print(f"{path}: not of this run, whose methods or display are others; left as it was")
+
+
+def _earlier(folder: Path, made: set[tuple[str, str]]) -> list[Path]:
+    """The folders of phases and captures in a folder that are those of other methods or displays than were made."""
+    found = sorted(path for what in ("phases", "captures") for path in folder.glob(f"{what}/*/*") if path.is_dir())
+    return [path for path in found if (path.parent.name, path.name) not in made]
 
 
 def write_study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> Path:

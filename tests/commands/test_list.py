@@ -74,6 +74,14 @@ def test_a_name_of_any_kind_is_explained(capsys: pytest.CaptureFixture[str], nam
         assert word in text
 
 
+def test_a_method_without_parameters_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.py").write_text('def flat(target, bench):\n    """A flat phase."""\n    return target * 0\n')
+    list_(f"{tmp_path}/mine.py:flat")
+    said = capsys.readouterr().out
+    assert "\nIt has no parameters.\n" in said
+    assert "params:" not in said
+
+
 @pytest.mark.parametrize("kind", ["methods", "datasets"])
 def test_every_parameter_of_what_ships_has_a_meaning(kind: plugins.Kind) -> None:
     for name in plugins.names(kind):

@@ -80,6 +80,18 @@ def test_a_refused_method_leaves_the_study_of_the_report_that_is_there(picture: 
     assert Path("out/study.yaml").read_text() == study
 
 
+def test_what_other_methods_and_displays_left_is_said_not_to_be_of_the_run(
+    picture: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for methods, display in (("double_phase", "ideal"), ("gerchberg_saxton", "ideal"), ("double_phase", "leto-mild")):
+        solve(methods, picture, display=display, panel=(128, 128), output=Path("out"))
+    said = [line.partition(": ")[0] for line in capsys.readouterr().out.splitlines() if "not of this run" in line]
+    first = [f"out/{what}/double_phase/ideal" for what in ("captures", "phases")]
+    second = [f"out/{what}/gerchberg_saxton/ideal" for what in ("captures", "phases")]
+    assert said == [*first, first[0], second[0], first[1], second[1]]
+    assert all(any(Path(path).iterdir()) for path in said)
+
+
 def test_a_folder_holds_one_picture(picture: Path) -> None:
     Path("out", "picture").mkdir(parents=True)
     Path("out", "picture", "other.png").touch()
@@ -113,15 +125,17 @@ def test_files_of_others_are_not_replaced(picture: Path) -> None:
         ("", {}, "methods"),
         ("double_phase", {"panel": (20, 20)}, "panel"),
         ("double_phase", {"display": "leto"}, "leto"),
+        ("phases", {}, "none of the files that it reads is there"),
     ],
 )
 def test_what_is_refused_is_said_of_the_command_and_leaves_nothing(
-    picture: Path, methods: str, changes: dict[str, Any], message: str
+    picture: Path, methods: str, changes: dict[str, Any], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(UserError, match=message) as refused:
         solve(methods, picture, output=Path("out"), **changes)
     assert "study.yaml" not in str(refused.value)
     assert not Path("out").exists()
+    assert capsys.readouterr().out == ""
 
 
 @pytest.mark.parametrize("name", ["picture", ".hidden.png"])
