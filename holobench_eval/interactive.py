@@ -17,7 +17,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from .core.arrays import Numbers, array_of, as_in_config, tensor_of
+from .core.arrays import Numbers, array_of, as_in_config, tensor_of, type_name
 from .core.errors import CellError, UserError, reason
 from .core.objects import method_of
 from .core.panels import is_small, rows_and_columns
@@ -112,8 +112,7 @@ class OpenDisplay:
         except Exception as error:  # whatever a stranger's method does
             raise CellError(f"{label}: {reason(error)}") from error
         if not is_plain(phase) or tuple(phase.shape) != (1, len(light), *self.spec.shape):
-            other = f"an array of {phase.dtype}" if isinstance(phase, np.ndarray) else type(phase).__name__
-            found = tuple(phase.shape) if isinstance(phase, Tensor) else other
+            found = tuple(phase.shape) if isinstance(phase, Tensor) else type_name(phase)
             raise CellError(f"{label}: solve returned {found}, not a phase {(1, len(light), *self.spec.shape)}")
         check_phase(phase[0], self.spec, label)
         return phase[0].detach().cpu().numpy()

@@ -209,7 +209,7 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (lambda d, t: d.solve(lambda target, bench: 3, t), r"solve returned int, not a phase \(1, 3, 128, 128\)"),
         (
             lambda d, t: d.solve(lambda target, bench: np.ones((1, 3, 128, 128), int), t),
-            "returned an array of int64, not",
+            "returned ndarray of int64, not",
         ),
         (lambda d, t: d.solve(lambda target, bench: torch.full((1, 3, 128, 128), torch.nan), t), "NaN or infinite"),
         (lambda d, t: d.solve(lambda target: 3, t), r"lambda>\(target\) cannot be called with target, bench"),

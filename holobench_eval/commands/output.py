@@ -62,7 +62,7 @@ def headline_table(results: Results, condition: str) -> Table:
     which were given as much of the camera, and named by them where there are several such categories.
     """
     from ..report.data.categories import CATEGORIES, ORACLE
-    from ..report.data.marks import marked
+    from ..report.data.marks import counted
     from ..report.data.text import FILES, number
 
     score, layout = results.headline, results.layout
@@ -81,13 +81,10 @@ def headline_table(results: Results, condition: str) -> Table:
     for name in methods:
         row, category = results.row(name, condition), layout.category(name)
         lacks = row["n"] < len(results.targets)
-        scored = f" ({row['n']:.0f} of {len(results.targets)} targets)" * lacks
         rank = number(row.get("rank", math.nan))
         place = f"{rank} {category}" if several and rank != "–" else "not ranked" if lacks else rank
         captures = [number(row["total_captures"])] if spends else []
-        table.add_row(
-            *map(escape, (f"{marked(results, name, condition)}{scored}", score.in_row(row), place, *captures))
-        )
+        table.add_row(*map(escape, (counted(results, name, condition), score.in_row(row), place, *captures)))
     return table
 
 

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from ..core.errors import UserError, suggest
 from .output import console as open_console
-from .output import print_headline
+from .output import print_answer, print_headline
 
 if TYPE_CHECKING:
     from ..report import Results
@@ -56,17 +56,9 @@ def score(
     for hole in results.holes.to_dict("records"):
         text = f"{hole['state']}: {hole['method']} · {hole['target']}: {hole['reason']}"
         console.print(text, style="red", markup=False, highlight=False, soft_wrap=True)
-    if word := advice(results):
-        console.print(word, markup=False, highlight=False, soft_wrap=True)
+    print_answer(console, results)
     print(f"{report}\n{output / 'report.html'}\n{output / 'table.csv'}\n{output / 'records.csv'}")
     raise typer.Exit(1 if len(results.holes) else 0)
-
-
-def advice(results: Results) -> str:
-    """Which methods are not ranked since they lack targets, and what to do about it; nothing where none does."""
-    from ..report.answers.lacking import lacking
-
-    return lacking(results)
 
 
 def score_folders(

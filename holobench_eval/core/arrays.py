@@ -1,4 +1,4 @@
-"""What a notebook passes as numbers: arrays of NumPy, tensors of torch, lists. What is wrong is told in one line."""
+"""What users pass as numbers: arrays of NumPy, tensors of torch, lists. What is wrong is told in one line."""
 
 from __future__ import annotations
 
@@ -40,6 +40,11 @@ def tensor_of(values: Numbers, what: str, radians: bool = False) -> Tensor:
         right = "radians as floating point, as np.angle gives them" if radians else "real numbers"
         raise UserError(f"{what} of {array.dtype}; expected {right}")
     return torch.from_numpy(array.astype(np.float32, order="C"))
+
+
+def type_name(value: object) -> str:
+    """What a value is called in messages; an array with the type of its numbers."""
+    return f"ndarray of {value.dtype}" if type(value) is np.ndarray else type(value).__name__
 
 
 def as_in_config(value: Any) -> Any:

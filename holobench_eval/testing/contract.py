@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ..core.arrays import type_name
 from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
@@ -79,7 +80,7 @@ def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, camera:
     shape = (*target.shape[:2], *bench.spec.shape)
     phase, handle = _solve(method, bench, target)
     assert is_plain(phase), (
-        f"{name}.solve returned {type(phase).__name__}, not a plain torch.Tensor or a NumPy array of float32 or float64"
+        f"{name}.solve returned {type_name(phase)}, not a plain torch.Tensor or a NumPy array of float32 or float64"
     )
     assert tuple(phase.shape) == shape, f"{name}.solve returned {tuple(phase.shape)} for {shape}"
     assert phase.is_floating_point(), f"{name}.solve returned {phase.dtype}, not a phase in radians"

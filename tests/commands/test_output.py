@@ -76,7 +76,7 @@ def test_a_rank_is_named_by_its_category_where_there_are_several(records: list[d
 
 def test_a_row_with_a_hole_has_no_rank_and_says_how_many_targets_it_has(records: list[dict[str, Any]]) -> None:
     (row, *_) = [line for line in printed(found(records)) if "GS" in line]
-    assert "GS (5 of 6 targets)" in row
+    assert "GS, 5 of 6 targets" in row
     assert "not ranked" in row
 
 

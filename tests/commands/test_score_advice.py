@@ -8,27 +8,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holobench_eval.commands.score import advice
 from holobench_eval.core.errors import CellError
 from holobench_eval.imaging.align import PLAIN, align
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.answers import kind_of
+from holobench_eval.report.answers.lacking import lacking
 from holobench_eval.study.folders import FILES
 from holobench_eval.study.folders.pairing import UNKNOWN
 from tests.support.synthetic_study import cell, layout, record, study
 
 
 def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path: Path) -> None:
-    records = study(tmp_path, size=24)
-    one = advice(Results(records_frame(records, layout()), layout()))  # GS lacks coffee on a display
+    records, given = study(tmp_path, size=24), layout(measure=FILES)
+    one = lacking(Results(records_frame(records, given), given))  # GS lacks coffee on a display
     assert one.startswith("Only the 11 methods that have every target are ranked: GS on leto-aged lacks 1 of 6 targets")
     first = records[0]["cell"]["target"]
     lost = {"state": "failed", "scores": {}, "reason": "cannot be aligned"}
     holed = [{**one, **lost} if one["cell"]["target"] == first else one for one in records]
-    results = Results(records_frame(holed, layout()), layout())
-    assert f"move the targets and captures of {first}" in advice(results)
+    results = Results(records_frame(holed, given), given)
+    assert f"move the targets and captures of {first}" in lacking(results)
     nothing = [{**one, **lost} for one in records]
-    assert advice(Results(records_frame(nothing, layout()), layout())).endswith("Take the failed captures again.")
+    assert lacking(Results(records_frame(nothing, given), given)).endswith("Take the failed captures again.")
 
 
 def holed(*holes: tuple[str, str, str, str]) -> Results:
@@ -48,7 +48,7 @@ def holed(*holes: tuple[str, str, str, str]) -> Results:
 
 def test_methods_that_lack_targets_are_told_though_others_are_complete() -> None:
     results = holed(("missing", "c", "t1", "no capture"), ("missing", "b", "t1", "no"), ("missing", "c", "t3", "no"))
-    said = advice(results)
+    said = lacking(results)
     assert said == (
         "Only the 1 method that has every target is ranked: b lacks 1 of 4 targets (t1), c lacks 2 of 4 targets "
         "(t1, t3). Add the captures that are missing, or move the targets and captures of t1, t3 away and rank all by "
@@ -58,13 +58,13 @@ def test_methods_that_lack_targets_are_told_though_others_are_complete() -> None
     assert said in answer
     assert "The best mean PSNR" in answer[0]  # a, though the mean of c is higher
     assert "on d a, 20.00 dB, the only one of 3 methods with a score for every target" in answer[0]
-    assert advice(holed()) == ""
+    assert lacking(holed()) == ""
     assert "methods with a score for every target" not in kind_of(holed()).answer(holed())[0]
 
 
 def test_a_method_without_any_score_does_not_stand_in_the_way_of_a_ranking_of_the_others() -> None:
     nothing = [("failed", "c", f"t{index}", "too faint") for index in range(4)]
-    said = advice(holed(*nothing, ("failed", "b", "t0", "too faint")))
+    said = lacking(holed(*nothing, ("failed", "b", "t0", "too faint")))
     assert "c lacks all 4 targets" in said
     assert "rank all that have any score by the 3 targets left" in said
     answer = kind_of(holed(*nothing)).answer(holed(*nothing))
@@ -81,11 +81,11 @@ def test_a_method_without_any_score_does_not_stand_in_the_way_of_a_ranking_of_th
     ],
 )
 def test_nobody_takes_a_capture_again_for_a_fault_of_its_target_or_its_file(reason: str) -> None:
-    said = advice(holed(*(("failed", method, "t1", reason) for method in "abc")))
+    said = lacking(holed(*(("failed", method, "t1", reason) for method in "abc")))
     assert "Save or choose the target t1 anew, whose fault it is and not the captures'" in said
     assert "again" not in said
     in_file = "CellError: the target is gray and the capture nearly so; save the capture in gray"
-    both = advice(holed(("failed", "a", "t1", reason), ("failed", "b", "t2", in_file), ("failed", "c", "t3", "faint")))
+    both = lacking(holed(("failed", "a", "t1", reason), ("failed", "b", "t2", in_file), ("failed", "c", "t3", "faint")))
     assert "fault it is and not the captures', as the reasons say; save b/t2 anew, as the reasons say; take" in both
     assert "take the failed captures again, or move the targets" in both
 

@@ -120,7 +120,7 @@ def test_a_method_that_keeps_the_contract_passes(method: Any) -> None:
         (Unbatched, r"returned \(1, 1, 64, 64\) for \(2, 1, 64, 64\)"),
         (Broken, "NaN or infinite"),
         (Complex, "not a phase in radians"),
-        (Levels, "returned ndarray, not a plain torch.Tensor or a NumPy array of float32 or float64"),
+        (Levels, "returned ndarray of uint8, not a plain torch.Tensor or a NumPy array of float32 or float64"),
         (Loose, "can be changed after it was made"),
         (Needy, "default for every parameter"),
         (Flagged, "must be a ClassVar"),

@@ -18,10 +18,15 @@ NAMED = 6  # changes that the answer lists with their differences
 
 
 def variants(results: Results) -> list[str]:
-    """The rows that are the baseline's own method with other settings."""
+    """The rows that are the baseline's own method with other settings; with another file it shows another's phases."""
     names = results.frame.drop_duplicates("method").set_index("method")["name"]
     baseline = results.layout.baseline
-    return [label for label in results.layout.methods if label != baseline and names.get(label) == names.get(baseline)]
+    files = {label: params.get("file") for label, params in results.layout.params.items()}
+    return [
+        label
+        for label in results.layout.methods
+        if label != baseline and (names.get(label), files.get(label)) == (names.get(baseline), files.get(str(baseline)))
+    ]
 
 
 def _reseeded(results: Results, label: str) -> bool:
@@ -60,14 +65,13 @@ def _changes(results: Results, condition: str, tests: list[PairedTest]) -> Itera
         more = f", and {len(found) - NAMED} more" if len(found) > NAMED else ""
         some = f"{words(listed)}{more}" if listed else "none"
         yield f"Of {len(tests)} single changes of {whole}, those shown to {effect} the score: {some}."
-    unclear = groups.get("not shown to differ", []) + groups.get("not tested", [])
-    if unclear:
+    if unclear := groups.get("not shown to differ", []):
         ends = np.array([[test.estimate.low, test.estimate.high] for test in unclear])
-        within = f", whose intervals reach from {score.number(np.nanmin(ends), signed=True)} to " + (
-            f"{score.with_unit(np.nanmax(ends), signed=True)}"
-        )
-        bounds = within if np.isfinite(ends).any() else ""
-        yield f"No difference is shown for the other {len(unclear)}{bounds}: {words([t.second for t in unclear])}."
+        reach = f"{score.number(ends.min(), signed=True)} to {score.with_unit(ends.max(), signed=True)}"
+        names = words([test.second for test in unclear])
+        yield f"No difference is shown for the other {len(unclear)}, whose intervals reach from {reach}: {names}."
+    if untested := groups.get("not tested", []):
+        yield f"Not tested, for want of targets: {words([test.second for test in untested])}."
 
 
 def _chance(results: Results, reseeded: PairedTest, changes: list[PairedTest]) -> str:

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 
 from ...study.plan import REFERENCE
 from ..data.categories import OFFLINE, ONLINE
-from ..data.marks import marked
+from ..data.marks import counted
 from ..data.phrases import difference, relation, tested, value, verdict
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES
-from ..data.text import FILES, number, p_value, percent, words
+from ..data.text import number, p_value, percent, words
 from ..markdown import Markdown, blocks, table
 from .kind import Kind, subjects
 from .lacking import lacking
@@ -23,8 +23,7 @@ def sentences(results: Results) -> Iterator[str]:
     if not subjects(results) and len(results.conditions) == 1:
         yield from everybody(results, results.conditions[0])
     yield best(results)
-    if results.layout.measure == FILES:
-        yield lacking(results)
+    yield lacking(results)
     yield from online(results)
     yield from floor(results)
     yield from oracle(results)
@@ -68,9 +67,7 @@ def best(results: Results) -> str:
     parts = [_first(results, condition) for condition in results.conditions]
     track = " without a capture of the scored image" if ONLINE in results.categories else ""
     if not any(parts):
-        ranked = any(results.ranking(name, categories=(ONLINE,)) for name in results.conditions)
-        told = ranked or results.layout.measure == FILES  # by `lacking`
-        return "" if told else "No method that competes has a score for every target, so none is ranked."
+        return ""
     score, domain = results.headline, DOMAIN_NAMES.get(results.headline.domain)
     metric = f"{score.title} ({domain})" if domain else score.title
     return f"The best mean {metric}{track}: {'; '.join(filter(None, parts))}."
@@ -182,7 +179,7 @@ def rows(results: Results) -> Markdown | None:
     for condition in results.conditions:
         for label in _ordered(results, condition):
             row, test = results.row(label, condition), tested(results, label, condition)
-            line = [marked(results, label, condition), *([condition] if many else []), results.headline.in_row(row)]
+            line = [counted(results, label, condition), *([condition] if many else []), results.headline.in_row(row)]
             if results.against_baseline:
                 line += (
                     _compared(results, label, condition) if test else ["baseline" if label == baseline else "–", "–"]

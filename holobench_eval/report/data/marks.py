@@ -17,6 +17,12 @@ def marked(results: Results, label: str, condition: str) -> str:
     return ", ".join([results.layout.marked(label), *_marks(results, label, condition)])
 
 
+def counted(results: Results, label: str, condition: str) -> str:
+    """``marked``, and how many targets have a score where that is not all: for tables without a column of that."""
+    scored, total = results.row(label, condition)["n"], len(results.targets)
+    return f"{marked(results, label, condition)}{f', {scored:.0f} of {total} targets' * bool(scored < total)}"
+
+
 def _marks(results: Results, label: str, condition: str) -> Iterator[str]:
     cells = results.cells(label, condition)
     if FELL_BACK_COLUMN in cells and (cells[FELL_BACK_COLUMN] != "").any():

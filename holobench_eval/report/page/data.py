@@ -8,7 +8,7 @@ from typing import Any
 
 from ...study.plan import REFERENCE
 from ..charts.look.methods import looks
-from ..data.marks import marked
+from ..data.marks import counted
 from ..data.ranks import Ranks
 from ..data.results import Results
 from ..data.scores import Score
@@ -130,7 +130,7 @@ def _row(results: Results, label: str, condition: str) -> Json:
     cells |= {key: _cell(number(row[key]), row[key]) for key in COSTS if key in results.table}
     return {
         "method": label,
-        "marked": marked(results, label, condition),
+        "marked": counted(results, label, condition),
         "n": int(row["n"]),
         "failed": int(row["failed"]),
         "cells": cells,

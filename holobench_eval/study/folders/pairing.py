@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .pictures import FEWEST_LEVELS, Picture
+from .exposure import NAMES, refusal
+from .pictures import Picture
 
-NAMES = ("red", "green", "blue")
-DARK = 0.1  # of full scale
 LASER = 0.3  # of the strongest channel: what filters of a colour camera let through of a laser that is not theirs
 
 SAVE_TARGET = "save the target as it was shown, in gray"  # ends what is refused by a fault of the target
@@ -41,14 +40,11 @@ def paired(capture: Picture, target: Picture) -> Pairing:
     if capture.pixels_sha256 == target.pixels_sha256:
         return Pairing(refused="the capture is the target itself, value for value, and no photograph of it")
     laser = _single_laser(capture, target)
-    levels = max(capture.levels) if laser is None else capture.levels[laser]
-    # A bright picture of few levels may be an honest one of a target that has no more, such as black and white.
-    if levels <= FEWEST_LEVELS and (capture.bright <= DARK or max(target.levels) > FEWEST_LEVELS):
-        return Pairing(
-            refused=f"the capture is under-exposed: it has {levels} levels of brightness, to which an offset or a "
-            f"stretch adds none, and whose rounding would decide the score; more than {FEWEST_LEVELS} are needed, and "
-            "a well exposed capture has a hundred"
-        )
+    if too_few := refusal(
+        ((name, capture.levels[own], target.levels[its]) for name, own, its in carrying(capture, target, laser)),
+        aligned=False,
+    ):
+        return Pairing(refused=too_few)
     if laser is not None and target.nearly_gray:
         return Pairing(refused=f"the target is nearly gray, {NEARLY}; {SAVE_TARGET}")
     if laser is not None and not target.gray:
@@ -57,7 +53,7 @@ def paired(capture: Picture, target: Picture) -> Pairing:
         )
     if laser is not None:
         return Pairing(NAMES[laser])
-    if capture.shape[0] == target.shape[0]:
+    if capture.shape[0] == target.shape[0] and (target.gray or not capture.gray):
         return Pairing()
     if capture.gray and target.gray:
         return Pairing("gray")
@@ -74,6 +70,19 @@ def paired(capture: Picture, target: Picture) -> Pairing:
         refused=f"the capture is in colour and the target gray, and no channel has nearly all of the light ({shares} "
         f"of the strongest; up to {LASER:g} is a single laser); save the channel that saw the display in gray"
     )
+
+
+def carrying(capture: Picture, target: Picture, laser: int | None) -> list[tuple[str, int, int]]:
+    """The channels that have much of the target's light: name, index in the capture and index in the target.
+
+    laser: the single channel of the capture that has light.
+    """
+    if laser is not None:
+        return [("", laser, min(laser, target.shape[0] - 1))]
+    if capture.shape[0] != target.shape[0] or len(target.structure) == 1:
+        return [("", 0, 0)]
+    least = LASER * max(target.structure)
+    return [(name, c, c) for c, name in enumerate(NAMES) if target.structure[c] >= least]
 
 
 def _single_laser(capture: Picture, target: Picture) -> int | None:

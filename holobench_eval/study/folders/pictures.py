@@ -16,6 +16,7 @@ from ...core.io import decode_levels
 from ...datasets.images import PNG_END, opened, read, refuse_other_colours
 from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
 from ...lab.raw import read_raw
+from .exposure import Levels, levels
 
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".webp", ".jpg", ".jpeg")
 RAW_SUFFIXES = (
@@ -34,10 +35,6 @@ MODES = ("1", "L", "P", "RGB", "LA", "RGBA")  # that are decoded without loss, i
 RIGHT = "expected an 8-bit or 16-bit PNG or TIFF, gray or RGB, or a BMP, WebP or JPEG"
 SMALLEST = 32  # pixels a side
 WIDEST = 16_384  # pixels a side
-ENDS = (1.0, 99.0)  # percentiles between which levels are counted; beyond them pixels may be hot or dead
-FEWEST_LEVELS = 8  # rounding to so many leaves an error of 29 dB, as large as that of a good hologram
-SAMPLED = 400  # pixels a side of the sample that is enough where it has more levels
-SMALLEST_OBJECT = 16  # connected pixels of a sparse scene; hot pixels stand alone
 NEARLY_GRAY = 3 / 255  # by which the channels of a gray picture differ that was stored in colour, as in a JPEG
 EXCEPT = 1e-3  # of the pixels, which may differ by more
 ROUNDING = 1e-6
@@ -53,8 +50,7 @@ class Picture:
     shape: ``(C, h, w)``, C = 1 or 3; sha256: of the file; pixels_sha256: of its values. gray: whether all channels are
     equal; nearly_gray: whether they are so within `NEARLY_GRAY`, but not equal; opaque: whether an alpha channel was
     left out that is opaque everywhere; is_lossy: whether it was compressed with loss. structure: standard deviation of
-    each channel's values, noise averaged away; levels: how many levels each channel has, whatever their brightness
-    (where these are more than `FEWEST_LEVELS`, those of a sample); bright: the largest value, hot pixels aside.
+    each channel's values, noise averaged away; levels: of each channel, whatever their brightness.
     """
 
     path: Path
@@ -66,8 +62,7 @@ class Picture:
     opaque: bool
     is_lossy: bool
     structure: tuple[float, ...]
-    levels: tuple[int, ...]
-    bright: float
+    levels: tuple[Levels, ...]
 
     @property
     def is_raw(self) -> bool:
@@ -95,7 +90,6 @@ def checked(path: Path) -> Picture:
     channels, height, width = values.shape
     if min(height, width) < SMALLEST or max(height, width) > WIDEST:
         raise UserError(f"{path}: {width} x {height} pixels; expected sides from {SMALLEST} to {WIDEST} pixels")
-    facts = [_levels(plane) for plane in values]
     gray = all(np.array_equal(plane, values[0]) for plane in values[1:])
     return Picture(
         path,
@@ -107,8 +101,7 @@ def checked(path: Path) -> Picture:
         opaque=alpha,
         is_lossy=path.suffix.lower() in (".jpg", ".jpeg") or (content[8:12] == b"WEBP" and b"VP8L" not in content[:64]),
         structure=tuple(_structure(plane) for plane in values),
-        levels=tuple(levels for levels, _ in facts),
-        bright=max(bright for _, bright in facts),
+        levels=tuple(levels(plane) for plane in values),
     )
 
 
@@ -117,28 +110,6 @@ def _structure(plane: Values) -> float:
     factor = min(1.0, FACTS_SIDE / max(plane.shape))
     size = (max(1, round(plane.shape[1] * factor)), max(1, round(plane.shape[0] * factor)))
     return float(np.std(cv2.resize(plane, size, interpolation=cv2.INTER_AREA)))
-
-
-def _levels(plane: Values) -> tuple[int, float]:
-    """How many levels a plane ``(h, w)`` has between its `ENDS`, and the upper one of these.
-
-    Where they are few: those of what is brighter, if that has more, for a few bright things in the dark.
-    """
-    step = max(1, min(plane.shape) // SAMPLED)
-    sample = _between_ends(plane[::step, ::step])
-    if sample[0] > FEWEST_LEVELS:
-        return sample
-    found = _between_ends(plane)
-    _, labels, facts, _ = cv2.connectedComponentsWithStats((plane > found[1]).astype(np.uint8), connectivity=8)
-    large = facts[:, cv2.CC_STAT_AREA] >= SMALLEST_OBJECT
-    large[0] = False  # what is not brighter
-    bright = plane[large[labels]]
-    return max(found, _between_ends(bright)) if bright.size else found
-
-
-def _between_ends(values: Values) -> tuple[int, float]:
-    low, high = np.percentile(values, ENDS)
-    return len(np.unique(values[(values >= low) & (values <= high)])), float(high)
 
 
 def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:

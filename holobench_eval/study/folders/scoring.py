@@ -34,7 +34,9 @@ from ..scoring.pictures import write_thumbnail
 from ..store import Record, Store
 from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
+from .exposure import MUCH, levels, refusal, within
 from .files import Folders, Key
+from .pairing import carrying
 from .pictures import Values
 from .visible import LEAST, Part, cropped, largest_part, share, shown
 
@@ -160,7 +162,9 @@ class Scoring:
         try:
             return align(self.viewable(capture), target, self.visible).to_dict()
         except CellError as error:
-            return {"refused": str(error)}
+            full = float((capture >= 1).mean())
+            burnt = f"; {full:.0%} of the capture is at full scale, so it may be over-exposed" * (full > MUCH)
+            return {"refused": f"{error}{burnt}"}
 
     def loaded(self, key: Key) -> tuple[Values, Values]:
         """A capture and its target, in the channels that are compared."""
@@ -230,9 +234,7 @@ class Scoring:
         if alignment is None:
             return Record(cell, "missing", method, f"no capture of '{name}' in the folder of {method}")
         if isinstance(alignment, str):
-            record = Record(cell, "failed", method, alignment)
-            self.store.write(record)
-            return record
+            return self.failed(cell, alignment)
         figure = self.store.output / "figures" / alignment_name(*key)
         kept = self.store.read(digest(cell))
         if kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file():
@@ -240,6 +242,8 @@ class Scoring:
         capture, target = self.loaded(key)
         warp = alignment.warp if part is None else cropped(alignment.warp, part)
         target = _of(target, part)
+        if too_few := self.too_few_levels(key, capture, target, warp):
+            return self.failed(cell, too_few)
         second = self.second(capture, target, warp)
         # In the precision that scores are computed in, so that there is no second copy of a large picture.
         image = torch.from_numpy(sampled(self.capture_values(capture), warp)).double()
@@ -258,6 +262,19 @@ class Scoring:
         self.draw(figure, self.viewable(capture), warp, self.encoded(matched), target)
         self.store.write(record)
         return record
+
+    def failed(self, cell: dict[str, Any], reason: str) -> Record:
+        """The record of a capture that has no score."""
+        record = Record(cell, "failed", cell["method"], reason)
+        self.store.write(record)
+        return record
+
+    def too_few_levels(self, key: Key, capture: Values, target: Values, warp: Warp) -> str:
+        """Why a capture has too few levels where it shows its target, in the channels that are compared."""
+        compared = [("", 0, 0)]
+        if len(target) > 1:
+            compared = carrying(self.folders.captures[key], self.folders.targets[key[1]], None)
+        return refusal(((name, within(capture[c], warp), levels(target[c])) for name, c, _ in compared), aligned=True)
 
     def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
         """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""

@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ...core.arrays import type_name
 from ...core.errors import CellError
 from ...display.api import Capture, DisplaySpec, Region, is_plain
 from ...display.estimates import Estimate
@@ -141,4 +142,4 @@ def _plain(value: Any, tensors: list[Tensor]) -> Any:
         return ["dict", *([_plain(key, tensors), _plain(item, tensors)] for key, item in value.items())]
     if type(value) is CLASSES.get(name):
         return ["class", name, _plain({field.name: getattr(value, field.name) for field in fields(value)}, tensors)]
-    return ["unsendable", name]
+    return ["unsendable", type_name(value)]

@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ...core.arrays import type_name
 from ...core.device import moved
 from ...core.errors import BudgetError, CellError
 from ...core.hashing import digest
@@ -80,7 +81,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
 
 def wrong_output(label: str, function: str, output: Any, wanted: str) -> CellError:
     """The error for an ``output`` that is not what was wanted."""
-    named = output.type_name if isinstance(output, isolation.Unsendable) else type(output).__name__
+    named = output.type_name if isinstance(output, isolation.Unsendable) else type_name(output)
     actual = tuple(output.shape) if is_plain(output) else named
     return CellError(f"{label}: {function} returned {actual}, not {wanted}")
 

@@ -102,7 +102,9 @@ def test_a_method_that_lacks_a_target_is_not_counted_among_every_method() -> Non
 def test_a_method_of_the_question_without_a_comparison_is_named() -> None:
     found = results_of({"old": 17.0, "new": 19.0, "other": 18.0}, question="Is new better?")
     hole = found.frame[(found.frame["method"] != "new") | (found.frame["target"] != TARGETS[0])].reset_index(drop=True)
-    assert "Nothing is said of new: a score is missing" in answer(Results(hole, found.layout))
+    text = answer(Results(hole, found.layout))
+    assert "new lacks 1 of 8 targets (t0)" in text
+    assert "name the other 7 targets with --targets to rank all by these" in text
 
 
 def test_a_baseline_of_another_display_leaves_no_budget_to_answer() -> None:

@@ -10,6 +10,8 @@ import pytest
 from PIL import Image, ImageCms
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.imaging.warp import Warp
+from holobench_eval.study.folders.exposure import FEWEST_LEVELS, levels, refusal, within
 from holobench_eval.study.folders.files import Folders, read_folders
 from holobench_eval.study.folders.pictures import checked
 from tests.support.bayer import bayer_dng
@@ -216,3 +218,27 @@ def test_a_raw_file_is_linear_light_above_black(tmp_path):
     assert picture.shape == (3, 32, 48)
     assert np.abs(picture.load()[0] - light).max() < 1e-4
     assert np.abs(picture.load()[1:]).max() < 1e-6
+
+
+def test_a_channel_of_few_levels_that_the_target_has_light_in_is_named(tmp_path):
+    capture = 0.9 * COLOUR
+    capture[0] = np.round(capture[0] * 4) / 255
+    refused = folders(tmp_path, capture.astype(np.float32), COLOUR).pairings["m", "coffee"].refused
+    assert "under-exposed: its red channel has" in refused
+
+
+def test_three_equal_channels_of_a_colour_target_are_refused_as_one_is(tmp_path):
+    refused = folders(tmp_path, (0.9 * EQUAL).astype(np.float32), COLOUR).pairings["m", "coffee"].refused
+    assert "the capture is gray and the target in colour" in refused
+
+
+def test_a_lamp_beside_the_target_adds_no_levels():
+    frame = np.zeros((120, 160), np.float32)
+    frame[30:90, 40:120] = np.round(cv2.resize(GRAY[0], (80, 60)) * 4) / 255
+    cv2.circle(frame, (12, 12), 8, 1.0, -1)
+    frame = np.maximum(frame, cv2.GaussianBlur(frame, (0, 0), 3) * (np.arange(160) < 30)).astype(np.float32)
+    shift = np.array([[1.0, 0, 40], [0, 1, 30], [0, 0, 1]])
+    seen = within(frame, Warp((60, 80), shift, np.zeros((6, 2))))
+    assert levels(frame).any > FEWEST_LEVELS >= seen.any
+    shown = levels(cv2.resize(GRAY[0], (80, 60)))
+    assert "under-exposed: it has" in refusal([("", seen, shown)], aligned=True)

@@ -1,0 +1,103 @@
+"""Whether a capture has levels enough: the rounding to a few of them would decide its score."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...imaging.warp import Warp
+
+NAMES = ("red", "green", "blue")
+ENDS = (1.0, 99.0)  # percentiles between which levels are counted; beyond them pixels may be hot or dead
+FEWEST_LEVELS = 8  # rounding to so many leaves an error of 29 dB, as large as that of a good hologram
+SAMPLED = 400  # pixels a side of the sample that is enough where it has more levels
+SMALLEST_OBJECT = 16  # connected pixels of a sparse scene; hot pixels stand alone
+DARK = 0.1  # of full scale
+MUCH = 0.1  # of the pixels at full scale
+
+Plane = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Levels:
+    """The levels of brightness of one channel.
+
+    most: how many there are between the `ENDS`, or at least so many; bright: how many what is brighter has, where these
+    are few, for a few bright things in the dark; top: the upper one of the `ENDS`; full: share of pixels at full scale.
+    """
+
+    most: int
+    bright: int
+    top: float
+    full: float
+
+    @property
+    def any(self) -> int:
+        """How many there are, in a picture that may be sparse."""
+        return max(self.most, self.bright)
+
+
+def levels(plane: Plane, mask: Mask | None = None) -> Levels:
+    """The levels of a plane ``(h, w)``, or of those of its pixels that a mask has."""
+    step = max(1, min(plane.shape) // SAMPLED)
+    full = float((plane >= 1).mean() if mask is None else (plane[mask] >= 1).mean())
+    most, top = _between_ends(_of(plane[::step, ::step], None if mask is None else mask[::step, ::step]))
+    if most > FEWEST_LEVELS:
+        return Levels(most, 0, top, full)
+    most, top = _between_ends(_of(plane, mask))
+    brighter = plane > top if mask is None else (plane > top) & mask
+    _, labels, facts, _ = cv2.connectedComponentsWithStats(brighter.astype(np.uint8), connectivity=8)
+    large = facts[:, cv2.CC_STAT_AREA] >= SMALLEST_OBJECT
+    large[0] = False  # what is not brighter
+    bright = plane[large[labels]]
+    return Levels(most, _between_ends(bright)[0] if bright.size else 0, top, full)
+
+
+def within(plane: Plane, warp: Warp) -> Levels:
+    """The levels of a capture's channel where it shows the target. A lamp or a date beside it adds none."""
+    corners = warp.corners()[[0, 1, 3, 2]]
+    mask = cv2.fillConvexPoly(np.zeros(plane.shape, np.uint8), np.round(corners).astype(np.int32), (1,)).astype(bool)
+    rows, columns = (slice(max(0, int(low)), int(high) + 2) for low, high in zip(*_ends(corners), strict=True))
+    return levels(plane[rows, columns], mask[rows, columns])
+
+
+def refusal(pairs: Iterable[tuple[str, Levels, Levels]], aligned: bool) -> str:
+    """Why a capture has too few levels; empty where it has enough.
+
+    pairs: name, levels of the capture and levels of the target, of every channel that has much of the target's light;
+    aligned: levels of the capture are those `within` the target, where bright things count in a sparse target alone.
+    """
+    for name, capture, target in pairs:
+        is_sparse = target.most <= FEWEST_LEVELS
+        found = capture.any if is_sparse or not aligned else capture.most
+        # A bright picture of few levels may be an honest one of a target that has no more, such as black and white.
+        if found > FEWEST_LEVELS or (capture.top > DARK and target.any <= FEWEST_LEVELS):
+            continue
+        whose = f"its {name} channel" if name else "it"
+        counted = f"{whose} has {found} level{'s' * (found != 1)} of brightness"
+        if capture.full > MUCH:
+            return f"the capture is over-exposed: {capture.full:.0%} of it is at full scale, and {counted}"
+        return (
+            f"the capture is under-exposed: {counted}, to which an offset or a stretch adds none, and whose rounding "
+            f"would decide the score; more than {FEWEST_LEVELS} are needed, and a well exposed capture has a hundred"
+        )
+    return ""
+
+
+def _ends(corners: NDArray[np.float64]) -> tuple[list[float], list[float]]:
+    """The smallest and the largest row and column of corners ``(4, 2)``, x before y."""
+    return list(np.floor(corners.min(0))[::-1]), list(np.ceil(corners.max(0))[::-1])
+
+
+def _of(plane: Plane, mask: Mask | None) -> Plane:
+    return plane if mask is None or not mask.any() else plane[mask]
+
+
+def _between_ends(values: Plane) -> tuple[int, float]:
+    low, high = np.percentile(values, ENDS)
+    return len(np.unique(values[(values >= low) & (values <= high)])), float(high)
