@@ -39,7 +39,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
         targets=TARGETS,
         question=EVIL,
         would_change="Another sign.",
-        about={"HIL": "A learned method.", "SGD": "Not spoken of."},
+        about={"HIL": "A learned method.", "GD": "Not spoken of."},
         tuned={"HIL": "the rates were chosen elsewhere"},
     )
     return write_report(layout, records, folder, {}, DESCRIPTION)[0].read_text()
