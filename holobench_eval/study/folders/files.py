@@ -9,7 +9,8 @@ from pathlib import Path
 
 from ...core.errors import UserError, suggest
 from ...core.io import TEMPORARY
-from .pairing import NAMES, Pairing, paired
+from .exposure import NAMES
+from .pairing import Pairing, paired
 from .pictures import RAW_SUFFIXES, SUFFIXES, Picture, checked
 
 CAPTURE_SUFFIXES = (*SUFFIXES, *RAW_SUFFIXES)
