@@ -36,6 +36,7 @@ LARGEST_PIXELS = 33_177_600
 LARGEST_BYTES = 512_000_000  # enough for the largest image in 16 bits without compression
 
 RIGHT = "expected an 8-bit RGB image in sRGB"
+ROUNDING = 1e-6  # by which linear light may leave [0, 1], as in the metric protocol
 
 _MODES = {
     "1": "a 1-bit image",
@@ -125,9 +126,9 @@ def from_array(picture: NDArray[Any]) -> Tensor:
     if picture.dtype.kind != "f":
         raise UserError(f"{right}; this one is of {picture.dtype}")
     low, high = float(picture.min()), float(picture.max())
-    if not (low >= 0 and high <= 1):  # nor NaN
+    if not (low >= -ROUNDING and high <= 1 + ROUNDING):  # nor NaN
         raise UserError(f"{right}; this one is of {picture.dtype} with values from {low:.4g} to {high:.4g}")
-    return planes(picture.astype(np.float32))
+    return planes(picture.astype(np.float32).clip(0, 1))
 
 
 def opened(content: bytes, name: str) -> Image.Image:

@@ -376,6 +376,11 @@ def from_numpy(value: Any) -> Any:
     return torch.from_numpy(np.array(value, dtype=value.dtype.newbyteorder("="), order="C"))
 
 
+def type_name(value: object) -> str:
+    """What a value is called in messages; an array with the type of its numbers."""
+    return f"ndarray of {value.dtype}" if type(value) is np.ndarray else type(value).__name__
+
+
 def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
     """Refuse a phase ``(C, H, W)`` [rad] that no display can show. label: name of the method in the error message.
 
@@ -383,13 +388,13 @@ def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
     """
     who = f"{label}: " if label else ""
     if not is_plain(phase):
-        raise CellError(f"{who}phase is {type(phase).__name__}, the display shows a plain torch.Tensor")
+        raise CellError(f"{who}phase is {type_name(phase)}, the display shows a plain torch.Tensor")
     if phase.ndim != 3 or tuple(phase.shape[-2:]) != spec.shape:
         raise CellError(
             f"{who}phase is {tuple(phase.shape)}, the display shows (channels, {spec.shape[0]}, {spec.shape[1]})"
         )
     if phase.is_complex() or not phase.is_floating_point():
         raise CellError(f"{who}phase is {phase.dtype}, the display shows real numbers in radians")
-    bad = int((~torch.isfinite(phase)).sum())
+    bad = int((~torch.isfinite(phase.float())).sum())  # in the precision that the display computes in
     if bad:
         raise CellError(f"{who}phase holds {bad} values that are NaN or infinite; the display refuses it")

@@ -20,7 +20,7 @@ HARNESS = "4: scattered light taken off before registration"
 # How photographs of a display that exists are scored, beside HARNESS: one new text for a real display's cells alone.
 PHOTOGRAPHS = "means over the target's pixels"
 # The alignment of a photograph with its target without fiducials (``holoeval score``).
-ALIGNMENT = "displaced parts count in a shared pose"
+ALIGNMENT = "levels are counted where a capture shows its target"
 
 # Names of versions in records that are older than declared versions; a method that is not listed is named by its own.
 RECORDED = {

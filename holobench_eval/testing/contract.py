@@ -8,12 +8,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ..core.arrays import type_name
 from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
 from ..display import CalibratedBench, MeteredDisplay, load_profile
-from ..display.api import from_numpy, is_plain
+from ..display.api import from_numpy, is_plain, type_name
 from ..study.opening import open_bench
 from ..study.versions import method_version
 

@@ -89,6 +89,12 @@ def refusal(pairs: Iterable[tuple[str, Levels, Levels]], aligned: bool) -> str:
     return ""
 
 
+def burnt(frame: Plane) -> str:
+    """What to add to the refusal of a capture ``(C, h, w)`` of which much is at full scale."""
+    full = float((frame >= 1).mean())
+    return f"; {full:.0%} of the capture is at full scale, so it may be over-exposed" if full > MUCH else ""
+
+
 def _ends(corners: NDArray[np.float64]) -> tuple[list[float], list[float]]:
     """The smallest and the largest row and column of corners ``(4, 2)``, x before y."""
     return list(np.floor(corners.min(0))[::-1]), list(np.ceil(corners.max(0))[::-1])

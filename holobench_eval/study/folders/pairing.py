@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .exposure import NAMES, refusal
-from .pictures import Picture
+from ...imaging.warp import Warp
+from .exposure import NAMES, levels, refusal, within
+from .pictures import Picture, Values
 
 LASER = 0.3  # of the strongest channel: what filters of a colour camera let through of a laser that is not theirs
 
@@ -70,6 +71,17 @@ def paired(capture: Picture, target: Picture) -> Pairing:
         refused=f"the capture is in colour and the target gray, and no channel has nearly all of the light ({shares} "
         f"of the strongest; up to {LASER:g} is a single laser); save the channel that saw the display in gray"
     )
+
+
+def too_few_levels(capture: Picture, target: Picture, frame: Values, shown: Values, warp: Warp) -> str:
+    """Why a capture has too few levels where it shows its target; empty where it has enough.
+
+    frame, shown: capture ``(C, Hs, Ws)`` and target ``(C, h, w)`` in the channels that are compared, which are one or
+    all; warp: where the target lies on the capture.
+    """
+    compared = carrying(capture, target, None) if len(shown) > 1 else [("", 0, 0)]
+    pairs = ((name, within(frame[own], warp), levels(shown[its])) for name, own, its in compared)
+    return refusal(pairs, aligned=True)
 
 
 def carrying(capture: Picture, target: Picture, laser: int | None) -> list[tuple[str, int, int]]:

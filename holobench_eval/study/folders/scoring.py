@@ -34,11 +34,11 @@ from ..scoring.pictures import write_thumbnail
 from ..store import Record, Store
 from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
-from .exposure import MUCH, levels, refusal, within
+from .exposure import burnt
 from .files import Folders, Key
-from .pairing import carrying
+from .pairing import too_few_levels
 from .pictures import Values
-from .visible import LEAST, Part, cropped, largest_part, share, shown
+from .visible import LEAST, Part, cropped, largest_part, part_of, share, shown
 
 LARGE = 2**21  # pixels of a target, those of 1080 x 1920
 WIDE = 2048  # pixels of a target's longer side to which the second aligner, of which 0.1 px is asked, reduces it
@@ -162,9 +162,7 @@ class Scoring:
         try:
             return align(self.viewable(capture), target, self.visible).to_dict()
         except CellError as error:
-            full = float((capture >= 1).mean())
-            burnt = f"; {full:.0%} of the capture is at full scale, so it may be over-exposed" * (full > MUCH)
-            return {"refused": f"{error}{burnt}"}
+            return {"refused": f"{error}{burnt(capture)}"}
 
     def loaded(self, key: Key) -> tuple[Values, Values]:
         """A capture and its target, in the channels that are compared."""
@@ -241,8 +239,8 @@ class Scoring:
             return kept
         capture, target = self.loaded(key)
         warp = alignment.warp if part is None else cropped(alignment.warp, part)
-        target = _of(target, part)
-        if too_few := self.too_few_levels(key, capture, target, warp):
+        target = part_of(target, part)
+        if too_few := too_few_levels(self.folders.captures[key], self.folders.targets[name], capture, target, warp):
             return self.failed(cell, too_few)
         second = self.second(capture, target, warp)
         # In the precision that scores are computed in, so that there is no second copy of a large picture.
@@ -268,13 +266,6 @@ class Scoring:
         record = Record(cell, "failed", cell["method"], reason)
         self.store.write(record)
         return record
-
-    def too_few_levels(self, key: Key, capture: Values, target: Values, warp: Warp) -> str:
-        """Why a capture has too few levels where it shows its target, in the channels that are compared."""
-        compared = [("", 0, 0)]
-        if len(target) > 1:
-            compared = carrying(self.folders.captures[key], self.folders.targets[key[1]], None)
-        return refusal(((name, within(capture[c], warp), levels(target[c])) for name, c, _ in compared), aligned=True)
 
     def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
         """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""
@@ -314,7 +305,7 @@ class Scoring:
         thumbnail = self.store.target_thumbnail(name)
         if len(kept) == len(rows) and thumbnail.is_file():
             return kept
-        pair = (_of(targets[target].load()[:channels], part) for target in (name, *wrong))
+        pair = (part_of(targets[target].load()[:channels], part) for target in (name, *wrong))
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
         pictures = floor_captures(reference, others, name)
@@ -393,11 +384,6 @@ class Scoring:
             "harness_sha256": HARNESS,
             "code_sha256": ALIGNMENT,
         }
-
-
-def _of(picture: Values, part: Part | None) -> Values:
-    """A part of ``(C, h, w)``, or all of it."""
-    return picture if part is None else np.ascontiguousarray(picture[:, part[0] : part[1], part[2] : part[3]])
 
 
 def _read(path: Path) -> dict[str, Any] | None:

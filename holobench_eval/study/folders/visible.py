@@ -54,3 +54,8 @@ def cropped(warp: Warp, part: Part) -> Warp:
     """The map from pixels of a part of a target to those of the capture."""
     shift = np.array([[1.0, 0, part[2]], [0, 1, part[0]], [0, 0, 1]])
     return replace(warp, shape=(part[1] - part[0], part[3] - part[2]), homography=warp.homography @ shift)
+
+
+def part_of(picture: NDArray[np.float32], part: Part | None) -> NDArray[np.float32]:
+    """A part of ``(C, h, w)``, or all of it."""
+    return picture if part is None else np.ascontiguousarray(picture[:, part[0] : part[1], part[2] : part[3]])

@@ -17,9 +17,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ...core.arrays import type_name
 from ...core.errors import CellError
-from ...display.api import Capture, DisplaySpec, Region, is_plain
+from ...display.api import Capture, DisplaySpec, Region, is_plain, type_name
 from ...display.estimates import Estimate
 from ...display.training import TrainingImage
 

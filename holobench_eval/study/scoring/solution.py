@@ -10,13 +10,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ...core.arrays import type_name
 from ...core.device import moved
 from ...core.errors import BudgetError, CellError
 from ...core.hashing import digest
 from ...core.io import write_atomically
 from ...display import MeteredDisplay
-from ...display.api import from_numpy, is_plain
+from ...display.api import from_numpy, is_plain, type_name
 from .. import cost, isolation
 from ..artifacts import Artifact, read_tensors
 from ..cost import Cost

@@ -17,19 +17,19 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from .core.arrays import Numbers, array_of, as_in_config, tensor_of, type_name
-from .core.errors import CellError, UserError, reason
-from .core.objects import method_of
-from .core.panels import is_small, rows_and_columns
-from .core.plugins import build
-from .datasets.base import fit, with_channels
-from .datasets.images import decode, from_array, read
-from .display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_plain
-from .metrics import catalogue, match
-from .metrics import score as _score
-from .optics.colour import srgb_encode
-from .study import opening
-from .study.displays import Condition, condition, real_condition
+from ..core.errors import CellError, UserError, reason
+from ..core.panels import is_small, rows_and_columns
+from ..core.plugins import build
+from ..datasets.base import fit, with_channels
+from ..datasets.images import decode, from_array, read
+from ..display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_plain, type_name
+from ..metrics import catalogue, match
+from ..metrics import score as _score
+from ..optics.colour import srgb_encode
+from ..study import opening
+from ..study.displays import Condition, condition, real_condition
+from .methods import method_of
+from .numbers import Numbers, array_of, as_in_config, tensor_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -316,8 +316,8 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     UserError
         No captures, other shapes or values, or a path that ends otherwise.
     """
-    from .report.charts.comparison import draw_comparison
-    from .report.charts.gallery import Column, Tile, error_limit, error_map
+    from ..report.charts.comparison import draw_comparison
+    from ..report.charts.gallery import Column, Tile, error_limit, error_map
 
     place = Path(path)
     if place.suffix.lower() not in ENDINGS:
@@ -365,7 +365,7 @@ def load_records(folder: str | Path) -> pd.DataFrame:
     UserError
         There is no such file, or it is damaged.
     """
-    from .report.compare.runs import read_run
+    from ..report.compare.runs import read_run
 
     return read_run(Path(folder)).records
 

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from .errors import UserError
+from ..core.errors import UserError
 
 Numbers = ArrayLike | Tensor
 
@@ -40,11 +40,6 @@ def tensor_of(values: Numbers, what: str, radians: bool = False) -> Tensor:
         right = "radians as floating point, as np.angle gives them" if radians else "real numbers"
         raise UserError(f"{what} of {array.dtype}; expected {right}")
     return torch.from_numpy(array.astype(np.float32, order="C"))
-
-
-def type_name(value: object) -> str:
-    """What a value is called in messages; an array with the type of its numbers."""
-    return f"ndarray of {value.dtype}" if type(value) is np.ndarray else type(value).__name__
 
 
 def as_in_config(value: Any) -> Any:

@@ -8,8 +8,8 @@ from dataclasses import is_dataclass
 from functools import partial
 from typing import Any
 
-from . import plugins
-from .errors import UserError
+from ..core import plugins
+from ..core.errors import UserError
 
 EXPECTED = "expected a name, path/to/file.py:Name, a function of target and bench, or a method's class or instance"
 
