@@ -179,6 +179,11 @@ def test_levels_and_light_give_the_same_target(display: hb.OpenDisplay, tmp_path
     assert display.target(np.full((50, 70, 3), light)) == pytest.approx(wanted, abs=1e-6)
 
 
+def test_a_rounding_beyond_white_is_white(display: hb.OpenDisplay) -> None:
+    white = np.ones((50, 60), np.float32)
+    assert np.array_equal(display.target(np.nextafter(white, 2)), display.target(white))
+
+
 def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
     light = np.random.default_rng(0).random((50, 60, 3), dtype=np.float32)
     wanted = display.target(light)
@@ -212,6 +217,7 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
             "returned ndarray of int64, not",
         ),
         (lambda d, t: d.solve(lambda target, bench: torch.full((1, 3, 128, 128), torch.nan), t), "NaN or infinite"),
+        (lambda d, t: d.solve(lambda target, bench: np.full((1, 3, 128, 128), 1e300), t), "NaN or infinite"),
         (lambda d, t: d.solve(lambda target: 3, t), r"lambda>\(target\) cannot be called with target, bench"),
         (
             lambda d, t: d.solve(flat, t, levle=1),

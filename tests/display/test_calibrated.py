@@ -57,6 +57,10 @@ def test_only_privileged_methods_see_the_simulation(bench, target):
     ("phase", "message"),
     [
         (torch.full((3, *PANEL), float("nan")), "mine: phase holds 110592 values that are NaN"),
+        (
+            torch.full((3, *PANEL), 1e300, dtype=torch.float64),
+            "mine: phase holds 110592 values that are NaN or infinite",
+        ),
         (torch.zeros(3, 10, 10), r"mine: phase is \(3, 10, 10\)"),
         (torch.zeros(3, *PANEL, dtype=torch.complex64), "mine: phase is torch.complex64"),
     ],
