@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import sys
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -246,7 +247,14 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (lambda d, t: hb.open_display("ideal", panel=(128, 128, 3)), "rows and columns such as"),
         (lambda d, t: hb.open_display("ideal", panel=(3, 128)), "a panel has 64 to 8192 pixels a side"),
         (lambda d, t: hb.open_display(3), "name: expected that of a display profile, or its path; got int"),
+        (lambda d, t: hb.open_display("ideal", panel=(128, 128), seed="x"), "seed: expected a whole number; got str"),
+        (lambda d, t: hb.open_bench(3), "file: expected a path; got int"),
+        (lambda d, t: d.target("a\0.png"), "a picture: .* is no path, since it holds a zero byte"),
+        (lambda d, t: d.target(np.ma.masked_less(np.ones((50, 50)), 2)), "a picture with a mask"),
+        (lambda d, t: d.solve(lambda target, bench: sys.exit("enough"), t), "SystemExit: enough"),
         (lambda d, t: hb.score(t[:, 1:], t), "must both be"),
+        (lambda d, t: hb.score(t, t, "psnr"), r'metrics: expected names in a list, such as \["psnr"\]; got \'psnr\''),
+        (lambda d, t: hb.score(t, t, 3), "metrics: expected names in a list"),
         (lambda d, t: hb.score(t, t, ("psrn",)), "did you mean 'psnr'"),
         (lambda d, t: hb.compare(t, {"a": t[:, 1:]}), r"capture 'a' of \(3, 103, 104\); expected .* \(3, 104, 104\)"),
         (lambda d, t: hb.compare(t, {"a": t * np.nan}), "not finite"),
@@ -255,13 +263,22 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (lambda d, t: hb.compare(t, [t]), "captures: expected arrays by their names"),
         (lambda d, t: hb.compare(t, {"a": t}, "compared.tif"), "'compared.tif' should end in .png, .jpg, .jpeg"),
         (lambda d, t: hb.compare(t, {}), "no captures to compare"),
+        (lambda d, t: hb.compare(t, {"a": t}, None), "path: expected a path; got NoneType"),
         (lambda d, t: hb.load_records("gone"), "no records.csv"),
+        (lambda d, t: hb.load_records(__file__), "no records.csv in this folder"),
+        (lambda d, t: hb.load_records(3), "folder: expected a path; got int"),
     ],
 )
 def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:
     with pytest.raises((UserError, CellError), match=message) as found:
         call(display, target)
     assert "\n" not in str(found.value)
+
+
+def test_a_folder_is_no_picture(target: interactive.Array, tmp_path: Path) -> None:
+    (tmp_path / "a.png").mkdir()
+    with pytest.raises(UserError, match=r"a\.png' is a folder; expected a file in it"):
+        hb.compare(target, {"same": target}, tmp_path / "a.png")
 
 
 def test_captures_are_compared_in_a_picture(display: hb.OpenDisplay, target: interactive.Array, tmp_path: Path) -> None:

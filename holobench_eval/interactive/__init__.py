@@ -7,7 +7,7 @@ methods of files in processes of their own; what is here is for a notebook, wher
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,8 +28,8 @@ from ..metrics import score as _score
 from ..optics.colour import srgb_encode
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
+from .given import Numbers, array_of, as_in_config, names, path_of, tensor_of, whole
 from .methods import method_of
-from .numbers import Numbers, array_of, as_in_config, tensor_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,7 +68,7 @@ class OpenDisplay:
             The file or the array is no such picture.
         """
         if isinstance(picture, str | Path):
-            light = decode(read(Path(picture)), str(picture), gray=True)
+            light = decode(read(path_of(picture, "a picture")), str(picture), gray=True)
         else:
             light = from_array(array_of(picture, "a picture"))
         return with_channels(fit(light, self.spec.region.shape), len(self.spec.wavelengths)).numpy()
@@ -109,7 +109,7 @@ class OpenDisplay:
                 phase = from_numpy(solver.solve(light[None].clone(), handle))
         except (CellError, UserError):
             raise
-        except Exception as error:  # whatever a stranger's method does
+        except (Exception, SystemExit) as error:  # whatever a stranger's method does
             raise CellError(f"{label}: {reason(error)}") from error
         if not is_plain(phase) or tuple(phase.shape) != (1, len(light), *self.spec.shape):
             found = tuple(phase.shape) if isinstance(phase, Tensor) else type_name(phase)
@@ -143,7 +143,7 @@ class OpenDisplay:
         """
         light, shown = self._target(target), self._phase(phase)
         with self._threads():
-            return self._bench.photograph(shown, light, _name(light), repeat).image.cpu().numpy()
+            return self._bench.photograph(shown, light, _name(light), whole(repeat, "repeat")).image.cpu().numpy()
 
     def ideal(self, phase: Numbers) -> Array:
         """What the nominal model, without any fault, makes of a phase ``(C, H, W)`` [rad].
@@ -234,7 +234,8 @@ def open_display(
     """
     if not isinstance(name, str | Path):
         raise UserError(f"name: expected that of a display profile, or its path; got {type(name).__name__}")
-    return OpenDisplay(condition(str(name), rows_and_columns(panel), Path(folder)), seed, Path(folder))
+    start = path_of(folder, "folder")
+    return OpenDisplay(condition(str(name), rows_and_columns(panel), start), whole(seed, "seed"), start)
 
 
 def open_bench(file: str | Path, seed: int = 0) -> OpenDisplay:
@@ -259,11 +260,11 @@ def open_bench(file: str | Path, seed: int = 0) -> OpenDisplay:
     CellError
         A check failed, or the camera cannot be registered.
     """
-    path = Path(file)
-    return OpenDisplay(real_condition(path.name, path.parent), seed, path.parent)
+    path = path_of(file, "file")
+    return OpenDisplay(real_condition(path.name, path.parent), whole(seed, "seed"), path.parent)
 
 
-def score(capture: Numbers, target: Numbers, metrics: tuple[str, ...] | None = None) -> dict[str, float]:
+def score(capture: Numbers, target: Numbers, metrics: Sequence[str] | None = None) -> dict[str, float]:
     """The scores of a capture by the metric protocol, by the names that the columns of a study have.
 
     Parameters
@@ -273,7 +274,7 @@ def score(capture: Numbers, target: Numbers, metrics: tuple[str, ...] | None = N
     target
         ``(C, h, w)`` linear light in [0, 1].
     metrics
-        Names, such as ``("psnr", "ssim")``; None for all that can be computed here.
+        Names, such as ``["psnr", "ssim"]``; None for all that can be computed here.
 
     Returns
     -------
@@ -285,11 +286,10 @@ def score(capture: Numbers, target: Numbers, metrics: tuple[str, ...] | None = N
     UserError
         Other shapes or values, or an unknown metric.
     """
-    if metrics is None:
-        metrics = tuple(metric.name for metric in catalogue() if metric.available() is None)
+    computed = [metric.name for metric in catalogue() if metric.available() is None] if metrics is None else metrics
     light, wanted = tensor_of(capture, "a capture"), tensor_of(target, "a target")
     try:
-        return _score(light, wanted, metrics=metrics)
+        return _score(light, wanted, metrics=names(computed, "metrics"))
     except ValueError as error:
         raise UserError(str(error)) from None
 
@@ -319,9 +319,11 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     from ..report.charts.comparison import draw_comparison
     from ..report.charts.gallery import Column, Tile, error_limit, error_map
 
-    place = Path(path)
+    place = path_of(path, "path")
     if place.suffix.lower() not in ENDINGS:
         raise UserError(f"path: '{path}' should end in {', '.join(ENDINGS)}")
+    if place.is_dir():
+        raise UserError(f"path: '{path}' is a folder; expected a file in it")
     if not isinstance(captures, Mapping) or not all(isinstance(name, str) for name in captures):
         raise UserError('captures: expected arrays by their names, such as {"wirtinger": image}')
     if not captures:
@@ -367,7 +369,7 @@ def load_records(folder: str | Path) -> pd.DataFrame:
     """
     from ..report.compare.runs import read_run
 
-    return read_run(Path(folder)).records
+    return read_run(path_of(folder, "folder")).records
 
 
 def _name(target: Tensor) -> str:

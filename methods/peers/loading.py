@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from ...core.errors import UserError
+from ...core.installed import installing
 
 
 def load(module: str) -> Any:
@@ -17,7 +18,7 @@ def load(module: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name != package:
             raise UserError(f"{package} cannot be imported: {error}") from error
-        raise UserError(f"{package} is not installed; pip install 'holobench_eval[peers]'") from error
+        raise UserError(f"{package} is not installed; {installing(extra='peers')}") from error
     except Exception as error:  # whatever a package does when it meets another version of what it needs
         raise UserError(f"{package} cannot be imported: {error}") from error
 

@@ -148,7 +148,7 @@ def test_a_study_from_run_to_check(
         (("report", "toy.yaml"), "no records in this folder"),
         (("list", "metods"), "unknown kind 'metods'; did you mean 'methods'?"),
         (("new-method", "Class"), "'Class' is no name for a method"),
-        (("check", "nowhere"), "no reports in this folder"),
+        (("check", "nowhere"), "no report, and none in its folders"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def check(
-    folder: Annotated[Path, typer.Argument(help="A folder of reports.")] = Path("reports"),
+    folder: Annotated[Path, typer.Argument(help="A report, or a folder of reports.")] = Path("reports"),
     rerun: Annotated[
         int, typer.Option(min=0, metavar="N", help="Solve, capture and score N cells of each report again.")
     ] = 0,
@@ -37,14 +37,14 @@ def check(
 
 
 def problems_in(folder: Path) -> tuple[int, list[str]]:
-    """Number of reports in a folder, and a line for everything that no longer holds. UserError: no reports."""
+    """Number of reports (``committed.reports_in``), and a line for all that no longer holds. UserError: no reports."""
     from ...benchmarks import report as performance
     from ...study import provenance
 
-    reports = sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
+    reports = committed.reports_in(folder)
     timed = sorted(path.parent for path in folder.glob(f"*/{performance.MACHINE}"))
     if not reports and not timed:
-        raise UserError(f"{folder}: no reports in this folder (looked for */{provenance.FILE})")
+        raise UserError(f"{folder}: no report, and none in its folders (looked for {provenance.FILE})")
     problems = [f"{report}: {problem}" for report in reports for problem in _problems(report)]
     problems += [f"{report}: {problem}" for report in timed for problem in performance.problems(report)]
     return len(reports) + len(timed), problems

@@ -13,6 +13,15 @@ if TYPE_CHECKING:
 NEEDED = ("records.csv", "table.csv")
 
 
+def reports_in(folder: Path) -> list[Path]:
+    """The reports of studies in a folder, or the folder itself where it is one."""
+    from ...study import provenance
+
+    if (folder / provenance.FILE).is_file():
+        return [folder]
+    return sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
+
+
 def read(report: Path) -> tuple[Study, dict[str, Any]]:
     """The study of a report and its provenance. UserError: the report is not finished, or what of it is missing."""
     from ...study import provenance

@@ -69,12 +69,11 @@ class Verdict:
 
 
 def rerun_in(folder: Path, count: int, seed: int, artifacts: Path, write: Callable[[str], None]) -> list[str]:
-    """Rerun ``count`` cells of every report in a folder; write what was found, and return a line for every fault."""
-    from ...study import provenance
+    """Rerun ``count`` cells of each of ``committed.reports_in``; write what was found, and return a line a fault."""
     from ...study.executors import executor
 
     faults = []
-    for report in sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}")):
+    for report in committed.reports_in(folder):
         try:
             study, _ = committed.read(report)
             where = executor("auto", None, is_small(study.display.panel))

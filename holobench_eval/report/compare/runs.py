@@ -33,7 +33,7 @@ def read_run(folder: Path) -> Run:
     """Read a report. UserError: the folder holds no records.csv, or one that names a cell twice."""
     try:
         text = (folder / "records.csv").read_text(encoding="utf-8")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise UserError(f"{folder}: no records.csv in this folder; expected the folder of a report") from None
     except ValueError as error:
         raise UserError(f"{folder}: {error}") from None

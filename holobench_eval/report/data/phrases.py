@@ -45,7 +45,7 @@ def relation(score: Score, test: PairedTest) -> str:
     """``better than wirtinger by +1.30 dB [+0.43, +2.17], p = 0.037``."""
     found, told = verdict(score, test), short(score, test)
     if found in ("better", "worse"):
-        return f"{found} than {test.first} by {told}"
+        return f"{found} than {test.first}{' by' if test.estimate.mean > 0 else ','} {told}"  # not worse by a minus
     if found == "not tested":
         return f"not tested against {test.first}, {told}"
     clusters = test.estimate.clusters

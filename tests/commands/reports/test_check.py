@@ -35,6 +35,10 @@ def test_a_report_that_follows_from_its_records_passes(report: Path) -> None:
     assert problems(report) == []
 
 
+def test_a_report_itself_is_checked_as_one_in_its_folder(report: Path) -> None:
+    assert problems_in(report) == problems_in(report.parent) == (1, [])
+
+
 def test_a_changed_number_in_a_table_is_found(report: Path) -> None:
     table = report / "table.csv"
     table.write_text(re.sub("(Toy,open loop,.*?,,,,)2,", r"\g<1>3,", table.read_text()))
@@ -103,5 +107,5 @@ def test_a_damaged_provenance_is_found(report: Path) -> None:
 
 
 def test_a_folder_without_reports_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no reports"):
+    with pytest.raises(UserError, match="no report, and none in its folders"):
         problems_in(tmp_path)

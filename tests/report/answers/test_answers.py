@@ -78,6 +78,11 @@ def test_the_method_that_the_question_names_is_answered_for_display_by_display()
     assert re.search(r"; on b -0\.10 dB \[.*\] against old, p = \d\.\d+, not shown \(", first)
 
 
+def test_a_worse_method_is_not_worse_by_a_minus() -> None:
+    found = results_of({"old": 19.0, "new": 17.0}, question="Is new better?")
+    assert "worse than old, -2." in answer(found)
+
+
 def test_without_a_named_method_the_best_one_is_compared_with_the_baseline() -> None:
     text = answer(results_of(COMPARED))
     assert "The best mean PSNR (linear light): on bench other, 20.05 dB, better than old by +3.00 dB" in text

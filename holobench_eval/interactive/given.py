@@ -1,8 +1,9 @@
-"""What users pass as numbers: arrays of NumPy, tensors of torch, lists. What is wrong is told in one line."""
+"""What users pass: numbers as arrays, tensors or lists, paths and names. What is wrong is told in one line."""
 
 from __future__ import annotations
 
-from pathlib import PurePath
+from collections.abc import Collection
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,8 @@ def array_of(values: Numbers, what: str) -> NDArray[Any]:
     if isinstance(values, Tensor):
         values = values.detach().cpu().resolve_conj().resolve_neg()
         return (values.float() if values.dtype == torch.bfloat16 else values).numpy()  # NumPy has no such type
+    if isinstance(values, np.ma.MaskedArray):
+        raise UserError(f"{what} with a mask; expected an array without one, such as values.filled(0)")
     try:
         return np.asarray(values)
     except ValueError:
@@ -50,3 +53,26 @@ def as_in_config(value: Any) -> Any:
     if isinstance(value, PurePath):
         return str(value)
     return value.item() if isinstance(value, np.generic) else value
+
+
+def path_of(value: object, what: str) -> Path:
+    """A path. what: the parameter, in the UserError for what is none."""
+    if not isinstance(value, str | PurePath):
+        raise UserError(f"{what}: expected a path; got {type(value).__name__}")
+    if "\0" in str(value):
+        raise UserError(f"{what}: {str(value)!r} is no path, since it holds a zero byte")
+    return Path(value)
+
+
+def whole(value: object, what: str) -> int:
+    """A whole number. what: the parameter, in the UserError for what is none."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise UserError(f"{what}: expected a whole number; got {type(value).__name__}")
+    return int(value)
+
+
+def names(value: object, what: str) -> tuple[str, ...]:
+    """Names. what: the parameter, in the UserError for one name alone and for what are none."""
+    if isinstance(value, str) or not isinstance(value, Collection) or not all(isinstance(name, str) for name in value):
+        raise UserError(f'{what}: expected names in a list, such as ["psnr"]; got {value!r}')
+    return tuple(value)
