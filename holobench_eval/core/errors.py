@@ -63,4 +63,5 @@ def suggest(word: str, allowed: Iterable[str]) -> str:
     words = sorted(allowed)
     near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
     hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"{hint}allowed: {', '.join(words)}"
+    between = "; " if any("," in each for each in words) else ", "
+    return f"{hint}allowed: {between.join(words)}"

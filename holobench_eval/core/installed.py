@@ -49,6 +49,11 @@ def shipped_configs() -> dict[str, Path]:
     return {path.stem: path for path in sorted(shipped().glob("*.yaml"))}
 
 
+def as_typed(config: Path) -> str:
+    """A config as a command has it: the name of one that ships, else the path."""
+    return config.stem if config == shipped_configs().get(config.stem) else str(config)
+
+
 def pinned() -> dict[str, str]:
     """The versions of packages that the committed results were made with, by name; none if their file is lost."""
     path = shipped() / "constraints.txt"

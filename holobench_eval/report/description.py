@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from pathlib import Path
 from types import MappingProxyType
 
 from ..core.errors import UserError
-from ..core.installed import shipped_configs
+from ..core.installed import as_typed
 from ..display.api import DisplaySpec
 from ..display.simulated.profile import Profile, load_profile
 from ..display.simulated.stages import Panel
@@ -61,9 +62,8 @@ def describe(study: Study) -> Description:
     else:
         profile = study.display.learned.profile
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
-    file = study.file.name if study.file.is_absolute() else study.file.as_posix()
-    if study.file == shipped_configs().get(study.name):
-        file = study.name
+    typed = Path(as_typed(study.file))
+    file = typed.name if typed.is_absolute() else typed.as_posix()
     command = "holoeval session import with the session's folder" if study.display.session else ""
     command = f"holoeval run {file} {study.changes}" if study.changes else command
     return Description(displays, file, study.text, command)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from holobench_eval.core.errors import BudgetError, CellError, ForeignError, StorageError, UserError, reason
+from holobench_eval.core.errors import BudgetError, CellError, ForeignError, StorageError, UserError, reason, suggest
 
 
 @pytest.mark.parametrize("kind", [BudgetError, CellError, StorageError, UserError])
@@ -23,3 +23,8 @@ def test_a_reason_is_one_short_line_and_never_empty() -> None:
     assert len(reason(CellError("x" * 400))) == 300
     assert reason(CellError()) == reason(UserError(" \n")) == "no reason given"
     assert reason(KeyboardInterrupt()) == "KeyboardInterrupt:"
+
+
+def test_words_that_hold_commas_are_told_apart() -> None:
+    assert suggest("x", ("b", "a")) == "allowed: a, b"
+    assert suggest("x", ("wirtinger", "sgd, tuned")) == "allowed: sgd, tuned; wirtinger"

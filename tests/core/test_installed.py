@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core import installed
-from holobench_eval.core.installed import clone, installing
+from holobench_eval.core.installed import as_typed, clone, installing, shipped_configs
 
 
 @pytest.fixture
@@ -40,3 +40,8 @@ def test_in_a_clone_the_command_is_that_of_the_documentation(place: Path, monkey
     assert installing(extra="peers") == "pip install -c constraints.txt -e '.[peers]'"
     assert installing("kornia") == "pip install -c constraints.txt kornia"
     assert installing() == "pip install -c constraints.txt -e ."
+
+
+def test_a_config_that_ships_is_typed_by_its_name_and_another_by_its_path() -> None:
+    assert as_typed(shipped_configs()["table3"]) == "table3"
+    assert as_typed(Path("elsewhere/table3.yaml")) == "elsewhere/table3.yaml"

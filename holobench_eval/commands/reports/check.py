@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...core.errors import UserError
+from ...core.installed import as_typed
 from ..options import Learned
 from . import committed
 from .rerun import rerun_in
@@ -73,7 +74,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     if differs := difference(read_records(records), plan(study)):
         yield f"{differs}: the study, the code or the metrics of this machine have changed; run the study again"
         return
-    command = f"run: holoeval report {study.file} --output {report}"
+    command = f"run: holoeval report {as_typed(study.file)} --output {report}"
     if text_digest(study.text) != known["config_sha256"]:
         yield f"the text of the config has changed, but no cell; {command} (computes nothing)"
     for name in ("report.md", "details.md"):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...core.errors import UserError
+from ...core.installed import as_typed
 from ..options import Config, Output, output_folder
 from ..output import console, write_report
 
@@ -34,8 +35,8 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
     store, committed = Store(folder), folder / "records.csv"
     raw = store.folder.is_dir()
     if not raw and not committed.is_file():
-        raise UserError(f"{folder}: no records in this folder; holoeval run {config} makes them")
-    again = " ".join(filter(None, (f"holoeval run {config} --output {folder}", str(changes or ""))))
+        raise UserError(f"{folder}: no records in this folder; holoeval run {as_typed(config)} makes them")
+    again = " ".join(filter(None, (f"holoeval run {as_typed(config)} --output {folder}", str(changes or ""))))
     records = store.load(grid) if raw else _committed(grid, committed, again)
     missing = sum(record["state"] == "missing" for record in records)
     if missing == len(records):

@@ -28,7 +28,7 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     yield from _mirrored(captures, folders)
     clipped = [record for record in captures if (record.saturated or 0) > MOST_SATURATED]
     if clipped:
-        shares = named([f"{_name(record)} {record.saturated:.1%}" for record in clipped])
+        shares = named([f"{_name(record)} {record.saturated:.2%}" for record in clipped])
         yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at full scale: {shares}."
     given = [record for record in captures if record.cell["geometry"]["kind"] == "given"]
     unlike = [record for record in given if record.cell["geometry"]["correlation"] < ALIKE_IN_POSE]
