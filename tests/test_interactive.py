@@ -61,7 +61,7 @@ def test_a_noise_free_display_gives_the_score_of_a_study(tmp_path: Path, display
     scored = next(record for record in records if record["label"] == "gerchberg_saxton")
     target = study.dataset.load("coffee", display.spec.region.shape)
     phase = display.solve("gerchberg_saxton", target, iterations=3, initial_phase="constant")
-    found = hb.score(display.capture(phase, target), target)
+    found = hb.score(display.capture(phase, target), target=target)
     assert found == pytest.approx({name: scored["scores"][name] for name in found})
 
 
@@ -110,7 +110,9 @@ def test_a_phase_of_numpy_scores_what_its_tensor_scores(
     tensor, array = (display.solve(Random(array, double), target) for array in (False, True))
     assert array.dtype == tensor.dtype
     assert np.array_equal(array, tensor)
-    first, second = (hb.score(display.capture(phase, target), target, ("psnr",)) for phase in (tensor, array))
+    first, second = (
+        hb.score(display.capture(phase, target), target=target, metrics=("psnr",)) for phase in (tensor, array)
+    )
     assert first == second
 
 
@@ -241,6 +243,10 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (lambda d, t: d.capture(np.ones((3, 128, 128), np.complex64), t), "phase of complex64; expected radians"),
         (lambda d, t: d.ideal(torch.ones((3, 128, 128)) * 1j), "phase of complex64; expected radians"),
         (lambda d, t: d.capture(np.ones((3, 128, 128), np.uint8), t), "phase of uint8; expected radians"),
+        (
+            lambda d, t: d.capture(np.arange(3.0 * 128 * 128).reshape(3, 128, 128) % 256, t),
+            "a phase of whole numbers up to 255, so levels; expected radians",
+        ),
         (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase with values that are NaN or infinite"),
         (lambda d, t: hb.open_display("ideal", panel=(256.0, 256)), r"rows and columns such as .*; got \(256.0, 256\)"),
         (lambda d, t: hb.open_display("ideal", panel=256), "rows and columns such as .*; got 256"),
@@ -252,10 +258,13 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (lambda d, t: d.target("a\0.png"), "a picture: .* is no path, since it holds a zero byte"),
         (lambda d, t: d.target(np.ma.masked_less(np.ones((50, 50)), 2)), "a picture with a mask"),
         (lambda d, t: d.solve(lambda target, bench: sys.exit("enough"), t), "SystemExit: enough"),
-        (lambda d, t: hb.score(t[:, 1:], t), "must both be"),
-        (lambda d, t: hb.score(t, t, "psnr"), r'metrics: expected names in a list, such as \["psnr"\]; got \'psnr\''),
-        (lambda d, t: hb.score(t, t, 3), "metrics: expected names in a list"),
-        (lambda d, t: hb.score(t, t, ("psrn",)), "did you mean 'psnr'"),
+        (lambda d, t: hb.score(t[:, 1:], target=t), "must both be"),
+        (
+            lambda d, t: hb.score(t, target=t, metrics="psnr"),
+            r'metrics: expected names in a list, such as \["psnr"\]; got \'psnr\'',
+        ),
+        (lambda d, t: hb.score(t, target=t, metrics=3), "metrics: expected names in a list"),
+        (lambda d, t: hb.score(t, target=t, metrics=("psrn",)), "did you mean 'psnr'"),
         (lambda d, t: hb.compare(t, {"a": t[:, 1:]}), r"capture 'a' of \(3, 103, 104\); expected .* \(3, 104, 104\)"),
         (lambda d, t: hb.compare(t, {"a": t * np.nan}), "not finite"),
         (lambda d, t: hb.compare(t, {"a": t + 1j}), "capture 'a' of complex64"),

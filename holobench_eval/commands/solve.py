@@ -74,6 +74,7 @@ def write_study(methods: list[str], picture: Path, display: str, panel: tuple[in
 
     UserError for a picture that is no such file, and for a folder that holds another picture or other files.
     """
+    from ..core.installed import shipped_configs
     from ..datasets.images import SUFFIXES, decode, opened, read
 
     content = read(picture)
@@ -94,10 +95,13 @@ def write_study(methods: list[str], picture: Path, display: str, panel: tuple[in
         shutil.copyfile(picture, pictures / picture.name)
     gray = {"gray": True} if opened(content, str(picture)).mode == "L" else {}
     profile = str(Path(display).resolve()) if Path(display).is_file() else display
+    table3 = yaml.safe_load(shipped_configs()["table3"].read_bytes())  # whose trained methods serve here, too
     study = {
         "title": f"{picture.name} on {display}",
+        "seed": table3["seed"],
         "display": {"profiles": [profile], "panel": list(panel)},
         "targets": {"dataset": "folder", "params": {"path": str(pictures), **gray}},
+        "training": table3["training"],
         "methods": [_absolute(method.strip()) for method in methods],
         "save": {"captures": True, "phases": True},
     }

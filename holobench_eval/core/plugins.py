@@ -145,7 +145,8 @@ def _plugin_class(kind: Kind, name: str, found: Any) -> type[Any]:
     function = "solve" if kind == "methods" else "items"
     if not (isinstance(found, type) and is_dataclass(found) and hasattr(found, function)):
         other = "neither a function of target and bench, nor" if kind == "methods" else "not"
-        raise UserError(f"{kind[:-1]} '{name}' is {other} a dataclass with a method '{function}'; see CONTRIBUTING.md")
+        own = f"; its parameters are {inspect.signature(found)}" if inspect.isfunction(found) else ""
+        raise UserError(f"{kind[:-1]} '{name}' is {other} a dataclass with a method '{function}'{own}")
     return found
 
 

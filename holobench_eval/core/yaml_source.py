@@ -88,6 +88,9 @@ def _read(path: Path) -> str:
         if len(content) > LARGEST_BYTES:
             raise UserError(f"{path}: larger than {LARGEST_BYTES} bytes; that is no config")
         return content.decode("utf-8")
+    except FileNotFoundError:
+        where = "" if path.is_absolute() else f" in {Path.cwd()}"
+        raise UserError(f"{path}: no such file{where}") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

@@ -26,6 +26,7 @@ from ..display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_
 from ..metrics import catalogue, match
 from ..metrics import score as _score
 from ..optics.colour import srgb_encode
+from ..optics.phase import are_levels
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
 from .given import Numbers, array_of, as_in_config, names, path_of, tensor_of, whole
@@ -185,6 +186,8 @@ class OpenDisplay:
             raise UserError(f"a phase of {tuple(shown.shape)}; the display shows {wanted}")
         if not bool(shown.isfinite().all()):
             raise UserError("a phase with values that are NaN or infinite; expected radians")
+        if are_levels(shown.numpy()):
+            raise UserError(f"a phase of whole numbers up to {float(shown.abs().max()):g}, so levels; expected radians")
         return shown
 
     def _solver(self, method: Any, params: dict[str, Any]) -> tuple[Any, str]:
@@ -229,7 +232,7 @@ def open_display(
     >>> target.shape
     (3, 104, 104)
     >>> phase = display.solve("double_phase", target)
-    >>> "psnr_linear" in score(display.capture(phase, target), target)
+    >>> "psnr_linear" in score(display.capture(phase, target), target=target)
     True
     """
     if not isinstance(name, str | Path):
@@ -264,7 +267,7 @@ def open_bench(file: str | Path, seed: int = 0) -> OpenDisplay:
     return OpenDisplay(real_condition(path.name, path.parent), whole(seed, "seed"), path.parent)
 
 
-def score(capture: Numbers, target: Numbers, metrics: Sequence[str] | None = None) -> dict[str, float]:
+def score(capture: Numbers, *, target: Numbers, metrics: Sequence[str] | None = None) -> dict[str, float]:
     """The scores of a capture by the metric protocol, by the names that the columns of a study have.
 
     Parameters
@@ -272,7 +275,7 @@ def score(capture: Numbers, target: Numbers, metrics: Sequence[str] | None = Non
     capture
         ``(C, h, w)`` linear light in any unit, aligned with the target.
     target
-        ``(C, h, w)`` linear light in [0, 1].
+        ``(C, h, w)`` linear light in [0, 1]. It is given by its name: the two in the other order have another score.
     metrics
         Names, such as ``["psnr", "ssim"]``; None for all that can be computed here.
 
@@ -335,7 +338,7 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
             raise UserError(
                 f"capture '{name}' of {tuple(image.shape)}; expected that of the target, {tuple(wanted.shape)}"
             )
-    measured = {name: score(image, wanted, ("psnr", "ssim")) for name, image in images.items()}
+    measured = {name: score(image, target=wanted, metrics=("psnr", "ssim")) for name, image in images.items()}
     truth, columns, errors = _picture(wanted), [], []
     for name, scores in measured.items():
         shown = _picture(match(images[name], wanted)[0])

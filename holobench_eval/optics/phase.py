@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 TAU = 2 * math.pi
+BEYOND_RADIANS = 20.0  # whole numbers of radians that reach this far do not occur
+HIGHEST_LEVEL = 65536.0
 
 Matrix = tuple[float, float, float]
 """A symmetric 2 x 2 matrix: along rows (vertical), along columns (horizontal), and between the two."""
@@ -40,6 +44,11 @@ def gray_level(phase: Tensor, bits: int) -> Tensor:
     """The nearest of ``2^bits`` gray levels of a phase [rad]; 2^bits levels span 2 pi, so 0 and 2^bits - 1 differ."""
     levels = 2**bits
     return (phase * (levels / TAU)).round_().remainder_(levels)
+
+
+def are_levels(values: NDArray[np.floating]) -> bool:
+    """Whether real numbers are a panel's levels and no radians: all are whole, and some go beyond three turns."""
+    return bool(BEYOND_RADIANS < np.abs(values).max() <= HIGHEST_LEVEL and (values == np.rint(values)).all())
 
 
 def quantise(phase: Tensor, bits: int) -> Tensor:

@@ -18,13 +18,12 @@ from torch import Tensor
 from ...core.errors import CellError, UserError
 from ...core.io import file_name
 from ...display.api import DisplaySpec
+from ...optics.phase import are_levels
 from ..common import Bench
 from ..double_phase import encode
 from .arrays import SUFFIXES, read_array
 
 COLOURS = ("red", "green", "blue")
-BEYOND_RADIANS = 20.0  # whole numbers of radians that reach this far do not occur
-HIGHEST_LEVEL = 65536.0
 
 
 class NamedBench(Bench, Protocol):
@@ -65,8 +64,8 @@ class Phases:
         Which real numbers are levels: integers, or all (MATLAB keeps levels as double). Floating point that is whole
         throughout and goes beyond 20 is no file of radians, and is refused unless all are levels.
     two_pi_level : float, optional
-        The level that lags a full turn behind level 0; by default 256 or 65536, by the bits of the file. A file of
-        radians is refused with it.
+        The level whose phase is a full turn, 2 pi; by default 256 or 65536, by the bits of the file. A file of radians
+        is refused with it.
     sign : {1, -1}
         -1 for phases of the opposite convention.
     origin : float
@@ -95,6 +94,7 @@ class Phases:
     version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
+    timed: ClassVar[bool] = False  # reading is no solving
 
     def __post_init__(self) -> None:
         for name, pattern in (("file", self.file), ("amplitude", self.amplitude)):
@@ -209,7 +209,7 @@ class Phases:
             array = array.astype(np.float64) * (math.tau / (self.two_pi_level or 2**bits))
         elif self.two_pi_level is not None:
             raise CellError(f"{path}: two_pi_level is set, but {array.dtype} holds radians; levels need 'levels: all'")
-        elif _are_levels(array):
+        elif are_levels(array):
             raise CellError(
                 f"{path}: {array.dtype}, but whole numbers up to {np.abs(array).max():g}, so levels, not radians; set "
                 "'levels: all' and two_pi_level (radians that are whole: store them modulo 2 pi)"
@@ -221,11 +221,6 @@ class Phases:
 
 def _names_targets(pattern: str) -> bool:
     return "{target}" in pattern or "{stem}" in pattern
-
-
-def _are_levels(array: NDArray[Any]) -> bool:
-    """Whether real numbers are levels beyond doubt: all are whole, and some go beyond three turns in radians."""
-    return bool(BEYOND_RADIANS < np.abs(array).max() <= HIGHEST_LEVEL and (array == np.rint(array)).all())
 
 
 def _real(array: NDArray[Any], path: str) -> NDArray[Any]:

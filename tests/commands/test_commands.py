@@ -142,7 +142,7 @@ def test_a_study_from_run_to_check(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("run", "absent.yaml"), "absent.yaml: cannot be read"),
+        (("run", "absent.yaml"), "absent.yaml: no such file in "),
         (("run", "toy.yaml", "--executor", "lokal"), "unknown executor 'lokal'; did you mean 'local'?"),
         (("run", "toy.yaml", "--executor", "serial", "--workers", "3"), "--workers 3 needs --executor local"),
         (("report", "toy.yaml"), "no records in this folder"),

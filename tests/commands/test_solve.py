@@ -10,8 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from holobench_eval.commands.solve import solve
+from holobench_eval.commands.solve import solve, write_study
 from holobench_eval.core.errors import UserError
+from holobench_eval.core.installed import shipped_configs
+from holobench_eval.study.config import load_study
+from holobench_eval.study.plan import plan
 
 FUNCTION = '''
 import torch
@@ -45,6 +48,12 @@ def test_several_methods_give_phases_captures_scores_and_a_picture(
     table = pd.read_csv(folder / "table.csv")
     assert set(table["label"]) >= {"double_phase", "flat"}
     assert (folder / "study.yaml").is_file()
+
+
+def test_what_table_3_trained_serves_to_solve(picture: Path) -> None:
+    config = write_study(["hil"], picture, "leto-2020", (256, 256), Path("out"))
+    (own,) = plan(load_study(config)).preparations()
+    assert own in plan(load_study(shipped_configs()["table3"])).preparations()
 
 
 def test_a_gray_picture_is_taken(picture: Path) -> None:

@@ -65,7 +65,7 @@ def test_files_that_are_no_configs_are_refused(tmp_path: Path) -> None:
     large.write_text("a: " + "x" * LARGEST_BYTES)
     binary.write_bytes(b"\xff\xfe")
     for path, message in (
-        (tmp_path / "absent.yaml", "No such file"),
+        (tmp_path / "absent.yaml", "no such file"),
         (tmp_path, "Is a directory"),
         (large, "larger than"),
         (binary, "not UTF-8"),

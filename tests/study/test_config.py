@@ -148,7 +148,7 @@ def test_one_method_twice_with_the_same_parameters_is_refused(tmp_path: Path) ->
 
 
 def test_a_missing_config_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"absent\.yaml: cannot be read: No such file"):
+    with pytest.raises(UserError, match=r"absent\.yaml: no such file"):
         load_study(tmp_path / "absent.yaml")
 
 

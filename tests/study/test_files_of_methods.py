@@ -52,6 +52,8 @@ def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_pat
     again = compute(config(tmp_path, "read", f"{read}, {levels}"), tmp_path / "read")
     assert scores(again, "read") == scores(made, "double_phase")
     assert scores(again, "levels") == scores(made, "double_phase")  # 8 bits are what this panel shows
+    assert {record["seconds"] is None for record in again if record["label"] in ("read", "levels")} == {True}
+    assert {record["seconds"] is None for record in made if record["label"] == "double_phase"} == {False}
     for file in saved.iterdir():
         assert (tmp_path / "read" / "phases" / "read" / "leto-aged" / file.name).read_bytes() == file.read_bytes()
 

@@ -158,6 +158,10 @@ _FIGURES = {
     "scale_0": ("Factor of the intensity match, red", ""),
     "scale_1": ("Factor of the intensity match, green", ""),
     "scale_2": ("Factor of the intensity match, blue", ""),
+    "second_aligner_px": (
+        "Most that a corner of the target lies elsewhere in the capture by a second aligner",
+        "px",
+    ),
     "share_scored": ("Share of the target that is scored, which all its captures show", ""),
     "share_seen": ("Share of the target that its capture shows", ""),
     "speckle_contrast": ("Standard deviation over mean of intensity in flat patches of the target", ""),

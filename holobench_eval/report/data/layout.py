@@ -222,12 +222,13 @@ def layout_of(study: Study) -> Layout:
 
 
 def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
-    """What methods and displays are that go by their registered name alone: the first sentence of a docstring, the
-    description of a profile."""
+    """What methods and displays are that go by their registered name alone, or read files: the first sentence of a
+    docstring, the description of a profile."""
     methods = {
-        entry.label: (inspect.getdoc(isolation.find(entry.name, study.folder)) or "").partition("\n\n")[0]
+        entry.label: (inspect.getdoc(cls) or "").partition("\n\n")[0]
         for entry in study.methods
-        if entry.label == entry.name.rpartition(":")[2]
+        for cls in [isolation.find(entry.name, study.folder)]
+        if entry.label == entry.name.rpartition(":")[2] or hasattr(cls, "files")  # phases that others have made
     }
     profiles = {
         condition.name: load_profile(source, study.folder).description

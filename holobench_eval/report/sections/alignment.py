@@ -51,8 +51,8 @@ def sentences(results: Results, records: Records) -> list[str]:
         )
     if own:
         lines.append(
-            f"An alignment of its own for {_count(own)}: the shared one, if there is one, is further away. Its error "
-            "affects its score."
+            f"An alignment of its own for {_count(own)}: "
+            f"{'the shared one is further away' if shared else 'no two are in one pose'}. Its error affects its score."
         )
     if any("part" in record["cell"] for record in records):
         lines.append(

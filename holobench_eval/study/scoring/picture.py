@@ -16,6 +16,7 @@ from ...display.learned import LearnedBench
 from ...lab.photograph import MOST_SATURATED
 from ...lab.real import RealBench
 from ...metrics import floor_captures, match, score
+from .. import isolation
 from ..artifacts import Artifact
 from ..displays import Condition
 from ..plan import Cell
@@ -65,15 +66,16 @@ def captured(
     if job.task.is_start:
         starts.keep(job.store, cell.id, solved.phase)
     scores = scored(job, cell, capture.image, target) | _second_scores(bench, capture, target)
+    timed = getattr(isolation.find(cell.method, job.setting.folder), "timed", True)
     return Record(
         cell=cell.description(),
         state="done",
         label=job.task.label,
         scores=scores | {"efficiency": capture.efficiency},
         captures=solved.captures,
-        seconds=solved.cost.seconds,
+        seconds=solved.cost.seconds if timed else None,
         alone=job.alone,
-        memory_mib=solved.cost.memory_mib,
+        memory_mib=solved.cost.memory_mib if timed else None,
         registration_residual_px=capture.residual,
         saturated=capture.saturated,
         learned=account(solved.learned),
