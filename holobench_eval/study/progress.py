@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,7 @@ from .store import Record
 from .training import WAITS
 
 SECONDS_BETWEEN_LINES = 5.0
+SHARE = "share"  # of all steps of a training, in its log
 
 
 def _unknown() -> None:
@@ -44,6 +46,19 @@ def _failure(record: Record) -> str:
 
 def _untrained(name: str, reason: str) -> str:
     return f"training {name}: {reason}" if reason == WAITS else f"failed: training {name}: {reason}"
+
+
+def _newest(rows: Sequence[Mapping[str, str]]) -> str:
+    """The newest row of a training's log, after the share of its steps that is done and the time left where the log
+    has them. The rounds to come take their captures as the past ones did, so that the time is a lower limit."""
+    told = ", ".join(f"{key} {value}" for key, value in rows[-1].items() if value and key != SHARE)
+    known = [(float(row[SHARE]), float(row["seconds"])) for row in rows if row.get(SHARE) and row.get("seconds")]
+    if not known:
+        return told
+    (first, begun), (share, now) = known[0], known[-1]
+    left = (1 - share) * (now - begun) / (share - first) if share > first else math.inf
+    time_left = f", at least {duration(left)} left" if 1 <= left < math.inf else ""
+    return f"{share:.0%} of the steps{time_left}; {told}"
 
 
 @dataclass
@@ -75,9 +90,7 @@ class Follower:
         while not self.done.wait(self.seconds):
             for name, folder in list(self.folders.items()):
                 rows = read_log(folder)
-                line = (
-                    f"{name}: {', '.join(f'{key} {value}' for key, value in rows[-1].items() if value)}" if rows else ""
-                )
+                line = f"{name}: {_newest(rows)}" if rows else ""
                 if line and self.last_lines.get(name) != line:
                     self.last_lines[name] = line
                     tell(line)

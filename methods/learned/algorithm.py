@@ -47,7 +47,7 @@ def train(
     earlier : sequence of Sample
         Not in the paper: captures that every round learns from beside its own.
     """
-    checkpoint = Checkpoint(bench, D)
+    checkpoint = Checkpoint(bench, D, schedule)
 
     def optimise(k: int, I: TrainingImage) -> Tensor:  # noqa: E741
         phase = checkpoint.kept(f"start {I.item}", lambda: start(I))

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ...display.training import TrainingBench, TrainingImage
-from .samples import Approximator, Sample, captured
+from .samples import Approximator, Sample, Schedule, captured
 
 STEPS_BETWEEN_SAVES = 100
 
@@ -22,8 +22,8 @@ class Checkpoint:
     and the same rows in its log.
     """
 
-    def __init__(self, bench: TrainingBench, approximator: Approximator) -> None:
-        self._bench, self._approximator = bench, approximator
+    def __init__(self, bench: TrainingBench, approximator: Approximator, schedule: Schedule) -> None:
+        self._bench, self._approximator, self._schedule = bench, approximator, schedule
         self._saved = bench.load("approximator") or {"round": 0, "step": 0}
         self._round = 0
         self._sums: dict[str, float] = {}
@@ -61,7 +61,7 @@ class Checkpoint:
         for sample in captured(self._bench, keys, phases, images, purpose, number):
             samples.append(sample)
             if purpose == "round" and self._round > self._saved["round"]:
-                self._bench.log(round=self._round, step=0, images=len(samples))
+                self.log(0, {"images": len(samples)})
         return samples
 
     def steps(self, samples: Sequence[Sample], count: int) -> Iterator[tuple[Sample, float]]:
@@ -87,8 +87,10 @@ class Checkpoint:
         self._sums = {name: self._sums.get(name, 0.0) + value for name, value in losses.items()}
 
     def log(self, step: int, values: Mapping[str, float]) -> None:
-        """A row of the present round."""
-        self._bench.log(round=self._round, step=step, **values)
+        """A row of the present round, with the share of all steps that are done after so many of it."""
+        steps = [self._schedule.steps_of(number) for number in range(1, self._schedule.rounds + 1)]
+        done = sum(steps[: self._round - 1]) + step
+        self._bench.log(round=self._round, step=step, share=round(done / sum(steps), 4), **values)
 
     def _save(self, step: int, count: int) -> None:
         """Log the mean losses of the last ``count`` steps, then keep the approximator."""

@@ -207,8 +207,12 @@ def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_p
     tells("two: round 3")
     logs["one"].log({"round": 0, "step": 10, "fidelity": 20.5})
     tells("one: round 0, step 10, fidelity 20.5")
+    logs["two"].log({"round": 3, "step": 0, "share": 0.0, "seconds": 40.0})
+    tells("two: 0% of the steps; round 3, step 0, seconds 40")
+    logs["two"].log({"round": 3, "step": 9, "share": 0.25, "seconds": 60.0})
+    tells("two: 25% of the steps, at least 60 s left; round 3, step 9, seconds 60")
     time.sleep(0.05)
-    assert len(told) == 3
+    assert len(told) == 5
     follower.ended("one")
     assert not follower.done.is_set()
     follower.ended("two")

@@ -305,13 +305,14 @@ def test_a_row_tells_the_mean_loss_since_the_row_earlier() -> None:
     samples = [
         Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (1.0, 2.0)
     ]
-    kept = Checkpoint(bench, approximator)
+    kept = Checkpoint(bench, approximator, Schedule(1, steps=8))
     for _ in kept.rounds(1):
         for sample, progress in kept.steps(samples, 8):
             kept.add(approximator.step(sample, progress))
     assert [row["step"] for row in memory.rows] == [3, 6, 8]
     expected = [sum(losses[a:b]) / (b - a) for a, b in ((0, 3), (3, 6), (6, 8))]
     assert [row["error"] for row in memory.rows] == pytest.approx(expected)
+    assert [row["share"] for row in memory.rows] == [0.375, 0.75, 1.0]
     assert not any("nothing" in row for row in memory.rows)
 
 
