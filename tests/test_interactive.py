@@ -221,6 +221,10 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         ),
         (lambda d, t: d.solve(lambda target, bench: torch.full((1, 3, 128, 128), torch.nan), t), "NaN or infinite"),
         (lambda d, t: d.solve(lambda target, bench: np.full((1, 3, 128, 128), 1e300), t), "NaN or infinite"),
+        (
+            lambda d, t: d.solve(lambda target, bench: torch.arange(3.0 * 128**2).view(1, 3, 128, 128), t),
+            "whole numbers up to 49151: levels; expected radians",
+        ),
         (lambda d, t: d.solve(lambda target: 3, t), r"lambda>\(target\) cannot be called with target, bench"),
         (
             lambda d, t: d.solve(flat, t, levle=1),
@@ -262,6 +266,10 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (
             lambda d, t: hb.score(t, target=t, metrics="psnr"),
             r'metrics: expected names in a list, such as \["psnr"\]; got \'psnr\'',
+        ),
+        (
+            lambda d, t: hb.score(t, target=t, metrics=["psnr", "ms_ssim"]),
+            "metrics: ms_ssim cannot be computed here of 104 x 104 pixels",
         ),
         (lambda d, t: hb.score(t, target=t, metrics=3), "metrics: expected names in a list"),
         (lambda d, t: hb.score(t, target=t, metrics=("psrn",)), "did you mean 'psnr'"),

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import UserError, suggest
-from ..core.installed import shipped_configs
+from ..core.installed import clone, shipped_configs
 from ..core.panels import is_small
 
 if TYPE_CHECKING:
     from ..study.changes import Changes
     from ..study.definition import Study
+    from ..study.plan import Plan
 
 
 def config_path(text: str) -> Path:
@@ -40,6 +41,7 @@ PANEL = typer.Option(metavar="ROWS COLUMNS", help="Pixels of the simulated panel
 Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
 Device = Annotated[str, typer.Option(help="Where torch computes: cpu, cuda, cuda:N, or auto, a GPU if it finds one.")]
 Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]
+ARTIFACTS = Path("artifacts")  # the default
 Methods = Annotated[list[str] | None, typer.Option(metavar="A,B", help="Only these methods, by their labels or names.")]
 Targets = Annotated[list[str] | None, typer.Option(metavar="X,Y", help="Only these targets.")]
 Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="Only the first N targets.")]
@@ -82,3 +84,15 @@ def thread_count(threads: int | None, workers: int, study: Study) -> int:
     import torch
 
     return threads or (1 if workers > 1 or is_small(study.display.panel) else torch.get_num_threads())
+
+
+def learned_folder(given: Path, grid: Plan) -> Path:
+    """The folder of artifacts. Where the default is not there, that of the clone which this package runs from, if it
+    has everything that a plan needs: nothing is trained into another folder than the working directory's."""
+    from ..study.artifacts import Artifacts
+
+    root, needed = clone(), grid.preparations().values()
+    if given != ARTIFACTS or given.is_dir() or root is None:
+        return given
+    own = Artifacts(root / given)
+    return own.folder if needed and all(own.has(preparation) for preparation in needed) else given

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -14,6 +13,7 @@ from rich.table import Table
 
 from ..core.panels import is_small
 from .options import (
+    ARTIFACTS,
     Config,
     Device,
     Learned,
@@ -24,6 +24,7 @@ from .options import (
     Threads,
     Values,
     changes_of,
+    learned_folder,
     output_folder,
     thread_count,
 )
@@ -48,7 +49,7 @@ def plan(
     values: Values = None,
     threads: Threads = None,
     device: Device = "auto",
-    artifacts: Learned = Path("artifacts"),
+    artifacts: Learned = ARTIFACTS,
 ) -> None:
     """Show what a study would compute, and what of it is done; compute nothing."""
     from ..core.device import find, gpu_name, gpus
@@ -64,6 +65,7 @@ def plan(
     workers = executor("auto", None, is_small(study.display.panel), gpus=gpus(device)).workers
     grid, many = plan_cells(study), thread_count(threads, workers, study)
     console.print(table(study, preview(study, grid, Store(folder), many, workers, gpu_name(find(device)))))
+    artifacts = learned_folder(artifacts, grid)
     if learning := trainings(grid, Artifacts(artifacts)):
         console.print(training_table(learning))
         if not artifacts.is_dir():

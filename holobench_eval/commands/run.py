@@ -23,6 +23,7 @@ import yaml
 
 from ..core.panels import is_small
 from .options import (
+    ARTIFACTS,
     RESULTS,
     Config,
     Device,
@@ -34,6 +35,7 @@ from .options import (
     Threads,
     Values,
     changes_of,
+    learned_folder,
     output_folder,
     thread_count,
 )
@@ -64,7 +66,7 @@ def run(
     device: Device = "auto",
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
     retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
-    artifacts: Learned = Path("artifacts"),
+    artifacts: Learned = ARTIFACTS,
 ) -> None:
     """Compute what is missing of a study and write its report. A stopped run goes on with the same command.
 
@@ -88,6 +90,7 @@ def run(
         if study.display.real:
             open_displays(study)
         folder, grid = output_folder(study, output), plan(study)
+        artifacts = learned_folder(artifacts, grid)
         if word := replaced(study, folder):
             console.print(word, markup=False, highlight=False, soft_wrap=True)
         many = thread_count(threads, where.workers, study)

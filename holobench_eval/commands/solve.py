@@ -11,7 +11,7 @@ import typer
 import yaml
 
 from ..core.errors import UserError
-from .options import PANEL, RESULTS, Learned
+from .options import ARTIFACTS, PANEL, RESULTS, Learned
 
 STUDY = "study.yaml"  # in the output folder
 
@@ -24,7 +24,7 @@ def solve(
     output: Annotated[
         Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the picture>]")
     ] = None,
-    artifacts: Learned = Path("artifacts"),
+    artifacts: Learned = ARTIFACTS,
 ) -> None:
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from ..core.io import file_name

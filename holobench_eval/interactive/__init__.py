@@ -186,8 +186,11 @@ class OpenDisplay:
             raise UserError(f"a phase of {tuple(shown.shape)}; the display shows {wanted}")
         if not bool(shown.isfinite().all()):
             raise UserError("a phase with values that are NaN or infinite; expected radians")
-        if are_levels(shown.numpy()):
-            raise UserError(f"a phase of whole numbers up to {float(shown.abs().max()):g}, so levels; expected radians")
+        if are_levels(shown):
+            raise UserError(
+                f"a phase of whole numbers up to {float(shown.abs().max()):g}, so levels; expected radians (those that "
+                "are whole by chance: modulo 2 pi)"
+            )
         return shown
 
     def _solver(self, method: Any, params: dict[str, Any]) -> tuple[Any, str]:
@@ -292,9 +295,14 @@ def score(capture: Numbers, *, target: Numbers, metrics: Sequence[str] | None = 
     computed = [metric.name for metric in catalogue() if metric.available() is None] if metrics is None else metrics
     light, wanted = tensor_of(capture, "a capture"), tensor_of(target, "a target")
     try:
-        return _score(light, wanted, metrics=names(computed, "metrics"))
+        found = _score(light, wanted, metrics=names(computed, "metrics"))
     except ValueError as error:
         raise UserError(str(error)) from None
+    lost = [name for name in metrics or () if not any(key.startswith(name) for key in found)]
+    if lost:
+        rows, columns = light.shape[1:]
+        raise UserError(f"metrics: {', '.join(lost)} cannot be computed here of {rows} x {columns} pixels")
+    return found
 
 
 def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path = "compared.jpg") -> Path:

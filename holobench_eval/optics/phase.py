@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 TAU = 2 * math.pi
@@ -46,9 +44,11 @@ def gray_level(phase: Tensor, bits: int) -> Tensor:
     return (phase * (levels / TAU)).round_().remainder_(levels)
 
 
-def are_levels(values: NDArray[np.floating]) -> bool:
+def are_levels(values: Tensor) -> bool:
     """Whether real numbers are a panel's levels and no radians: all are whole, and some go beyond three turns."""
-    return bool(BEYOND_RADIANS < np.abs(values).max() <= HIGHEST_LEVEL and (values == np.rint(values)).all())
+    low, high = values.detach().aminmax()
+    largest = max(-float(low), float(high))
+    return BEYOND_RADIANS < largest <= HIGHEST_LEVEL and bool(low < high) and bool((values == values.round()).all())
 
 
 def quantise(phase: Tensor, bits: int) -> Tensor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -65,7 +66,7 @@ def describe(study: Study) -> Description:
     typed = Path(as_typed(study.file))
     file = typed.name if typed.is_absolute() else typed.as_posix()
     command = "holoeval session import with the session's folder" if study.display.session else ""
-    command = f"holoeval run {file} {study.changes}" if study.changes else command
+    command = f"holoeval run {shlex.quote(file)} {study.changes}" if study.changes else command
     return Description(displays, file, study.text, command)
 
 

@@ -209,7 +209,7 @@ class Phases:
             array = array.astype(np.float64) * (math.tau / (self.two_pi_level or 2**bits))
         elif self.two_pi_level is not None:
             raise CellError(f"{path}: two_pi_level is set, but {array.dtype} holds radians; levels need 'levels: all'")
-        elif are_levels(array):
+        elif are_levels(torch.from_numpy(array.astype(np.float64))):
             raise CellError(
                 f"{path}: {array.dtype}, but whole numbers up to {np.abs(array).max():g}, so levels, not radians; set "
                 "'levels: all' and two_pi_level (radians that are whole: store them modulo 2 pi)"

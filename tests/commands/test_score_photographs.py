@@ -256,7 +256,7 @@ def test_clipped_captures_are_named_with_their_share(tmp_path):
     assert share > 0.05
     for said in (text, terminal):
         assert "more than 0.1% of the scored samples at full scale: clipped/astronaut" in said
-        assert f"clipped/astronaut {share:.1%}" in said
+        assert f"clipped/astronaut {share:.2%}" in said
     assert "fair/" not in terminal.partition("Clipped")[2]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from holobench_eval.commands.options import ARTIFACTS, learned_folder
 from holobench_eval.commands.solve import solve, write_study
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.installed import shipped_configs
@@ -54,6 +55,15 @@ def test_what_table_3_trained_serves_to_solve(picture: Path) -> None:
     config = write_study(["hil"], picture, "leto-2020", (256, 256), Path("out"))
     (own,) = plan(load_study(config)).preparations()
     assert own in plan(load_study(shipped_configs()["table3"])).preparations()
+
+
+def test_the_networks_of_the_clone_are_found_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    grid, root = plan(load_study(shipped_configs()["table3"])), Path(__file__).parents[2]
+    monkeypatch.chdir(tmp_path)
+    assert learned_folder(ARTIFACTS, grid) == root / "artifacts"
+    assert learned_folder(Path("mine"), grid) == Path("mine")
+    ARTIFACTS.mkdir()
+    assert learned_folder(ARTIFACTS, grid) == ARTIFACTS
 
 
 def test_a_gray_picture_is_taken(picture: Path) -> None:

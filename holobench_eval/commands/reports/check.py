@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -43,7 +44,8 @@ def problems_in(folder: Path) -> tuple[int, list[str]]:
     from ...study import provenance
 
     reports = committed.reports_in(folder)
-    timed = sorted(path.parent for path in folder.glob(f"*/{performance.MACHINE}"))
+    patterns = (performance.MACHINE, f"*/{performance.MACHINE}")
+    timed = sorted(path.parent for pattern in patterns for path in folder.glob(pattern))
     if not reports and not timed:
         raise UserError(f"{folder}: no report, and none in its folders (looked for {provenance.FILE})")
     problems = [f"{report}: {problem}" for report in reports for problem in _problems(report)]
@@ -74,7 +76,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     if differs := difference(read_records(records), plan(study)):
         yield f"{differs}: the study, the code or the metrics of this machine have changed; run the study again"
         return
-    command = f"run: holoeval report {as_typed(study.file)} --output {report}"
+    command = f"run: holoeval report {shlex.quote(as_typed(study.file))} --output {shlex.quote(str(report))}"
     if text_digest(study.text) != known["config_sha256"]:
         yield f"the text of the config has changed, but no cell; {command} (computes nothing)"
     for name in ("report.md", "details.md"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,10 +34,10 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
     study = load_study(config, changes)
     folder, grid = output_folder(study, output), plan(study)
     store, committed = Store(folder), folder / "records.csv"
-    raw = store.folder.is_dir()
+    raw, typed = store.folder.is_dir(), shlex.quote(as_typed(config))
     if not raw and not committed.is_file():
-        raise UserError(f"{folder}: no records in this folder; holoeval run {as_typed(config)} makes them")
-    again = " ".join(filter(None, (f"holoeval run {as_typed(config)} --output {folder}", str(changes or ""))))
+        raise UserError(f"{folder}: no records in this folder; holoeval run {typed} makes them")
+    again = " ".join(filter(None, (f"holoeval run {typed} --output {shlex.quote(str(folder))}", str(changes or ""))))
     records = store.load(grid) if raw else _committed(grid, committed, again)
     missing = sum(record["state"] == "missing" for record in records)
     if missing == len(records):

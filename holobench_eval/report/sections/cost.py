@@ -24,11 +24,14 @@ def _render(report: Report, _: Figures) -> Blocks:
     if report.layout.measure == FILES:
         yield f"{text.cost} Match factors and brightness ratios are computed {text.compared}."
     else:
-        memory = MEMORY_COLUMN in results.table
+        memory, timed = MEMORY_COLUMN in results.table, results.done["seconds"].notna().any()
         sentences = [
             text.cost,
-            _measured(report.provenance, memory),
-            timing(results, report.provenance.get("workers", 1)),
+            *(
+                [_measured(report.provenance, memory), timing(results, report.provenance.get("workers", 1))]
+                if timed
+                else []
+            ),
         ]
         if memory:
             sentences.append(

@@ -80,6 +80,8 @@ def cost_columns(results: Results, each: str = "") -> dict[str, str]:
     solving = {"captures": f"captures{each}{' while solving' * trained}", "seconds": f"seconds{each}"}
     if results.layout.predicts:
         del solving["captures"]
+    if results.table["seconds"].isna().all():  # phases from files alone
+        del solving["seconds"]
     return training | solving if trained else solving
 
 
