@@ -46,11 +46,14 @@ class Checkpoint:
     def phases(
         self, purpose: str, number: int, images: Sequence[TrainingImage], retrieve: Callable[[TrainingImage], Tensor]
     ) -> list[Tensor]:
-        """The phases ``(C, H, W)`` [rad] of images."""
-        return [
-            self.kept(f"phase of {purpose} {number} {image.item}", partial(retrieve, image))  # its key in a memory
-            for image in images
-        ]
+        """The phases ``(C, H, W)`` [rad] of images, which the log counts for a round that is new."""
+        phases = []
+        for image in images:
+            key = f"phase of {purpose} {number} {image.item}"  # in a memory
+            phases.append(self.kept(key, partial(retrieve, image)))
+            if self._is_new(purpose):
+                self.log(0, {"phases": f"{len(phases)} of {len(images)}"})
+        return phases
 
     def captures(
         self, purpose: str, number: int, images: Sequence[TrainingImage], phases: Sequence[Tensor]
@@ -60,7 +63,7 @@ class Checkpoint:
         samples = []
         for sample in captured(self._bench, keys, phases, images, purpose, number):
             samples.append(sample)
-            if purpose == "round" and self._round > self._saved["round"]:
+            if self._is_new(purpose):
                 self.log(0, {"images": len(samples)})
         return samples
 
@@ -86,11 +89,15 @@ class Checkpoint:
         """The losses of a step, for the next row of the log."""
         self._sums = {name: self._sums.get(name, 0.0) + value for name, value in losses.items()}
 
-    def log(self, step: int, values: Mapping[str, float]) -> None:
+    def log(self, step: int, values: Mapping[str, float | str]) -> None:
         """A row of the present round, with the share of all steps that are done after so many of it."""
         steps = [self._schedule.steps_of(number) for number in range(1, self._schedule.rounds + 1)]
         done = sum(steps[: self._round - 1]) + step
         self._bench.log(round=self._round, step=step, share=round(done / sum(steps), 4), **values)
+
+    def _is_new(self, purpose: str) -> bool:
+        """Whether what is retrieved and captured is of a round that was not learned from before the interruption."""
+        return purpose == "round" and self._round > int(self._saved["round"])
 
     def _save(self, step: int, count: int) -> None:
         """Log the mean losses of the last ``count`` steps, then keep the approximator."""
