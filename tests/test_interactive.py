@@ -249,9 +249,9 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (lambda d, t: d.capture(np.ones((3, 128, 128), np.uint8), t), "phase of uint8; expected radians"),
         (
             lambda d, t: d.capture(np.arange(3.0 * 128 * 128).reshape(3, 128, 128) % 256, t),
-            "a phase of whole numbers up to 255, so levels; expected radians",
+            "a phase has whole numbers up to 255: levels; expected radians, modulo 2 pi",
         ),
-        (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase with values that are NaN or infinite"),
+        (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase holds 49152 values that are NaN or infinite"),
         (lambda d, t: hb.open_display("ideal", panel=(256.0, 256)), r"rows and columns such as .*; got \(256.0, 256\)"),
         (lambda d, t: hb.open_display("ideal", panel=256), "rows and columns such as .*; got 256"),
         (lambda d, t: hb.open_display("ideal", panel=(128, 128, 3)), "rows and columns such as"),

@@ -397,4 +397,4 @@ def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
     if bad:
         raise CellError(f"{who}phase holds {bad} values that are NaN or infinite; the display refuses it")
     if are_levels(phase):
-        raise CellError(f"{who}phase has whole numbers up to {float(phase.max()):g}: levels; expected radians")
+        raise CellError(f"{who}phase has whole numbers up to {phase.max():g}: levels; expected radians, modulo 2 pi")

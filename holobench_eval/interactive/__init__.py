@@ -26,7 +26,6 @@ from ..display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_
 from ..metrics import catalogue, match
 from ..metrics import score as _score
 from ..optics.colour import srgb_encode
-from ..optics.phase import are_levels
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
 from .given import Numbers, array_of, as_in_config, names, path_of, tensor_of, whole
@@ -184,13 +183,10 @@ class OpenDisplay:
         shown, wanted = tensor_of(phase, "a phase", radians=True), (len(self.spec.wavelengths), *self.spec.shape)
         if tuple(shown.shape) != wanted:
             raise UserError(f"a phase of {tuple(shown.shape)}; the display shows {wanted}")
-        if not bool(shown.isfinite().all()):
-            raise UserError("a phase with values that are NaN or infinite; expected radians")
-        if are_levels(shown):
-            raise UserError(
-                f"a phase of whole numbers up to {float(shown.abs().max()):g}, so levels; expected radians (those that "
-                "are whole by chance: modulo 2 pi)"
-            )
+        try:
+            check_phase(shown, self.spec, "")
+        except CellError as error:
+            raise UserError(f"a {error}") from None
         return shown
 
     def _solver(self, method: Any, params: dict[str, Any]) -> tuple[Any, str]:

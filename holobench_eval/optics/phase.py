@@ -45,7 +45,8 @@ def gray_level(phase: Tensor, bits: int) -> Tensor:
 
 
 def are_levels(values: Tensor) -> bool:
-    """Whether real numbers are a panel's levels and no radians: all are whole, and some go beyond three turns."""
+    """Whether real numbers of any shape are a panel's levels and no radians: all are whole, some go beyond three turns,
+    and they differ (a constant shifts no light, whatever its unit). False for a panel of so few levels as 16."""
     low, high = values.detach().aminmax()
     largest = max(-float(low), float(high))
     return BEYOND_RADIANS < largest <= HIGHEST_LEVEL and bool(low < high) and bool((values == values.round()).all())

@@ -29,7 +29,7 @@ def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path: P
     assert f"move the targets and captures of {first}" in lacking(results)
     nothing = [{**one, **lost} for one in records]
     assert lacking(Results(records_frame(nothing, given), given)).endswith(
-        "Name the failed captures by what they show, or take them again."
+        "Take the failed captures again, or name them by what they show."
     )
 
 
@@ -88,8 +88,8 @@ def test_nobody_takes_a_capture_again_for_a_fault_of_its_target_or_its_file(reas
     assert "again" not in said
     in_file = "CellError: the target is gray and the capture nearly so; save the capture in gray"
     both = lacking(holed(("failed", "a", "t1", reason), ("failed", "b", "t2", in_file), ("failed", "c", "t3", "faint")))
-    assert "fault it is and not the captures', as the reasons say; save b/t2 anew, as the reasons say; name" in both
-    assert "name the failed captures by what they show, or take them again, or move the targets" in both
+    assert "fault it is and not the captures', as the reasons say; save b/t2 anew, as the reasons say; take" in both
+    assert "take the failed captures again, or name them by what they show, or move the targets" in both
 
 
 def test_the_reasons_that_blame_a_target_are_those_that_are_given() -> None:

@@ -52,7 +52,7 @@ def sentences(results: Results, records: Records) -> list[str]:
     if own:
         lines.append(
             f"An alignment of its own for {_count(own)}: "
-            f"{'the shared one is further away' if shared else 'no two are in one pose'}. Its error affects its score."
+            f"{'the shared one is further away' if shared else 'there is no shared one'}. Its error affects its score."
         )
     if any("part" in record["cell"] for record in records):
         lines.append(

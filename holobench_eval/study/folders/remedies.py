@@ -30,7 +30,7 @@ def _by_kind(kinds: dict[str, list[tuple[str, str]]]) -> Iterator[str]:
     if in_file := [f"{method}/{target}" for method, target in kinds.get("file", [])]:
         yield f"save {named(in_file)} anew, as the reasons say"
     if kinds.get("photograph"):
-        yield "name the failed captures by what they show, or take them again"
+        yield "take the failed captures again, or name them by what they show"
     if kinds.get("missing"):
         yield "add the captures that are missing"
 
