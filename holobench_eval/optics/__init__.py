@@ -3,7 +3,6 @@
 from .angular_spectrum import AngularSpectrum
 from .colour import srgb_decode, srgb_encode
 from .convolution import Propagator
-from .fraunhofer import Fraunhofer
 from .fresnel import Fresnel
 from .phase import blaze, lens, quantise, wrap
 from .point_source import PointSource
@@ -11,7 +10,6 @@ from .zernike import zernike
 
 __all__ = [
     "AngularSpectrum",
-    "Fraunhofer",
     "Fresnel",
     "PointSource",
     "Propagator",

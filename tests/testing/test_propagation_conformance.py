@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from holobench_eval.optics import AngularSpectrum, Fraunhofer
+from holobench_eval.optics import AngularSpectrum
 from holobench_eval.testing.propagation_conformance import CHECKS, SHIPPED, check_propagator, finding, main
-from holobench_eval.testing.propagation_reference import WAVELENGTH
 from holobench_eval.testing.propagator import Subject
 
 
@@ -243,12 +242,3 @@ def test_the_table_is_printed_with_causes_and_counted(capsys):
     out = capsys.readouterr().out
     assert "cause: a paraxial (Fresnel) model" in out
     assert max(len(line) for line in out.splitlines()) <= 100
-
-
-def test_fraunhofer_is_unitary_and_images_a_tilt_at_its_frequency():
-    model = Fraunhofer((32, 64), 6.4e-6, WAVELENGTH, 0.2)
-    field = torch.polar(torch.ones(32, 64), 2 * math.pi * 5 / 64 * torch.arange(64).expand(32, 64))
-    image = model.forward(field)
-    assert torch.allclose(model.adjoint(image), field, atol=1e-5)
-    assert int(image.abs().argmax()) == 16 * 64 + 32 + 5
-    assert model.image_pitch[1] == pytest.approx(WAVELENGTH * 0.2 / (64 * 6.4e-6))
