@@ -324,4 +324,4 @@ def test_the_ending_says_what_a_comparison_is(
 
 def test_records_of_a_report_are_read() -> None:
     records = hb.load_records(Path(__file__).parents[1] / "reports" / "table3")
-    assert {"method", "condition", "target", "psnr_linear"} <= set(records.columns)
+    assert {"method", "condition", "target", "psnr_linear_db"} <= set(records.columns)

@@ -23,6 +23,7 @@ from ..core.plugins import build
 from ..datasets.base import fit, with_channels
 from ..datasets.images import decode, from_array, read
 from ..display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_plain, type_name
+from ..display.traits import traits_of
 from ..metrics import catalogue, match
 from ..metrics import score as _score
 from ..optics.colour import srgb_encode
@@ -101,7 +102,7 @@ class OpenDisplay:
         """
         light = self._target(target)
         solver, label = self._solver(method, params)
-        if getattr(solver, "trains", False):
+        if traits_of(solver, label).trains:
             raise UserError(f"method '{label}' has to be trained: name it in a study, and use holoeval run")
         handle = self._bench.for_method(solver, label, light, _name(light), 0)
         try:

@@ -57,8 +57,8 @@ def describe(study: Study) -> Description:
         displays = tuple(_real(condition) for condition in conditions(study).values())
     elif study.display.learned is None:
         profiles = [load_profile(source, study.folder) for source in study.display.profiles]
-        methods = {entry.label: isolation.find(entry.name, study.folder) for entry in study.methods}
-        forms = {label: method.form for label, method in methods.items() if hasattr(method, "form")}
+        traits = {entry.label: isolation.traits(entry.name, study.folder) for entry in study.methods}
+        forms = {label: method.form for label, method in traits.items() if method.form is not None}
         displays = tuple(simulated(profile, study.display.panel, forms) for profile in profiles)
     else:
         profile = study.display.learned.profile

@@ -8,11 +8,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ..core.errors import UserError
 from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
 from ..display import CalibratedBench, MeteredDisplay, load_profile
 from ..display.api import from_numpy, is_plain, type_name
+from ..display.traits import traits_of
 from ..study.opening import open_bench
 from ..study.versions import method_version
 
@@ -31,7 +33,10 @@ def check_method(method: Any) -> None:
     cls = method if isinstance(method, type) else type(method)
     instance = _default(cls) if isinstance(method, type) else method
     _check_parameters(cls, instance)
-    camera = bool(getattr(cls, "camera", False))
+    try:
+        camera = traits_of(cls).camera
+    except UserError as error:
+        raise AssertionError(str(error)) from error
     bench = open_bench(load_profile("ideal"), CAMERA_PANEL if camera else PLAIN_PANEL, seed=0)
     fewest = 3 if camera else 1  # a capture is of all colours of the display
     _check_solution(instance, bench, _target(bench, images=1, channels=3), camera)
@@ -57,7 +62,6 @@ def _check_parameters(cls: type[Any], instance: Any) -> None:
             continue
         raise AssertionError(f"{name} can be changed after it was made; write @dataclass(frozen=True)")
     for flag in ("camera", "privileged"):
-        assert isinstance(getattr(cls, flag, False), bool), f"{name}.{flag} must be True or False"
         assert flag not in {item.name for item in fields(cls)}, f"{name}.{flag} must be a ClassVar, not a parameter"
     canonical(params_of(instance))
     assert method_version(cls) == method_version(cls), f"the code of {name} cannot be identified"

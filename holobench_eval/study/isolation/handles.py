@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import inspect
+from collections.abc import Iterable, Mapping, Sequence
+from functools import wraps
 from typing import Any
 
 import torch
@@ -10,36 +12,28 @@ from torch import Tensor
 
 from ...core.device import CPU, moved
 from ...core.errors import BudgetError, CellError
-from ...display.api import Capture, DisplaySpec, Simulation, white_irradiance
-from ...display.metered import MeteredDisplay
+from ...display.api import DisplaySpec, Simulation, white_irradiance
+from ...display.metered import MeteredDisplay, Solver
 from ...display.training import TrainingBench, TrainingImage, Value
 from .messages import Channel, refuse_unsendable
 
 ERRORS: dict[str, type[CellError]] = {"BudgetError": BudgetError}  # others arrive as a CellError
-Known = dict[str, Any]
-"""What never changes about a handle, sent once."""
-
-
-def known(handle: MeteredDisplay | TrainingBench) -> Known:
-    """What the process of a method gets of a handle when it begins."""
-    if isinstance(handle, TrainingBench):
-        return {"handle": "training", "spec": handle.spec, "images": handle.images, "held_out": handle.held_out}
-    return {
-        "handle": "solving",
-        "spec": handle.spec,
-        "label": handle._label,
-        "target": handle._target,
-        "budget": handle.budget,
-        "learned": handle._learned,
-        "target_name": handle.target_name,
-        "target_sha256": handle.target_sha256,
-    }
-
-
-REQUESTS = {
+CONSTANTS: dict[type[Any], tuple[str, ...]] = {
+    MeteredDisplay: ("spec", "budget", "target_name", "target_sha256", "_label", "_target", "_learned"),
+    TrainingBench: ("spec", "images", "held_out"),
+}
+"""Constant fields of a handle, sent at the start."""
+REQUESTS: dict[type[Any], tuple[str, ...]] = {
     MeteredDisplay: ("capture", "announce", "keep", "rectify", "captures", "kept", "over", "generator"),
     TrainingBench: ("photograph", "announce", "captures", "seconds", "load", "save", "log", "generator"),
 }
+"""Members of a handle that a method may ask for. One with the same arguments on both sides needs only its name here."""
+
+
+def known(handle: MeteredDisplay | TrainingBench) -> dict[str, Any]:
+    """What the process of a method gets of a handle when it begins."""
+    constants = {name: getattr(handle, name) for name in CONSTANTS[type(handle)]}
+    return {"handle": type(handle).__name__, "known": constants}
 
 
 def answer(
@@ -57,15 +51,38 @@ def answer(
     return value.initial_seed() if isinstance(value, torch.Generator) else value
 
 
-class _Remote:
-    """What both handles share. device: where the method computes."""
+def _request(name: str, member: Any) -> Any:
+    """A property or function that asks for the member of that name in the process that holds the display."""
+    if isinstance(member, property):
+        return property(lambda self: self._ask(name), doc=member.__doc__)
+    signature = inspect.signature(member)
 
-    def __init__(self, channel: Channel, known: Known, device: torch.device) -> None:
-        self.spec: DisplaySpec = known["spec"]
+    @wraps(member)
+    def ask(self: _Remote, *args: Any, **named: Any) -> Any:
+        given = signature.bind(self, *args, **named)
+        return self._ask(name, *given.args[1:], **given.kwargs)  # only arguments by position are moved
+
+    return ask
+
+
+class _Remote:
+    """What both handles share. of: the handle that one stands for; device: where the method computes."""
+
+    spec: DisplaySpec
+
+    def __init_subclass__(cls, of: type[Any]) -> None:
+        for name in CONSTANTS[of]:
+            setattr(cls, name, None)  # each object has its own; here so that ``dir`` of the class shows it
+        for name in REQUESTS[of]:
+            if not hasattr(cls, name):
+                setattr(cls, name, _request(name, getattr(of, name)))
+
+    def __init__(self, channel: Channel, known: Mapping[str, Any], device: torch.device) -> None:
+        vars(self).update(known)
         self.device = device
         self._channel = channel
 
-    def _ask(self, name: str, *args: Any, **named: Any) -> Any:
+    def _ask(self, name: str, /, *args: Any, **named: Any) -> Any:
         with self._channel.lock:
             self._channel.send({"ask": name, "args": args, "named": named})
             got = self._channel.receive()
@@ -73,34 +90,17 @@ class _Remote:
             raise ERRORS.get(got["error"], CellError)(got["message"])
         return moved(got["value"], self.device)
 
-    @property
-    def captures(self) -> int:
-        """Captures taken so far."""
-        return int(self._ask("captures"))
-
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on the study's seed and ``names``; what else they depend on is not told."""
         return torch.Generator().manual_seed(self._ask("generator", *map(str, names)))
 
 
-class SolvingHandle(_Remote):
+class SolvingHandle(_Remote, of=MeteredDisplay):
     """``MeteredDisplay`` at a distance: the same names, arguments and errors."""
 
-    def __init__(self, channel: Channel, known: Known, device: torch.device) -> None:
-        super().__init__(channel, known, device)
-        self.budget: int | None = known["budget"]
-        self.target_name, self.target_sha256 = str(known["target_name"]), str(known["target_sha256"])
-        self._label, self._target, self._learned = known["label"], known["target"], known["learned"]
-
-    @property
-    def kept(self) -> Tensor | None:
-        """See ``MeteredDisplay``."""
-        return self._ask("kept")
-
-    @property
-    def over(self) -> str:
-        """See ``MeteredDisplay``."""
-        return str(self._ask("over"))
+    _label: str
+    _target: Tensor
+    _learned: Mapping[str, Any] | None
 
     @property
     def learned(self) -> Mapping[str, Any]:
@@ -121,41 +121,30 @@ class SolvingHandle(_Remote):
 
     starts = simulation
 
-    def capture(self, phase: Tensor) -> Capture:
-        """See ``MeteredDisplay``."""
-        return self._ask("capture", phase)
+    def solved(self, method: Solver, target: Tensor) -> Tensor:
+        """See ``MeteredDisplay``; here nothing is kept."""
+        return method.solve(target, self)
 
     def announce(self, phases: Sequence[Tensor]) -> None:
         """See ``MeteredDisplay``."""
         self._ask("announce", list(phases))
 
-    def keep(self, phase: Tensor) -> None:
-        """See ``MeteredDisplay``."""
-        self._ask("keep", phase)
 
-    def rectify(self, capture: Capture) -> Tensor:
-        """See ``MeteredDisplay``."""
-        return self._ask("rectify", capture)
-
-
-class TrainingHandle(_Remote):
+class TrainingHandle(_Remote, of=TrainingBench):
     """``TrainingBench`` at a distance: the same names, arguments and errors."""
 
-    def __init__(self, channel: Channel, known: Known, device: torch.device) -> None:
+    kept, light = TrainingBench.kept, TrainingBench.light
+
+    def __init__(self, channel: Channel, known: Mapping[str, Any], device: torch.device) -> None:
         super().__init__(channel, known, device)
         self.images, self.held_out = (
             tuple(TrainingImage(image.item, image.target.to(device)) for image in known[name])
             for name in ("images", "held_out")
         )
 
-    @property
-    def seconds(self) -> float:
-        """See ``TrainingBench``."""
-        return float(self._ask("seconds"))
-
-    def light(self, image: TrainingImage) -> Tensor:
-        """See ``TrainingBench``."""
-        return white_irradiance(image.target, self.spec)
+    def solved(self, method: Solver, image: TrainingImage) -> Tensor:
+        """See ``TrainingBench``; here nothing is kept."""
+        return method.solve(image.target[None], self)[0]
 
     def photograph(self, phase: Tensor, image: TrainingImage, *names: object) -> Tensor:
         """See ``TrainingBench``."""
@@ -165,22 +154,6 @@ class TrainingHandle(_Remote):
         """See ``TrainingBench``."""
         self._ask("announce", [(phase, image, tuple(map(str, names))) for phase, image, names in photographs])
 
-    def kept(self, name: str, make: Callable[[], Value]) -> Value:
-        """See ``TrainingBench``."""
-        if (before := self.load(name)) is not None:
-            return before
-        value = make()
-        self.save(name, value)
-        return value
-
-    def load(self, name: str) -> Value | None:
-        """See ``TrainingBench``."""
-        return self._ask("load", name)
-
     def save(self, name: str, value: Value) -> None:
         """See ``TrainingBench``."""
         self._ask("save", name, moved(value, CPU))
-
-    def log(self, **row: float | int | str) -> None:
-        """See ``TrainingBench``."""
-        self._ask("log", **row)

@@ -1,0 +1,57 @@
+"""What a method declares about itself, read in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal, get_args
+
+from ..core.errors import UserError
+
+Function = Literal["solve", "solve_planes", "predict", "prepare", "estimates", "available", "files", "external"]
+FUNCTIONS: tuple[Function, ...] = get_args(Function)
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What the class of a method declares; the defaults are those of a class that declares nothing.
+
+    camera: captures while it solves; privileged: may see the simulated bench; trains: learns first; follows: is solved
+    after all others; planes: solves all planes of a scene at once; form: effects that its model of the display has
+    parameters for; tuned: what its defaults were chosen on; version: of the numbers it gives; timed: False where its
+    seconds mean nothing; functions: those that it has.
+    """
+
+    camera: bool = False
+    privileged: bool = False
+    trains: bool = False
+    follows: bool = False
+    planes: bool = False
+    form: frozenset[str] | None = None
+    tuned: str | None = None
+    version: int = 1
+    timed: bool = True
+    functions: frozenset[Function] = frozenset()
+
+    @property
+    def sees(self) -> bool:
+        """Whether what it finds for a target depends on the display and not on its nominal optics alone."""
+        return self.camera or self.privileged
+
+
+FLAGS = tuple(item.name for item in fields(Traits) if item.name not in ("timed", "functions"))
+"""What any method may declare; only one that ships may say that it is not timed."""
+BOOLEANS = tuple(item.name for item in fields(Traits) if isinstance(item.default, bool) and item.name in FLAGS)
+
+
+def traits_of(method: object, name: str = "") -> Traits:
+    """The traits of a method, given as its class or as an object of it.
+
+    name: its name in messages, by default that of its class. UserError where a flag is neither True nor False.
+    """
+    declared: dict[str, Any] = {item.name: getattr(method, item.name, item.default) for item in fields(Traits)}
+    for flag in BOOLEANS:
+        if not isinstance(declared[flag], bool):
+            cls = method if isinstance(method, type) else type(method)
+            raise UserError(f"method '{name or cls.__name__}': {flag} should be True or False")
+    has = frozenset(function for function in FUNCTIONS if callable(getattr(method, function, None)))
+    return Traits(**declared | {"functions": has})
