@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
 import inspect
-import sys
 from collections.abc import Callable
-from dataclasses import is_dataclass, make_dataclass
+from dataclasses import is_dataclass, make_dataclass, replace
 from functools import cache, lru_cache, wraps
-from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import CodeType, ModuleType
 from typing import Any, Literal, get_type_hints
 
 from pydantic import TypeAdapter
 
+from . import sources
 from .errors import UserError, reason, suggest
 from .hashing import canonical
 from .schema import checked
@@ -63,7 +59,7 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
     >>> find("datasets", "charts").__name__
     'Charts'
     """
-    if _is_file(name):
+    if is_file(name):
         return _from_file(kind, name, folder)
     entries = _entries(kind)
     if name.endswith(".py"):
@@ -78,47 +74,20 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
 
 def is_shipped(kind: Kind, name: str) -> bool:
     """Whether a plug-in's code is that of this package; nothing is imported for the answer."""
-    if _is_file(name) or name not in _entries(kind):
+    if is_file(name) or name not in _entries(kind):
         return False
     return _entries(kind)[name].value.startswith(f"{__package__.partition('.')[0]}.")
 
 
-def _is_file(name: str) -> bool:
+def is_registered(kind: Kind, cls: type[Any]) -> bool:
+    """Whether a class is itself a plug-in of this package, which then has a version of its own."""
+    value = f"{cls.__module__}:{cls.__qualname__}"
+    return any(entry.value == value and is_shipped(kind, name) for name, entry in _entries(kind).items())
+
+
+def is_file(name: str) -> bool:
+    """Whether a name is that of a file and its class."""
     return ".py:" in name
-
-
-class _FromSource(SourceFileLoader):
-    """Compiles a file anew for every import.
-
-    Cached bytecode is valid for a source of the same size and the same second, so a file that is rewritten within a
-    second would run as it was before.
-    """
-
-    def get_code(self, fullname: str) -> CodeType:
-        return self.source_to_code(self.get_data(self.path), self.path)
-
-
-def import_file(path: Path) -> ModuleType:
-    """Import a Python file from its source, anew each time: nothing that one cell computes may reach the next.
-
-    Parameters
-    ----------
-    path : Path
-        The file. Its module has a name of its own for every path.
-
-    Raises
-    ------
-    Exception
-        Whatever the file raises while it runs; OSError where it cannot be read.
-    """
-    path = path.absolute()  # a file may ask where it is, and its code is identified by where it lies
-    unique = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
-    loader = _FromSource(f"holobench_user_{path.stem}_{unique}", str(path))
-    module = importlib.util.module_from_spec(ModuleSpec(loader.name, loader, origin=str(path)))
-    module.__file__ = str(path)
-    sys.modules[loader.name] = module  # dataclasses look their module up
-    loader.exec_module(module)
-    return module
 
 
 def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
@@ -128,7 +97,7 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     if path is None:
         raise UserError(f"{kind[:-1]} '{name}': no such file: {candidates[0]}")
     try:
-        module = import_file(path)
+        module, code = sources.import_class(path, attribute, folder)
     except (Exception, SystemExit) as error:
         raise UserError(f"{kind[:-1]} '{name}': the file fails to import: {reason(error)}") from error
     cls = getattr(module, attribute, None)
@@ -136,7 +105,12 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
         own = {key: value for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__}
         near = [key for key, value in own.items() if is_dataclass(value) or _is_function(kind, value)]
         raise UserError(f"{kind[:-1]} '{name}': {path} has no '{attribute}'; {suggest(attribute, near)}")
-    return _plugin_class(kind, name, cls)
+    found = _plugin_class(kind, name, cls)
+    if not sources.is_fresh(found):  # from elsewhere, and the same one for all files that name it
+        derive: Any = type(found)
+        found = derive(found.__name__, (found,), {"__module__": module.__name__, "__doc__": found.__doc__})
+    sources.remember(found, replace(code, bases=sources.bases_of(found)))
+    return found
 
 
 def _plugin_class(kind: Kind, name: str, found: Any) -> type[Any]:
@@ -213,7 +187,7 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
     5
     """
     cls = find(kind, name, folder)
-    return made(cls, f"{kind[:-1]} '{name}'", params, None if _is_file(name) else _kept_adapter(kind, name))
+    return made(cls, f"{kind[:-1]} '{name}'", params, None if is_file(name) else _kept_adapter(kind, name))
 
 
 def made(cls: type[Any], owner: str, params: dict[str, Any], adapter: TypeAdapter[Any] | None = None) -> Any:

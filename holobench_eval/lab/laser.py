@@ -13,7 +13,7 @@ from typing import Annotated, Protocol
 from annotated_types import Interval
 
 from ..core.errors import UserError
-from ..core.plugins import import_file
+from ..core.sources import import_file
 from .devices import DeviceError
 
 

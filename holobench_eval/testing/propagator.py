@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from ..core.errors import UserError, reason, suggest
-from ..core.plugins import import_file
+from ..core.sources import import_file
 from .propagation_reference import Physics, Setting
 
 BAND = 0.9

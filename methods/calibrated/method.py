@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import torch
@@ -18,7 +19,7 @@ from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
-from ..learned.retrieval import SquaredErrorRetrieval, check_region, retrieve
+from ..learned.retrieval import SquaredErrorRetrieval, check_region, lpips_weights, retrieve
 from ..learned.samples import Sample, Schedule, Steps
 from ..wirtinger import Wirtinger
 from .approximator import ModelApproximator
@@ -72,6 +73,10 @@ class ThroughModel(ABC):
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 3
+
+    def external(self) -> dict[str, Path | None]:
+        """Files that it takes where a machine has them, by what they hold; None for one that is not there."""
+        return lpips_weights(self.retrieval, self.search)
 
     @abstractmethod
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
@@ -132,9 +137,9 @@ class ThroughModel(ABC):
             Where what was learned belongs to another model.
         """
         if bench.learned["fell_back"]:
-            return WIRTINGER.solve(target, bench)
+            return bench.solved(WIRTINGER, target)
         display = frozen(self.approximator(bench.spec), bench).image(bench.light)
-        start = self.start.solve(target, bench)
+        start = bench.solved(self.start, target)
         pairs = zip(target, start, strict=True)
         return torch.stack([retrieve(display, image, phase, self.retrieval) for image, phase in pairs])
 

@@ -80,7 +80,7 @@ class PhaseGamma(ABC):
         BudgetError
             When no capture is left.
         """
-        phases = [self.of.solve(image.target[None], bench)[0] for image in bench.images[: self.images]]
+        phases = [bench.solved(self.of, image) for image in bench.images[: self.images]]
         coarse = self._errors(bench, 1, phases, COARSE)
         best = min(coarse, key=coarse.__getitem__)
         errors = coarse | self._errors(bench, 2, phases, [best * factor for factor in FINE])
@@ -131,7 +131,7 @@ class PhaseGamma(ABC):
         CellError
             Where the method was not trained.
         """
-        return corrected(self.of.solve(target, bench), bench.learned["gamma"], bench.spec)
+        return corrected(bench.solved(self.of, target), bench.learned["gamma"], bench.spec)
 
 
 def corrected(phase: Tensor, gamma: float, spec: DisplaySpec) -> Tensor:

@@ -6,6 +6,7 @@ Chakravarthula et al. 2020, Sections 4.3.1 and 5.2.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import torch
@@ -95,6 +96,15 @@ def published_loss(network: Network) -> ApproximatorLoss:
     if network.name in ("unet", "identity"):
         return ApproximatorLoss(l1=1.0, perceptual=0.0, adversarial=0.0)
     return ApproximatorLoss()
+
+
+def vgg_weights(network: Network, loss: ApproximatorLoss | None) -> dict[str, Path | None]:
+    """The file that a loss takes where it is there, by what it holds; empty for a loss without a perceptual term.
+
+    loss: None for the one that the network is published with.
+    """
+    is_used = published_loss(network).perceptual or network.name == "pix2pixhd" if loss is None else loss.perceptual
+    return {"VGG-19 weights": find_weights()} if is_used else {}
 
 
 def adversarial_loss(judged: list[list[Tensor]], wanted: float, gan: Gan) -> Tensor:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, ClassVar
 
 import torch
@@ -20,11 +21,11 @@ from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
-from ..learned.retrieval import Image, PhaseRetrieval, check_region, retrieve
+from ..learned.retrieval import Image, PhaseRetrieval, check_region, lpips_weights, retrieve
 from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
-from .approximator_loss import ApproximatorLoss, LearningRates
+from .approximator_loss import ApproximatorLoss, LearningRates, vgg_weights
 from .networks import Network
 
 
@@ -72,6 +73,10 @@ class HIL:
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 4
+
+    def external(self) -> dict[str, Path | None]:
+        """Files that it takes where a machine has them, by what they hold; None for one that is not there."""
+        return {**lpips_weights(self.retrieval), **vgg_weights(self.network, self.loss)}
 
     def approximator(self, spec: DisplaySpec) -> NetworkApproximator:
         """D, untrained."""
@@ -132,10 +137,10 @@ class HIL:
             Where what was learned are the weights of another network.
         """
         if bench.learned["fell_back"]:
-            return WIRTINGER.solve(target, bench)
+            return bench.solved(WIRTINGER, target)
         approximator = frozen(self.approximator(bench.spec), bench)
         display = approximator.image(bench.light)
-        start = self.start.solve(target, bench)
+        start = bench.solved(self.start, target)
         pairs = zip(target, start, strict=True)
         return torch.stack([self._retrieve(approximator, display, *pair) for pair in pairs])
 

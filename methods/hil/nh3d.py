@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, ClassVar
 
 import torch
@@ -21,11 +22,11 @@ from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
-from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, lpips_weights, retrieve
 from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
-from .approximator_loss import LearningRates
+from .approximator_loss import LearningRates, vgg_weights
 from .networks import Network
 
 
@@ -64,6 +65,10 @@ class HILNH3D:
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 3
 
+    def external(self) -> dict[str, Path | None]:
+        """Files that it takes where a machine has them, by what they hold; None for one that is not there."""
+        return {**lpips_weights(self.retrieval), **vgg_weights(self.network, None)}
+
     def approximator(self, spec: DisplaySpec) -> NetworkApproximator:
         """The network, untrained."""
         return NetworkApproximator(
@@ -85,9 +90,9 @@ class HILNH3D:
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]; errors as in `HIL.solve`."""
         if bench.learned["fell_back"]:
-            return WIRTINGER.solve(target, bench)
+            return bench.solved(WIRTINGER, target)
         display = frozen(self.approximator(bench.spec), bench).image(bench.light)
-        start = self.start.solve(target, bench)
+        start = bench.solved(self.start, target)
         return torch.stack([self._retrieve(display, *pair) for pair in zip(target, start, strict=True)])
 
     def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:

@@ -28,7 +28,7 @@ def best_offset(bench: TrainingBench, start: Wirtinger, offsets: int) -> float:
 
     def search() -> dict[str, list[float]]:
         images = bench.images[:TRIED_IMAGES]
-        phases = [start.solve(image.target[None], bench)[0] for image in images]
+        phases = [bench.solved(start, image) for image in images]
         candidates = [
             (phase + offset, image, ("offset", index))
             for image, phase in zip(images, phases, strict=True)

@@ -18,7 +18,7 @@ D = TypeVar("D", bound=Approximator)
 
 def hologram(solver: Wirtinger, image: TrainingImage, bench: TrainingBench) -> Tensor:
     """The phase ``(C, H, W)`` [rad] of a training image by the nominal model."""
-    return solver.solve(image.target[None], bench)[0]
+    return bench.solved(solver, image)
 
 
 def frozen(approximator: D, bench: MeteredDisplay) -> D:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import torch
@@ -16,7 +17,7 @@ from torch.nn import functional
 
 from ...core.errors import UserError
 from ...metrics.feature_distance import SMALLEST_MOFD, FixedMofd
-from ...metrics.lpips import available, lpips
+from ...metrics.lpips import available, find_weights, lpips
 from ...metrics.ms_ssim import SMALLEST_MS_SSIM, FixedMsSsim
 from ...optics import srgb_encode
 from ..common import matched
@@ -102,6 +103,13 @@ class PictureLoss:
         if weights.adversarial and self.verdict is not None:
             loss = loss + weights.adversarial * self.verdict(picture[None])
         return loss, error.detach()
+
+
+def lpips_weights(*settings: PhaseRetrieval) -> dict[str, Path | None]:
+    """The file that the perceptual term of a retrieval takes where it is there, by what it holds; empty without it."""
+    if not any(each.perceptual for each in settings):
+        return {}
+    return {"LPIPS weights (AlexNet)": None if available("alex") else find_weights("alex")}
 
 
 def check_region(shape: tuple[int, int], settings: PhaseRetrieval) -> None:

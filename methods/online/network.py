@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 import torch
@@ -17,9 +18,9 @@ from torch import Tensor
 from ...display.metered import MeteredDisplay
 from ...metrics.base import gaussian_blur
 from ..hil.approximator import NetworkApproximator
-from ..hil.approximator_loss import ApproximatorLoss
+from ..hil.approximator_loss import ApproximatorLoss, vgg_weights
 from ..hil.networks import Network
-from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, retrieve
+from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, lpips_weights, retrieve
 from ..learned.samples import Sample
 from .start import LEAST_SHARE, Camera, CameraStart, allowed
 
@@ -80,6 +81,10 @@ class OnlineCameraNetwork:
     camera: ClassVar[bool] = True
     privileged: ClassVar[bool] = False
     version: ClassVar[int] = 2
+
+    def external(self) -> dict[str, Path | None]:
+        """Files that it takes where a machine has them, by what they hold; None for one that is not there."""
+        return {**lpips_weights(self.retrieval), **vgg_weights(self.network, self.loss)}
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phases of least captured error.

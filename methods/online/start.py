@@ -108,14 +108,14 @@ class CameraStart:
 
     def nominal(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """The converged hologram ``(C, H, W)`` [rad] of a target ``(C, h, w)``, made without a capture."""
-        return self.converged.solve(target[None], bench)[0]
+        return bench.solved(self.converged, target[None])[0]
 
     def search(self, target: Tensor, bench: MeteredDisplay, camera: Camera, nominal: Tensor) -> Tensor:
         """Show the candidates, the converged one first; the best of each colour, ``(C, H, W)`` [rad]."""
         offsets = min(self.offsets, camera.left // LEAST_SHARE - 1)
         tried = [nominal] if offsets >= 0 else []
         if offsets > 0:
-            early = self.early.solve(target[None], bench)[0]
+            early = bench.solved(self.early, target[None])[0]
             tried += [early + math.tau * index / offsets for index in range(offsets)]
         camera.announce(tried)
         for phase in tried:

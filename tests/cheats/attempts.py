@@ -222,7 +222,7 @@ class PatchesTheAccount(Attempt):
     kind = "patches the harness"
 
     def cheat(self, target, bench):
-        from holobench_eval.display.metered import Account
+        from holobench_eval.display.account import Account
 
         Account.take = lambda self: None
 
@@ -447,7 +447,7 @@ class SendsItsOwnResult(Attempt):
     kind, outcome, reason = "poisons records", "refused", "returned dict, not a phase"
 
     def cheat(self, target, bench):
-        bench._channel.send({"result": {"psnr_linear": 100.0}})
+        bench._channel.send({"result": {"psnr_linear": 100.0}, "seen": {}})
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ def test_a_file_and_an_entry_point_can_be_named_in_a_study(tmp_path: Path) -> No
     )
     cells = [cell for cell in plan(load_study(tmp_path / "study.yaml")).cells if cell.method == "flat"]
     assert [(cell.target, cell.params) for cell in cells] == [("dark", {"phase": 0.5}), ("bright", {"phase": 0.5})]
-    assert len(cells[0].method_sha256) == 64  # code from elsewhere is named by its hash
+    assert len(cells[0].code) == 64  # code from elsewhere is named by its hash
 
 
 @pytest.mark.usefixtures("installed")

@@ -40,6 +40,19 @@ of a run on the [command line](start/first-run.md#a-part-of-a-study-or-a-variant
 
 So a config that has its pictures or phases beside it is run from its own folder, or names them from where it is run.
 
+## Code of your own
+
+The code of `mine.py:Name` is the file, and what it imports from its own folder or below: `import helper` or `from
+.losses import l1`, also inside a function. No `PYTHONPATH` is needed. A module of Python's own library goes before a
+file of the same name, an installed package after it. A change of any byte of these files, comments included, or of a
+file that is read while they are imported, has the method's cells computed and its training made again. A `version` of
+your class is a label for people.
+
+What a method opens in `prepare`, `solve` or `predict` is part of its cells by its digest where it lies in the folder
+of the config, or where a parameter names it or a folder above it. Other files are listed as not covered. Not seen is
+what C code opens by itself (h5py, pyarrow, safetensors), unless a parameter names the file; what other programs and
+processes read; and a listing of a folder.
+
 ## In an editor
 
 Editors that know JSON schemas complete keys, show these texts, and mark mistakes. Write the schema once, and name it

@@ -73,7 +73,7 @@ def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkey
         planned(path)
     np.save(tmp_path / "astronaut.npy", np.zeros((3, 128, 128)))
     cells = [cell for label, cell in planned(path).labelled() if label == "phases"]
-    assert [cell.files[f"{cell.target}.npy"] == "missing" for cell in cells] == [False, True]
+    assert [cell.files[f"{cell.target}.npy"] == "absent" for cell in cells] == [False, True]
     names = [cell.target for cell in cells]
     for name in names:
         np.save(tmp_path / f"{name}.npy", np.zeros((3, 128, 128)))
@@ -171,6 +171,6 @@ def test_a_method_of_a_file_says_which_files_it_reads(tmp_path: Path, monkeypatc
         grid = planned(path)
         found = {cell.files["mine.npy"] for label, cell in grid.labelled() if label == "mine"}
         assert len(found) == 1
-        assert "missing" not in found
+        assert "absent" not in found
     records = compute(path, tmp_path / "out", grid=grid)
     assert {record["state"] for record in records} == {"done"}

@@ -3,13 +3,13 @@ from __future__ import annotations
 import importlib
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from holobench_eval.core import plugins
+from holobench_eval.core.sources import code_of
 from holobench_eval.methods.wirtinger import Wirtinger
-from holobench_eval.study.versions import RECORDED, code_digest, code_of, method_version
+from holobench_eval.study.versions import method_version
 
 METHOD = '''
 from dataclasses import dataclass
@@ -17,46 +17,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Method:
-    """{doc}"""
+    """A method."""
 
     def solve(self, target, bench):
-        return {value}  # {comment}
+        return 1
 '''
-
-
-def code(folder: Path, doc: str = "A method.", value: str = "1", comment: str = "why", imports: str = "") -> str:
-    file = folder / "method.py"
-    file.write_text(METHOD.format(doc=doc, value=value, comment=comment, imports=imports))
-    return code_digest(plugins.find("methods", f"{file}:Method"))
-
-
-def test_a_method_is_the_same_after_a_change_of_its_words(tmp_path: Path) -> None:
-    assert code(tmp_path) == code(tmp_path, doc="Other words.", comment="because")
-
-
-def test_a_method_is_another_after_a_change_of_its_code(tmp_path: Path) -> None:
-    assert code(tmp_path) != code(tmp_path, value="2")
-
-
-def names(cls: type[Any], folder: Path) -> set[str]:
-    """The files that a class's code is in, seen from a folder."""
-    return {str(file.relative_to(folder)) for file in code_of(cls)}
-
 
 PACKAGE = {
     "shop/__init__.py": "",
     "shop/tools.py": "LIMIT = 1",
+    "shop/unused.py": "",
     "shop/plug/__init__.py": "",
-    "shop/plug/method.py": METHOD.format(
-        imports="from .deep.first import limit\nfrom . import other\nfrom ..tools import LIMIT",
-        doc="A method.",
-        value="limit()",
-        comment="why",
-    ),
-    "shop/plug/other.py": "",
+    "shop/plug/method.py": METHOD.format(imports="from .deep.first import limit\nfrom ..tools import LIMIT"),
     "shop/plug/deep/__init__.py": "",
-    "shop/plug/deep/first.py": "from ..second import limit\nfrom ... import tools\nfrom . import whole",
-    "shop/plug/deep/whole/__init__.py": "from ....plug.last import END",
+    "shop/plug/deep/first.py": "from ..second import limit\nfrom . import whole",
+    "shop/plug/deep/whole/__init__.py": "def late():\n    from ....plug.last import END",
     "shop/plug/second.py": "def limit():\n    return 1",
     "shop/plug/last.py": "END = 1",
 }
@@ -71,42 +46,31 @@ def shop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.syspath_prepend(tmp_path)
     for name in [name for name in sys.modules if name.split(".")[0] == "shop"]:
         monkeypatch.delitem(sys.modules, name)
-    return tmp_path / "shop" / "plug"
+    return tmp_path / "shop"
 
 
-def test_imports_are_followed_at_every_level_within_the_own_folder(shop: Path) -> None:
+def test_the_code_of_an_installed_method_is_what_is_imported_of_its_package(shop: Path) -> None:
     method = importlib.import_module("shop.plug.method").Method
-    assert names(method, shop) == {
-        "__init__.py",
-        "method.py",
-        "other.py",
-        "second.py",
-        "last.py",
-        "deep/__init__.py",
-        "deep/first.py",
-        "deep/whole/__init__.py",
-    }
-    before = code_digest(method)
-    (shop.parent / "tools.py").write_text("LIMIT = 2")
-    assert code_digest(method) == before
-    (shop / "last.py").write_text("END = 2")
-    assert code_digest(method) != before
+    names = {name.removeprefix("shop/") for name in PACKAGE} - {"unused.py"}
+    assert set(code_of(method).files) == names
+
+
+@pytest.mark.parametrize("file", ["tools.py", "plug/last.py", "plug/method.py"])
+def test_an_installed_method_is_another_after_an_edit_of_its_package(shop: Path, file: str) -> None:
+    versions = []
+    for _ in range(2):
+        for name in [name for name in sys.modules if name.split(".")[0] == "shop"]:
+            del sys.modules[name]
+        importlib.invalidate_caches()
+        versions.append(method_version(importlib.import_module("shop.plug.method").Method))
+        (shop / file).write_text((shop / file).read_text() + "# more")
+    assert versions[0] != versions[1]
 
 
 def test_a_shipped_method_is_named_by_its_declared_version(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert method_version(Wirtinger) == RECORDED["Wirtinger 1"]
+    assert method_version(Wirtinger) == "Wirtinger 1"
     monkeypatch.setattr(Wirtinger, "version", 2, raising=False)
     assert method_version(Wirtinger) == "Wirtinger 2"
-
-
-def test_every_recorded_version_is_that_of_a_method_or_older() -> None:
-    shipped = {cls.__qualname__: getattr(cls, "version", 1) for cls in map(found, plugins.names("methods"))}
-    recorded = [name.split() for name in RECORDED]
-    assert all(int(number) <= shipped[name] for name, number in recorded)
-
-
-def found(name: str) -> type[Any]:
-    return plugins.find("methods", name)
 
 
 MINE = """
@@ -119,16 +83,20 @@ class Method(Wirtinger):
 """
 
 
+def version(folder: Path, name: str = "Method") -> str:
+    return method_version(plugins.find("methods", f"mine.py:{name}", folder))
+
+
 def test_a_users_method_is_another_after_a_new_version_of_its_shipped_base(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "mine.py").write_text(MINE)
-    mine = plugins.find("methods", "mine.py:Method", tmp_path)
-    before = method_version(mine)
+    before = version(tmp_path)
     monkeypatch.setattr(Wirtinger, "version", 2, raising=False)
-    assert method_version(mine) != before
+    assert version(tmp_path) != before
 
 
-def test_a_users_method_without_code_of_its_own_is_its_shipped_base(tmp_path: Path) -> None:
+def test_a_shipped_class_under_the_name_of_a_file_is_that_files(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(MINE)
-    assert method_version(plugins.find("methods", "mine.py:Method", tmp_path)) == method_version(Wirtinger)
+    assert len(version(tmp_path, "Wirtinger")) == 64
+    assert method_version(Wirtinger) == "Wirtinger 1"

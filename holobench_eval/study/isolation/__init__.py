@@ -6,26 +6,41 @@ The harness gets what such a method declares, asks it to solve, and answers what
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 import torch
 from pydantic import TypeAdapter, ValidationError
 
-from ...core import parameters, plugins
+from ...core import parameters, plugins, sources
 from ...core.device import CPU
 from ...core.errors import CellError, UserError
 from ...core.hashing import canonical
+from ...core.reads import Seen, recorded
 from ...core.schema import FieldError
+from ...display.traits import BOOLEANS, FLAGS, FUNCTIONS, Traits, traits_of
 from ..definition import Isolation, Limits
+from ..versions import AGAIN, method_version
 from . import process
-from .inside import FUNCTIONS
-from .messages import Unsendable
+from .reads import NOTHING, Reads, changed, reads_of
 
-__all__ = ["Apart", "Unsendable", "build", "find", "imports", "opened", "params_of", "runs_inside", "solver", "words"]
-
-BOOLEANS = ("camera", "privileged", "trains", "follows", "planes")
+__all__ = [
+    "Apart",
+    "Opened",
+    "Reads",
+    "build",
+    "changed",
+    "find",
+    "imports",
+    "opened",
+    "params_of",
+    "runs_inside",
+    "solver",
+    "traits",
+    "words",
+]
 
 
 class Apart:
@@ -37,35 +52,63 @@ class Apart:
 
     file: ClassVar[str]
     folder: ClassVar[Path]
-    code_version: ClassVar[str]
     refused: ClassVar[str]
 
     def __init__(self, params: Mapping[str, Any], limits: Limits | None = None) -> None:
         self.params = dict(params)
         self.limits = limits or Limits(seconds=process.IMPORT_LIMIT)
-        self._opened: process.Call | None = None
+        self._opened: Opened | None = None
 
     def _call(self, function: str, *args: Any) -> Any:
-        if self._opened is not None:
-            return process.call(self._opened, function, self.params, args)
+        if self._opened is not None and self._opened.call is not None:
+            return process.call(self._opened.call, function, self.params, args)
         handle = next((argument for argument in args if isinstance(argument, process.Handle)), None)
         with opened(self, CPU if handle is None else handle.device):
             return self._call(function, *args)
 
 
+@dataclass(frozen=True)
+class Opened:
+    """A method that is ready for its calls. seen: what they have opened so far; call: its process, None for a method
+    that runs inside."""
+
+    method: Any
+    seen: Seen
+    call: process.Call | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """The number of its process."""
+        return None if self.call is None else self.call.pid
+
+    @property
+    def reads(self) -> Reads:
+        """What a user's code has read so far; nothing for a method of this package, which declares it."""
+        cls = type(self.method)
+        if sources.ships(cls):
+            return NOTHING
+        code = sources.code_of(cls)
+        return reads_of(self.seen.of_the_method(code.folder), params_of(self.method), code)
+
+
 @contextmanager
-def opened(method: object, device: torch.device) -> Iterator[int | None]:
-    """A process for the next call of a method, ready before the clock runs; its number, None for a method that runs
-    inside."""
-    if not isinstance(method, Apart) or method._opened is not None:
-        yield None
-        return
-    with process.process_of(method.file, method.folder).opened(device, method.limits) as call:
-        method._opened = call
-        try:
-            yield call.pid
-        finally:
-            method._opened = None
+def opened(method: Any, device: torch.device) -> Iterator[Opened]:
+    """A method that is ready for its calls, with its process, if it has one, before the clock runs."""
+    if not isinstance(method, Apart):
+        with nullcontext(Seen()) if sources.ships(type(method)) else recorded() as seen:
+            yield Opened(method, seen)
+    elif method._opened is not None:
+        yield method._opened
+    else:
+        running = process.process_of(method.file, method.folder)
+        if running.code is not None and running.code.sha256 != method_version(type(method)):
+            raise CellError(f"the code of {method.file} {AGAIN}")
+        with running.opened(device, method.limits) as call:
+            method._opened = Opened(method, call.seen, call)
+            try:
+                yield method._opened
+            finally:
+                method._opened = None
 
 
 def find(name: str, folder: Path) -> type[Any]:
@@ -74,16 +117,24 @@ def find(name: str, folder: Path) -> type[Any]:
     return plugins.find("methods", name, folder) if installed else _apart(name, folder)
 
 
+def traits(name: str, folder: Path) -> Traits:
+    """The traits of a method. UserError as ``find``."""
+    return traits_of(find(name, folder), name)
+
+
 def _apart(name: str, folder: Path) -> type[Apart]:
-    facts = process.process_of(name, folder).facts
-    flags = facts["flags"]
-    for flag in BOOLEANS:
-        if not isinstance(flags.get(flag, False), bool):
-            raise UserError(f"method '{name}': {flag} should be True or False")
-    functions = {function: _calling(function) for function in FUNCTIONS if function in facts["functions"]}
-    identity = {"file": name, "folder": folder, "code_version": facts["version"], "__doc__": facts["doc"]}
-    identity["refused"] = str(facts["refused"])
-    return type(facts["name"], (Apart,), {**flags, **functions, **identity})
+    described = process.process_of(name, folder)
+    facts = described.facts
+    functions: dict[str, Any] = {
+        function: _calling(function) for function in FUNCTIONS if function in facts["functions"]
+    }
+    flags = {name: value for name, value in facts["flags"].items() if name in FLAGS}  # the process may say anything
+    identity = {"file": name, "folder": folder, "__doc__": facts["doc"], "refused": str(facts["refused"])}
+    cls = type(facts["name"], (Apart,), {**flags, **functions, **identity})
+    traits_of(cls, name)  # UserError for a flag that is neither True nor False
+    if described.code is not None:
+        sources.remember(cls, replace(described.code, study=str(folder.absolute())))
+    return cls
 
 
 def _calling(function: str) -> Any:
@@ -147,4 +198,4 @@ def runs_inside(name: str, folder: Path, isolation: Isolation) -> bool:
     """Whether a method's functions run in the process of the harness; those that look into the bench always do."""
     if isolation == "files":
         return plugins.is_shipped("methods", name)
-    return isolation == "none" or bool(getattr(find(name, folder), "privileged", False))
+    return isolation == "none" or traits(name, folder).privileged

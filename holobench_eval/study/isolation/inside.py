@@ -25,21 +25,20 @@ from typing import Any
 import torch
 
 from ... import display
-from ...core import plugins
+from ...core import plugins, sources
 from ...core.device import find, moved, repeatable
 from ...core.errors import CellError, UserError
 from ...core.parameters import words
+from ...core.reads import recorded
 from ...core.schema import FieldError
 from ...display.api import from_numpy
-from ..versions import method_version
+from ...display.traits import FLAGS, FUNCTIONS
 from .handles import SolvingHandle, TrainingHandle
 from .messages import Channel
 
-FLAGS = ("camera", "privileged", "trains", "follows", "planes", "form", "tuned", "version")
-FUNCTIONS = ("solve", "solve_planes", "predict", "prepare", "estimates", "available", "files")
 PICTURES = ("solve", "solve_planes", "predict")  # whose results are arrays of NumPy, too
 HIDDEN = ("display.simulated", "study", "lab", "report", "commands", "testing")  # the bench and the harness
-HANDLES = {"solving": SolvingHandle, "training": TrainingHandle}
+HANDLES = {"MeteredDisplay": SolvingHandle, "TrainingBench": TrainingHandle}
 
 
 def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
@@ -95,6 +94,8 @@ def _imported(name: str, folder: Path) -> tuple[type[Any], str]:
         cls = plugins.find("methods", name, folder)
     if _threads() > threads:
         raise UserError(f"method '{name}' starts threads while its file is imported; start them in solve or prepare")
+    if plugins.is_file(name):
+        sys.path.append(_folder(cls))  # for processes that it starts
     return cls, refused
 
 
@@ -152,8 +153,12 @@ def _facts(cls: type[Any]) -> dict[str, Any]:
         "doc": inspect.getdoc(cls) or "",
         "flags": {flag: getattr(cls, flag) for flag in FLAGS if hasattr(cls, flag)},
         "functions": [function for function in FUNCTIONS if callable(getattr(cls, function, None))],
-        "version": method_version(cls),
+        "code": None if sources.ships(cls) else asdict(sources.code_of(cls)),
     }
+
+
+def _folder(cls: type[Any]) -> str:
+    return "" if sources.ships(cls) else sources.code_of(cls).folder
 
 
 def _call(channel: Channel, cls: type[Any], owner: str) -> None:
@@ -166,12 +171,17 @@ def _call(channel: Channel, cls: type[Any], owner: str) -> None:
         torch.zeros(1, device=device)  # a GPU is opened before the clock runs
         channel.send("ready")
         call = channel.receive()
+        with recorded() as opened:
+            try:
+                told = {"result": _result(channel, cls, owner, device, **call)}
+                _flush()
+            except BaseException as error:
+                told = _told(error, cls)
+        reads = {"seen": vars(opened.of_the_method(_folder(cls)))}
         try:
-            result = _result(channel, cls, owner, device, **call)
-            _flush()
-            channel.send({"result": result})
-        except BaseException as error:
-            channel.send(_told(error, cls))
+            channel.send(told | reads)
+        except Exception as error:  # a result that is no message
+            channel.send(_told(error, cls) | reads)
     with suppress(EOFError, OSError):
         channel.receive()  # until the harness has read what memory this took
 
@@ -185,7 +195,7 @@ def _result(
     if function == "params":
         return plugins.params_of(method)
     own = [
-        HANDLES[argument["handle"]](channel, argument, device)
+        HANDLES[argument["handle"]](channel, argument["known"], device)
         if isinstance(argument, dict) and "handle" in argument
         else moved(argument, device)
         for argument in args
@@ -193,6 +203,8 @@ def _result(
     result = getattr(method, function)(*own)
     if function in PICTURES:
         return from_numpy(result)
+    if function == "external":
+        return {name: None if path is None else str(path) for name, path in result.items()}
     return list(result) if function in ("estimates", "files") else result
 
 

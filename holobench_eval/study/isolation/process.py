@@ -9,17 +9,21 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing import reduction, util
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
 import torch
+from pydantic import TypeAdapter, ValidationError
 
 from ...core.device import moved
 from ...core.errors import BudgetError, CellError, ForeignError, Pending, StopError, UserError
+from ...core.hashing import State, file_state
+from ...core.reads import Seen
 from ...core.schema import FieldError
+from ...core.sources import Code
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
 from ..definition import Limits
@@ -31,15 +35,24 @@ from .messages import Channel, GarbledError, refuse_unsendable
 KEPT = 32  # processes of methods that stay when they have nothing to do
 IMPORT_LIMIT = 600.0  # seconds that the import of a method's file may take
 ANSWER_LIMIT = 10.0  # seconds in which the process that has imported it ends a call
+SEEN = TypeAdapter(Seen)
 Handle = MeteredDisplay | TrainingBench
 
 
 @dataclass(frozen=True)
 class Call:
-    """A process that is ready for one call. pid: its number."""
+    """A process that is ready for its calls. pid: its number; seen: what they have read."""
 
     pid: int
     channel: Channel
+    seen: Seen = field(default_factory=Seen)
+
+    def note(self, told: Any) -> None:
+        """Add what a call has read. GarbledError for a message that does not say it."""
+        try:
+            self.seen.add(SEEN.validate_python(told))
+        except ValidationError as error:
+            raise GarbledError(f"no reads: {error}") from None
 
 
 class MethodProcess:
@@ -66,10 +79,23 @@ class MethodProcess:
         if not isinstance(told, dict) or "facts" not in told:
             raise UserError(told["error"] if isinstance(told, dict) else f"method '{name}' does not say what it is")
         self.facts: dict[str, Any] = told["facts"]
+        try:
+            self.code = TypeAdapter(Code | None).validate_python(self.facts["code"])
+        except ValidationError as error:
+            self.end()
+            raise UserError(f"method '{name}' does not say what its code is: {error}") from None
+        self.states = self._states()
         self.seconds: float = told["seconds"]
 
+    def is_current(self) -> bool:
+        """Whether it lives, and its code is still what it has imported."""
+        return self.process.is_alive() and self.states == self._states()
+
+    def _states(self) -> list[State | None]:
+        return [file_state(path) for path in self.code.paths] if self.code else []
+
     def end(self) -> None:
-        """End it, whatever it does."""
+        """Kill the process."""
         self.process.kill()
         self.process.join()
         self.control.close()
@@ -139,6 +165,8 @@ def call(opened: Call, function: str, params: dict[str, Any], args: Sequence[Any
         got = opened.channel.receive()
         if not isinstance(got, dict):
             raise GarbledError("no mapping")
+        if "result" in got or "error" in got:
+            opened.note(got.get("seen"))
         if "result" in got:
             if function == "prepare":
                 refuse_unsendable(got["result"], "what prepare returned")
@@ -206,10 +234,11 @@ _processes: OrderedDict[tuple[Any, ...], MethodProcess] = OrderedDict()
 
 
 def process_of(name: str, folder: Path) -> MethodProcess:
-    """The process of a method, the same one while its file and those beside it stay as they are."""
+    """The process of a method, the same one while its code and the Python files beside it stay as they are."""
     key = (name, folder, Path.cwd(), _state(name, folder))
-    if key in _processes and not _processes[key].process.is_alive():
-        _processes.pop(key).end()
+    if key in _processes and not _processes[key].is_current():
+        former = _processes.pop(key)
+        _processes[(*key, id(former))] = former  # a call may still run in it
     if key not in _processes:
         _processes[key] = MethodProcess(name, folder)
     _processes.move_to_end(key)

@@ -1,18 +1,21 @@
-"""The files that a method reads, by which its cells are told apart: a file that is replaced gives another cell."""
+"""The files that a method reads, by which phases are told apart: a file that is replaced gives another phase.
+
+What a method of this package reads, it declares: ``files(target)``, which should be there, and ``external()``, which it
+takes where a machine has them. What a user's code reads, is seen while it runs: see `reads`.
+"""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ...core.errors import CellError, UserError
+from ...core.hashing import ABSENT, file_digest
 from ...core.io import file_name
+from ...display.traits import traits_of
 from ..definition import MethodEntry
 from . import build
-
-MISSING = "missing"
 
 
 def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str]) -> dict[str, Mapping[str, str]]:
@@ -22,11 +25,12 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
     lack are holes of the table.
     """
     targets = list(targets)
-    if not hasattr(cls, "files"):
+    if traits_of(cls).functions.isdisjoint(("files", "external")):
         return {target: {} for target in targets}
     method = build(entry.name, entry.params, folder)
     try:
-        found: dict[str, Mapping[str, str]] = {target: digests(method, target) for target in targets}
+        found: dict[str, Mapping[str, str]] = {target: files(method, target) for target in targets}
+        taken = external(method)
     except (CellError, OSError) as error:
         raise UserError(f"method '{entry.name}' does not say which files it reads: {error}") from error
     if hasattr(method, "refuse_shared"):
@@ -34,27 +38,31 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
             method.refuse_shared(targets)
         except UserError as error:
             raise UserError(f"method '{entry.name}': {error}") from None
-    read = [(target, path, sha256) for target, files in found.items() for path, sha256 in files.items()]
-    if read and all(sha256 == MISSING for *_, sha256 in read):
+    read = [(target, path, sha256) for target, digests in found.items() for path, sha256 in digests.items()]
+    if read and all(sha256 == ABSENT for *_, sha256 in read):
         target, path, _ = read[0]
         which = "" if file_name(target) == target else f" for the target '{target}'"
         where = "" if Path(path).is_absolute() else ", from the working directory"
         raise UserError(
             f"method '{entry.name}': none of the files that it reads is there, such as {path}{which}{where}"
         )
-    return found
+    return {target: {**digests, **taken} for target, digests in found.items()}
 
 
 def digests(method: Any, target: str) -> dict[str, str]:
-    """sha256 of the files that a method reads for a target, by the paths that its function ``files`` gives; ``missing``
+    """``files`` and ``external`` of a method: all that its phase of a target depends on beside its code."""
+    return {**files(method, target), **external(method)}
+
+
+def files(method: Any, target: str) -> dict[str, str]:
+    """sha256 of the files that a method reads for a target, by the paths that its function ``files`` gives; ``absent``
     for one that is not there. Empty for a method without that function."""
-    if not hasattr(method, "files"):
-        return {}
-    return {str(path): _sha256(Path(str(path))) for path in method.files(target)}
+    given = method.files(target) if "files" in traits_of(method).functions else ()
+    return {str(path): file_digest(str(path)) for path in given}
 
 
-def _sha256(path: Path) -> str:
-    if not path.is_file():
-        return MISSING
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def external(method: Any) -> dict[str, str]:
+    """sha256 of the files that a method takes where a machine has them, by names that are the same everywhere;
+    ``absent`` for one that is not there. Its function ``external`` gives their paths, None for no file."""
+    given = method.external() if "external" in traits_of(method).functions else {}
+    return {name: ABSENT if path is None else file_digest(path) for name, path in given.items()}

@@ -171,12 +171,12 @@ methods: ["mine.py:Greedy"]
 
 def test_a_call_that_is_left_ends_its_process(file: str) -> None:
     method = isolation.build(f"{file}:Mine", {}, Path())
-    with isolation.opened(method, CPU) as number:
-        assert Path(f"/proc/{number}").exists() or not Path("/proc").exists()
+    with isolation.opened(method, CPU) as ready:
+        assert Path(f"/proc/{ready.pid}").exists() or not Path("/proc").exists()
     deadline = time.monotonic() + 10
-    while Path(f"/proc/{number}").exists() and time.monotonic() < deadline:
+    while Path(f"/proc/{ready.pid}").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
-    assert not Path(f"/proc/{number}").exists()
+    assert not Path(f"/proc/{ready.pid}").exists()
 
 
 def test_a_method_of_a_file_has_the_digits_that_it_has_inside(file: str, tmp_path: Path) -> None:

@@ -1,0 +1,80 @@
+"""What a user's code was seen to read in its calls (`core.reads` says what is not seen), and whether it is still so."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...core.hashing import ABSENT, file_digest, file_state
+from ...core.reads import STARTED, Seen, within
+from ...core.sources import Code, lies_in
+
+LARGEST = 2**36  # bytes of a file that is hashed
+CHANGED = "changed while it was read"  # in place of a digest
+
+
+@dataclass(frozen=True)
+class Reads:
+    """What a user's code read in its calls.
+
+    covered: sha256 by path, seen from the study's folder where the file lies there; ``absent`` for a file that was
+    asked for in vain. uncovered: paths of other files, of those too that the code itself writes after it has read them,
+    and in words what cannot be seen.
+    """
+
+    covered: Mapping[str, str]
+    uncovered: tuple[str, ...]
+
+
+NOTHING = Reads({}, ())
+
+
+def reads_of(seen: Seen, params: Any, code: Code) -> Reads:
+    """What was read, told apart: covered is what lies below the folder of the study or of the method's file, and what
+    a parameter names, itself or by a folder above it.
+
+    params: of the method; code: its own, whose files count there.
+    """
+    study = Path(code.study).absolute()
+    folder, named = str(study), _named(params, study)
+    places, own = [folder, code.folder, *named], dict(zip(code.paths, code.files.values(), strict=True))
+    # C code may have read a file that a parameter names.
+    states = {**{path: file_state(path) for path in named if path not in seen.written}, **seen.read}
+    covered, uncovered = dict[str, str](), {*code.uncovered, *([STARTED] if seen.starts else [])}
+    for path, state in states.items():
+        if Path(path).is_dir() or (path in own and file_digest(path) == own[path]):
+            continue
+        is_fixed = path not in seen.written and (state is None or state[1] <= LARGEST)
+        if not is_fixed or not any(lies_in(path, place) for place in places):
+            uncovered |= {path} if state is not None else set()
+            continue
+        name = os.path.relpath(path, folder) if within(path, folder) else path
+        covered[name] = ABSENT if state is None else file_digest(path) if file_state(path) == state else CHANGED
+    return Reads(dict(sorted(covered.items())), tuple(sorted(uncovered)))
+
+
+def changed(covered: Mapping[str, str], folder: Path) -> str:
+    """The first path of ``Reads.covered`` that has another digest now; empty for none. folder: of the study."""
+    return next((path for path, sha256 in covered.items() if file_digest(folder / path) != sha256), "")
+
+
+def _named(params: Any, study: Path) -> list[str]:
+    """The files and folders that parameters name, from the working directory or from the study's folder."""
+    if isinstance(params, Mapping):
+        params = list(params.values())
+    if isinstance(params, list | tuple):
+        return [path for value in params for path in _named(value, study)]
+    if not isinstance(params, str) or not params or "\0" in params:
+        return []
+    paths = (Path(place, Path(params).expanduser()).absolute() for place in (Path.cwd(), study))
+    return list(dict.fromkeys(os.path.normpath(path) for path in paths if _exists(path)))
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # too long for a name
+        return False

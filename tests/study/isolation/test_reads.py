@@ -1,0 +1,161 @@
+"""What a method's calls read is known: by digest where the study can be held to it, else by name."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from multiprocessing import Pipe
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from holobench_eval.core import plugins
+from holobench_eval.core.device import CPU
+from holobench_eval.core.reads import STARTED
+from holobench_eval.study import isolation
+from holobench_eval.study.isolation.messages import Channel, GarbledError
+from holobench_eval.study.isolation.process import Call
+
+METHOD = """
+import os
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+HERE = Path(__file__).parent
+Path({outside!r}, "at_import.txt").read_text()
+
+
+@dataclass(frozen=True)
+class Mine:
+    weights: str = {outside!r} + "/weights.bin"
+    tables: str = {outside!r} + "/tables"
+    log: str = {outside!r} + "/log.txt"
+
+    def solve(self, target, bench):
+        np.load(HERE / "array.npy")
+        np.memmap(HERE / "mapped.bin")
+        torch.load(HERE / "tensors.pt")
+        torch.jit.load(HERE / "script.pt")
+        cv2.imread(str(HERE / "picture.png"))
+        os.close(os.open("by_number.txt", os.O_RDONLY))
+        Path(self.tables, "one.txt").read_text()
+        Path({outside!r}, "other.txt").read_text()
+        try:
+            open(HERE / "nothing.txt")
+        except FileNotFoundError:
+            pass
+        Path(self.log).open("a").write("called")
+        (HERE / "count.txt").write_text((HERE / "count.txt").read_text() + "1")
+        (HERE / "own.txt").write_text("made here")
+        (HERE / "own.txt").read_text()
+        with tempfile.TemporaryDirectory(dir=HERE) as folder:
+            torch.save(target, Path(folder, "own.pt"))
+            torch.load(Path(folder, "own.pt"))
+        subprocess.run(["true"])
+        return 1.0
+"""
+INSIDE = ("array.npy", "mapped.bin", "tensors.pt", "script.pt", "picture.png", "by_number.txt")
+
+
+def inside(folder: Path) -> Any:
+    return plugins.build("methods", "mine.py:Mine", {}, folder)
+
+
+def apart(folder: Path) -> Any:
+    return isolation.build("mine.py:Mine", {}, folder)
+
+
+def sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize("build", [inside, apart])
+def test_what_a_call_reads_is_covered_or_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, build: Callable[[Path], Any]
+) -> None:
+    study, outside = tmp_path / "study", tmp_path / "outside"
+    (outside / "tables").mkdir(parents=True)
+    study.mkdir()
+    monkeypatch.chdir(study)
+    for name in ("at_import.txt", "other.txt", "weights.bin", "tables/one.txt", "tables/two.txt", "log.txt"):
+        (outside / name).write_text(name)
+    np.save("array.npy", np.zeros(3))
+    Path("mapped.bin").write_bytes(bytes(8))
+    torch.save(torch.zeros(2), "tensors.pt")
+    torch.jit.script(torch.nn.Linear(2, 2)).save("script.pt")
+    cv2.imwrite("picture.png", np.zeros((4, 4), np.uint8))
+    Path("by_number.txt").write_text("1")
+    Path("count.txt").write_text("1")
+    Path("mine.py").write_text(METHOD.format(outside=str(outside)))
+    method = build(study)
+    with isolation.opened(method, CPU) as ready:
+        method.solve(2.0, None)
+    named = [outside / "weights.bin", outside / "tables" / "one.txt"]
+    assert ready.reads.covered == {
+        **{name: sha256(study / name) for name in INSIDE},
+        **{str(path): sha256(path) for path in named},
+        "nothing.txt": "absent",
+    }
+    assert set(ready.reads.uncovered) == {
+        str(outside / "at_import.txt"),
+        str(outside / "other.txt"),
+        str(study / "count.txt"),
+        STARTED,
+    }
+
+
+def test_a_method_of_this_package_declares_what_it_reads() -> None:
+    method = isolation.build("double_phase", {}, Path())
+    with isolation.opened(method, CPU) as ready:
+        Path(__file__).read_text()
+    assert ready.reads == isolation.Reads({}, ())
+
+
+@pytest.mark.parametrize(
+    ("edit", "path"),
+    [
+        (lambda folder: None, ""),
+        (lambda folder: (folder / "a.txt").write_text("other"), "a.txt"),
+        (lambda folder: (folder / "a.txt").unlink(), "a.txt"),
+        (lambda folder: (folder / "b.txt").write_text(""), "b.txt"),
+        (lambda folder: os.utime(folder / "a.txt", (0, 0)), ""),
+        (lambda folder: (folder / "a.txt").chmod(0o600), ""),
+    ],
+)
+def test_a_file_that_is_another_one_is_named(tmp_path: Path, edit: Callable[[Path], Any], path: str) -> None:
+    (tmp_path / "a.txt").write_text("first")
+    covered = {"a.txt": sha256(tmp_path / "a.txt"), "b.txt": "absent"}
+    assert isolation.changed(covered, tmp_path) == ""
+    edit(tmp_path)
+    assert isolation.changed(covered, tmp_path) == path
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        None,
+        {"read": []},
+        {"read": {"a": (1, 2)}},
+        {"read": {"a": "b"}},
+        {"read": {1.5: None}},
+        {"written": 3},
+        {"starts": "<script>"},
+    ],
+)
+def test_reads_that_are_no_reads_are_refused(told: Any) -> None:
+    ours, theirs = Pipe()
+    with pytest.raises(GarbledError, match="no reads"):
+        Call(0, Channel(ours)).note(told)
+    theirs.close()

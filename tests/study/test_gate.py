@@ -1,0 +1,81 @@
+"""What was edited after a study was planned does not run under the names of the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.core.errors import CellError
+from holobench_eval.methods.wirtinger import Wirtinger
+from holobench_eval.study.artifacts import Artifacts
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.plan import plan
+from holobench_eval.study.progress import Lines
+from holobench_eval.study.run import run
+from holobench_eval.study.versions import gate
+from tests.support.trained_study import write
+
+PREDICTION = "seed: 3\nmeasure: prediction\nholograms: {name: 'trained.py:Even'}"
+METHODS = 'methods: ["trained.py:Gain"]'
+
+
+def reasons(config: Path, edit: Callable[[str], str], file: str = "trained.py") -> set[str]:
+    """Why a study's methods fail whose file is edited between plan and run."""
+    study = load_study(config)
+    planned = plan(study)
+    path = config.parent / file
+    path.write_text(edit(path.read_text()))
+    watch, folder = Lines(lambda line: None), config.parent
+    records = run(study, planned, folder / "out", Serial(), watch, threads=1, artifacts=folder / "artifacts").records
+    return {record["reason"] for record in records if not record["label"].startswith("floor")}
+
+
+def edited(text: str) -> str:
+    return text.replace("6 * torch.rand", "3 * torch.rand") + "# edited\n"
+
+
+@pytest.mark.parametrize("isolation", ["files", "none"])
+def test_code_that_was_edited_is_not_trained(tmp_path: Path, isolation: str) -> None:
+    config = write(tmp_path, ("seed: 3", f"seed: 3\nisolation: {isolation}"))
+    assert reasons(config, edited) == {
+        "not trained: the code of trained.py:Gain has changed since the study was planned; start the run again"
+    }
+    assert not list((tmp_path / "artifacts").rglob("learned.pt"))
+
+
+@pytest.mark.parametrize("isolation", ["files", "none"])
+def test_code_that_was_edited_solves_nothing(tmp_path: Path, isolation: str) -> None:
+    config = write(tmp_path, (METHODS, 'methods: ["trained.py:Even"]'), ("seed: 3", f"isolation: {isolation}"))
+    (why,) = reasons(config, edited)
+    assert "the code of trained.py:Even has changed since the study was planned" in why
+
+
+def test_code_that_was_edited_predicts_nothing(tmp_path: Path) -> None:
+    even = (METHODS, 'methods: ["trained.py:Even"]')
+    (why,) = reasons(write(tmp_path, even, ("seed: 3", PREDICTION.partition("\nholograms")[0])), edited)
+    assert "the code of trained.py:Even has changed since the study was planned" in why
+
+
+def test_code_that_was_edited_gives_no_hologram_to_predict(tmp_path: Path) -> None:
+    config = write(tmp_path, (METHODS, 'methods: ["other.py:Even"]'), ("seed: 3", PREDICTION))
+    (tmp_path / "other.py").write_text((tmp_path / "trained.py").read_text())
+    (why,) = reasons(config, edited)
+    assert "the code of trained.py:Even has changed since the study was planned" in why
+
+
+def test_a_file_that_is_another_one_is_refused() -> None:
+    gate(Wirtinger(), "wirtinger", "Wirtinger 1", {"a": "1"}, {"a": "1"})
+    with pytest.raises(CellError, match="a file that wirtinger reads has changed since the study was planned"):
+        gate(Wirtinger(), "wirtinger", "Wirtinger 1", {"a": "1"}, {"a": "2"})
+
+
+def test_a_training_of_before_an_edit_is_not_used_after_it(tmp_path: Path) -> None:
+    config = write(tmp_path)
+    (before,) = plan(load_study(config)).preparations().values()
+    Artifacts(tmp_path / "artifacts").write(before, {}, {"captures": 0, "seconds": 0.0})
+    (tmp_path / "trained.py").write_text(edited((tmp_path / "trained.py").read_text()))
+    (after,) = plan(load_study(config)).preparations().values()
+    assert not Artifacts(tmp_path / "artifacts").has(after)
