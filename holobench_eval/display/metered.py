@@ -2,47 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from threading import Lock
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, Protocol
 
 import torch
 from torch import Tensor
 
 from ..core.errors import BudgetError, CellError
 from ..core.seeds import generator
+from .account import Account, Journal
 from .api import Camera, Capture, Display, DisplaySpec, Simulation, check_phase, white_irradiance
+from .traits import traits_of
 
 
-class Account:
-    """The captures of a handle: taken so far, and allowed in all (None: no limit). It has no copies, and so no handle
-    that holds it can be copied into a second budget; threads take their captures one after the other."""
+class Solver(Protocol):
+    """A method that knows the nominal optics alone."""
 
-    def __init__(self, label: str, budget: int | None, purpose: str = "") -> None:
-        self.budget, self.captures = budget, 0
-        self._refusal = f"{label} has used its {budget} captures{purpose}"
-        self._lock = Lock()
+    def solve(self, target: Tensor, bench: Any) -> Tensor:
+        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
+        ...
 
-    def __copy__(self) -> Account:
-        return self
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Account:
-        return self
-
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("a display's account of captures cannot be sent to another process")
-
-    def take(self) -> None:
-        """Count a capture. BudgetError when none is left."""
-        with self._lock:
-            if self.budget is not None and self.captures >= self.budget:
-                raise BudgetError(self._refusal)
-            self.captures += 1
-
-    def left(self, wanted: int) -> int:
-        """How many of the wanted captures may be taken."""
-        return wanted if self.budget is None else min(wanted, max(0, self.budget - self.captures))
+# A method, and what has it solve; the phases, from where they are kept or from there.
+Known = Callable[[Solver, Callable[[], Tensor]], Tensor]
 
 
 class MeteredDisplay:
@@ -70,6 +53,10 @@ class MeteredDisplay:
         Phases ``(C, H, W)`` [rad] of other methods for this target, for a privileged method to start from.
     target_name, target_sha256
         The target's name in its dataset and the digest of its source, empty where it has none.
+    known
+        Gives the phase of the target by another method, from where phases are kept; None: nothing is kept.
+    journal
+        Where its captures are counted beside those of other attempts, see ``Journal``.
     """
 
     def __init__(
@@ -84,15 +71,18 @@ class MeteredDisplay:
         starts: Sequence[Tensor] = (),
         target_name: str = "",
         target_sha256: str = "",
+        known: Known | None = None,
+        journal: Journal | None = None,
     ) -> None:
+        self._known = known
         self.target_name, self.target_sha256 = target_name, target_sha256
         self._display = display
         self._label = label
         self._target = target.clone()  # a method that writes to its target must not reach the scored one
         self._names = names
-        self._camera = bool(getattr(method, "camera", False))
-        self._privileged = bool(getattr(method, "privileged", False))
-        self._account = Account(label, budget)
+        traits = traits_of(method)
+        self._camera, self._privileged = traits.camera, traits.privileged
+        self._account = Account(label, budget, journal=journal)
         self._learned = learned
         self._starts = tuple(starts)
         self._kept: Tensor | None = None
@@ -110,7 +100,7 @@ class MeteredDisplay:
 
     @property
     def captures(self) -> int:
-        """Captures taken so far."""
+        """Captures taken so far, in this attempt."""
         return self._account.captures
 
     @property
@@ -154,6 +144,13 @@ class MeteredDisplay:
             raise CellError(f"{self._label}: only a method that declares privileged = True may see other holograms")
         return self._starts
 
+    def solved(self, method: Solver, target: Tensor) -> Tensor:
+        """Phases ``(B, C, H, W)`` [rad] of targets ``(B, C, h, w)`` by another method that knows the nominal optics
+        alone, such as where a method begins; solved once for all methods and displays that need them."""
+        if self._known is None or len(target) > 1 or not torch.equal(target[0], self._target):
+            return method.solve(target, self)
+        return self._known(method, lambda: method.solve(target, self))
+
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on study seed, target, repeat and ``names``."""
         return generator("method", *self._names, *names)
@@ -185,12 +182,13 @@ class MeteredDisplay:
         if not self._camera:
             raise CellError(f"{self._label} took a capture, but declares no camera (camera = True)")
         check_phase(phase, self.spec, self._label)
+        camera = self._opened_camera  # before the capture is counted: to open it may take long, or fail
         try:
             self._account.take()
         except BudgetError as error:
             self._over = str(error)
             raise
-        return self._opened_camera.capture(phase)
+        return camera.capture(phase)
 
     def announce(self, phases: Sequence[Tensor]) -> None:
         """Tell the display which phases ``(C, H, W)`` [rad] are captured next, in that order, whatever they show.
@@ -240,6 +238,8 @@ class MethodHandles:
         learned: Mapping[str, Any] | None = None,
         starts: Sequence[Tensor] = (),
         sha256: str = "",
+        known: Known | None = None,
+        journal: Journal | None = None,
     ) -> MeteredDisplay:
         """The handle that a method gets to solve a target.
 
@@ -259,8 +259,8 @@ class MethodHandles:
             Captures that may be taken, None for no limit.
         learned
             What the method's ``prepare`` returned.
-        starts
+        starts, known, journal
             See ``MeteredDisplay``.
         """
-        names = (self.seed, item, repeat)
-        return MeteredDisplay(self, label, target, names, method, budget, learned, starts, item, sha256)
+        given = (method, budget, learned, starts, item, sha256, known, journal)
+        return MeteredDisplay(self, label, target, (self.seed, item, repeat), *given)

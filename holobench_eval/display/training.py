@@ -14,8 +14,9 @@ from torch import Tensor
 from ..core.device import CPU, moved
 from ..core.errors import CellError
 from ..core.seeds import generator
+from .account import Account, Journal
 from .api import Camera, Display, DisplaySpec, check_phase, white_irradiance
-from .metered import Account
+from .metered import Known, Solver
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
@@ -49,7 +50,9 @@ class TrainingBench:
     """A display for training: nominal optics, the images, a metered camera, and a memory that survives a kill.
 
     images: to train with; held_out: captured only to watch how well the captures of unseen images are predicted.
-    budget: captures that may be taken, None for no limit. seed: the study's.
+    budget: captures that may be taken, None for no limit; what is kept has its captures counted once. seed: the
+    study's. known: of images by name, see ``MeteredDisplay``. journal: where captures are counted beside those of
+    attempts that were cut short, see ``Journal``.
     """
 
     def __init__(
@@ -61,14 +64,17 @@ class TrainingBench:
         memory: Memory,
         budget: int | None,
         seed: int,
+        known: Mapping[str, Known] | None = None,
+        journal: Journal | None = None,
     ) -> None:
         self.images = tuple(images)
         self.held_out = tuple(held_out)
         self._display = display
         self._label = label
         self._memory = memory
-        self._account = Account(label, budget, " for training")
+        self._account = Account(label, budget, " for training", journal)
         self._seed = seed
+        self._known = known or {}
         self._spent = 0.0
         self._started = time.perf_counter()
 
@@ -84,7 +90,7 @@ class TrainingBench:
 
     @property
     def captures(self) -> int:
-        """Captures taken so far, those before an interruption included."""
+        """Captures taken so far, those before an interruption included, but for what was not kept then."""
         return self._account.captures
 
     @property
@@ -95,6 +101,13 @@ class TrainingBench:
     def light(self, image: TrainingImage) -> Tensor:
         """Light at a white pixel, ``(C,)``, if all of the panel's went into the target; incident light is 1."""
         return white_irradiance(image.target, self.spec)
+
+    def solved(self, method: Solver, image: TrainingImage) -> Tensor:
+        """The phase ``(C, H, W)`` [rad] of an image by another method; see ``MeteredDisplay.solved``."""
+        known = self._known.get(image.item)
+        if known is None:
+            return method.solve(image.target[None], self)[0]
+        return known(method, lambda: method.solve(image.target[None], self))[0]
 
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on the study's seed and ``names``."""
@@ -112,8 +125,9 @@ class TrainingBench:
         if not own and not _is_even(image.target):
             raise CellError(f"{self._label} photographed '{image.item}', which is no image it may be trained with")
         check_phase(phase, self.spec, self._label)
+        camera = self._camera(image, *names)
         self._account.take()
-        return self._display.rectified(self._camera(image, *names).capture(phase.detach()), image.target)
+        return self._display.rectified(camera.capture(phase.detach()), image.target)
 
     def announce(self, photographs: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
         """Tell the display the arguments of the next calls of ``photograph``, whatever those captures show.
@@ -140,7 +154,7 @@ class TrainingBench:
         known = self._memory.load(name)
         if known is None:
             return None
-        self._account.captures = max(self.captures, int(known["captures"]))
+        self._account.resume(int(known["captures"]), int(known["total"]))
         if known["seconds"] > self.seconds:
             self._spent += known["seconds"] - self.seconds
         value: Value = moved(dict(known["value"]), self.device)
@@ -148,11 +162,15 @@ class TrainingBench:
 
     def save(self, name: str, value: Value) -> None:
         """Keep a value under ``name``, in the place of an older one; what is kept does not depend on the device."""
-        self._memory.save(name, {"value": moved(value, CPU), "captures": self.captures, "seconds": self.seconds})
+        counted = {"captures": self.captures, "total": self._account.total, "seconds": self.seconds}
+        self._memory.save(name, {"value": moved(value, CPU), **counted})
 
     def log(self, **row: float | int | str) -> None:
-        """A row for those who watch: numbers by name, such as round, step, losses and fidelity."""
-        self._memory.log({**row, "captures": self.captures, "seconds": round(self.seconds, 1)})
+        """A row for those who watch: numbers by name, such as round, step, losses and fidelity.
+
+        It gets all captures up to now, those that an interruption cost included.
+        """
+        self._memory.log({**row, "captures": self._account.total, "seconds": round(self.seconds, 1)})
 
 
 def _is_even(image: Tensor) -> bool:

@@ -6,13 +6,14 @@ import copy
 import pickle
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 import torch
 
-from holobench_eval.core.errors import BudgetError
+from holobench_eval.core.errors import BudgetError, StorageError
 from holobench_eval.display import MeteredDisplay
-from holobench_eval.display.metered import Account
+from holobench_eval.display.account import Account, Journal
 from tests.support.toy_camera import SPEC, ToyDisplay, picture
 
 
@@ -54,3 +55,27 @@ def test_threads_share_a_budget() -> None:
 def test_an_account_is_not_sent_to_another_process() -> None:
     with pytest.raises(TypeError, match="another process"):
         pickle.dumps(Account("mine", 1))
+
+
+def test_a_journal_has_the_captures_of_all_accounts_and_a_budget_those_of_one(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "new folder" / "one.captures")
+    accounts = [Account("mine", 2, journal=journal) for _ in range(2)]
+    for account in accounts:
+        account.take()
+        account.take()
+        with pytest.raises(BudgetError, match="has used its 2 captures"):
+            account.take()
+    assert [(account.captures, account.total) for account in accounts] == [(2, 2), (2, 4)]
+    assert journal.captures == 4
+    journal.close()
+    journal.close()
+    assert journal.captures == 0
+
+
+def test_a_capture_that_cannot_be_counted_is_not_taken(tmp_path: Path) -> None:
+    (tmp_path / "journal").touch()
+    display, phase = ToyDisplay(), torch.zeros(len(picture()), *SPEC.shape)
+    handle = MeteredDisplay(display, "mine", picture(), (), Seeing(), journal=Journal(tmp_path / "journal" / "one"))
+    with pytest.raises(StorageError, match="journal"):
+        handle.capture(phase)
+    assert handle.captures == 0

@@ -16,16 +16,29 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from holobench_eval.core.hashing import digest
 from holobench_eval.study.executors.processes import PRELOADED, start
+from holobench_eval.study.phases import phases_of
+from tests.faults.counts import COUNTS, reported, taken
 from tests.faults.life import DEVICES, SAID, SIMULATED, TRACEBACK, begin, ends, live
 from tests.faults.system import FAULTS, FAULTS_OF_DEVICES
 
-TIMES = {"seconds", "memory_mib", "alone", "sha256"}  # of a record: what differs from run to run, and its digest
+TIMES = {
+    "seconds",
+    "reused",
+    "memory_mib",
+    "alone",
+    "sha256",
+}  # of a record: what differs from run to run, and its digest
+CAPTURES = "captures"  # those of attempts that a fault has ended count, too; they are compared with the camera's
+CAMERA = "Mine"  # the method that has one
 
 
 @dataclass
 class Count:
-    """What a campaign has seen. late: faults that met no life; told: how lives ended that ended wrongly."""
+    """What a campaign has seen. late: faults that met no life; told: how lives ended that ended wrongly; counted:
+    numbers of captures that were compared with the camera's; surplus: captures that were counted and not taken, since
+    the fault came between; miscounted: numbers that are wrong all the same."""
 
     faults: dict[str, int] = field(default_factory=dict)
     studies: int = 0
@@ -37,6 +50,9 @@ class Count:
     holes: int = 0
     tracebacks: int = 0
     late: int = 0
+    counted: int = 0
+    surplus: int = 0
+    miscounted: int = 0
     told: list[str] = field(default_factory=list)
 
 
@@ -87,30 +103,35 @@ def study(folder: Path, draw: random.Random, faults: list[str], wanted: Whole, s
     seen.hung += not ends(last)
     seen.holes += last.exitcode != 0
     compare(folder, wanted, seen)
+    count(folder, len(faults), seen)
 
 
 def unfinish(folder: Path, draw: random.Random) -> None:
-    """Take away half of the records, so that the next life has something to do."""
+    """Take away half of the records with their phases, so that the next life has something to do."""
     for path in sorted((folder / "out/records").glob("*.json")):
         if draw.random() < 0.5:
+            record = json.loads(path.read_text())
+            if record["label"] == CAMERA and record["state"] == "done":  # made again, it begins a new account
+                (folder / COUNTS / record["target"]).unlink()
             path.unlink()
+            phases_of(folder / "out").path(digest(record["capture"]["phase"])).unlink(missing_ok=True)
 
 
 def records(folder: Path) -> dict[str, Any]:
-    """The records of a study by their names, without times."""
+    """The records of a study by their names, without times and captures."""
     found = {}
     for path in sorted((folder / "out/records").glob("*.json")):
         content = json.loads(path.read_text())
         if content["learned"]:
-            del content["learned"]["seconds"]
-        found[path.name] = {key: value for key, value in content.items() if key not in TIMES}
+            del content["learned"]["seconds"], content["learned"][CAPTURES]
+        found[path.name] = {key: value for key, value in content.items() if key not in {*TIMES, CAPTURES}}
     return found
 
 
 def table(folder: Path) -> str:
-    """The table without its columns of times and memory."""
+    """The table without its columns of times, memory and captures."""
     rows = list(csv.reader(io.StringIO((folder / "out/table.csv").read_text())))
-    kept = [i for i, name in enumerate(rows[0]) if not name.endswith(("_s", "_mib"))]
+    kept = [i for i, name in enumerate(rows[0]) if not name.endswith(("_s", "_mib", CAPTURES))]
     return "\n".join(",".join(row[i] for i in kept) for row in rows)
 
 
@@ -122,6 +143,15 @@ def compare(folder: Path, wanted: Whole, seen: Count) -> None:
     seen.doubled += len(found.keys() - wanted.records.keys())
     seen.wrong += sum(found[name] != record for name, record in wanted.records.items() if name in found)
     seen.tables += table(folder) != wanted.table
+
+
+def count(folder: Path, faults: int, seen: Count) -> None:
+    """Compare the captures that are reported with those that the camera has counted; each fault may cost one more."""
+    for of, captures in reported(folder, CAMERA).items():
+        surplus = captures - taken(folder, of)
+        seen.counted += 1
+        seen.surplus += int(max(0, surplus))
+        seen.miscounted += not 0 <= surplus <= faults
 
 
 def without_fault(kind: Kind, folder: Path) -> Whole:

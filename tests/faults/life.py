@@ -6,27 +6,36 @@ import os
 import resource
 import signal
 import traceback
+from collections.abc import Callable
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
+
+from torch import Tensor
 
 from holobench_eval.core.errors import UserError, out_of_memory
+from holobench_eval.display import Capture
+from holobench_eval.display.simulated.pipeline import BenchSession
+from holobench_eval.lab.real import RealSession
 from holobench_eval.report.data.layout import layout_of
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.report.files import write_files
+from holobench_eval.study import run as running
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.executors.clusters import Address
 from holobench_eval.study.executors.local import Local
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import run
 from tests.faults import devices
+from tests.faults.counts import note
 
 LONGEST = 300.0  # seconds that a life may take before it counts as hung
 WORKERS = 2
 TRACEBACK = 3  # how a life ends that ends with one
 SAID = "said.txt"  # what lives print
+STEP, CAPTURES = running.step, {camera: camera.capture for camera in (BenchSession, RealSession)}
 
 METHOD = """
 from dataclasses import dataclass
@@ -68,6 +77,21 @@ def executor(name: str) -> Executor:
     return {"serial": Serial(), "workers": Local(WORKERS)}.get(name) or Address(name)
 
 
+def counting(job: running.Step) -> running.Result:
+    """``run.step`` with cameras that count, also in workers."""
+    for camera, capture in CAPTURES.items():
+        camera.capture = _counted(capture)  # type: ignore[attr-defined]
+    return STEP(job)
+
+
+def _counted(capture: Callable[[Any, Tensor], Capture]) -> Callable[[Any, Tensor], Capture]:
+    def counted(camera: Any, phase: Tensor) -> Capture:
+        note(camera.names)
+        return capture(camera, phase)
+
+    return counted
+
+
 def live(
     folder: Path,
     where: str = "serial",
@@ -87,10 +111,12 @@ def live(
         resource.setrlimit(limit, (value, value))
     if Path("bench.yaml").is_file():
         devices.failing(fault)
+    running.step = counting
     try:
         study = load_study(Path("study.yaml"))
         planned, watch = plan(study), Lines(lambda _: None)
-        outcome = run(study, planned, Path("out"), executor(where), watch, 1, Path("artifacts"), retry_failed=peace)
+        chosen, artifacts = executor(where), Path("artifacts")
+        outcome = running.run(study, planned, Path("out"), chosen, watch, 1, artifacts, retry_failed=peace)
         layout = layout_of(study)
         write_files(Results(records_frame(outcome.records, layout), layout), Path("out"))
     except (UserError, OSError):  # which the command says in one line

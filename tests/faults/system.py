@@ -27,6 +27,7 @@ from tests.faults.life import LONGEST, WORKERS, ends, live, on_devices
 
 Told = Iterator[Any]  # the process of a life, then whether it was hit
 IMPORTS = 1.0  # seconds that a life on a Dask cluster takes to begin
+ROOT = Path(__file__).parents[2]
 ANSWER = 60.0  # seconds that a Dask cluster has to begin
 
 
@@ -122,6 +123,7 @@ def dask(victim: int) -> Callable[..., Told]:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 cwd=folder,
+                env=os.environ | {"PYTHONPATH": str(ROOT)},  # for the cameras that count
             )
             for command in commands
         ]

@@ -20,4 +20,6 @@ def test_a_study_that_is_hit_by_every_fault_ends_as_one_without(tmp_path: Path, 
     study(tmp_path / "hit", random.Random(1), names, without_fault(kind, tmp_path / "without"), seen)
     assert sum(seen.faults.values()) + seen.late == len(names)
     assert (seen.lost, seen.doubled, seen.wrong, seen.tables) == (0, 0, 0, 0)
+    assert seen.counted > 0
+    assert seen.miscounted == 0
     assert (seen.hung, seen.holes, seen.tracebacks) == (0, 0, 0), seen.told
