@@ -6,7 +6,6 @@ from .data.layout import Layout, layout_of
 from .data.results import Results
 from .data.tables import csv_text, read_records, records_frame, table_from_records
 from .description import Description
-from .files.tidy import tidy_records
 from .sections.results import headline_rows
 
 __all__ = [
@@ -23,6 +22,5 @@ __all__ = [
     "recompute_files",
     "records_frame",
     "table_from_records",
-    "tidy_records",
     "write_report",
 ]

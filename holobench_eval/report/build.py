@@ -12,7 +12,7 @@ from ..core.io import write_atomically
 from ..study.definition import Study
 from .data.layout import Layout, layout_of
 from .data.results import Results
-from .data.tables import read_records, records_frame
+from .data.tables import of_study, read_records, records_frame
 from .description import Description, describe
 from .files import texts, write_files
 from .markdown import FIGURE, Markdown, blocks
@@ -95,4 +95,4 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
 
 def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:
     """The text of every file of data, by name, computed anew from that of records.csv; equal bytes belong together."""
-    return texts(Results(read_records(records_csv), layout))
+    return texts(Results(of_study(read_records(records_csv), layout), layout))

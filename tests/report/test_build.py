@@ -118,7 +118,7 @@ def test_a_reader_is_told_what_was_at_work_beside_what_was_timed(records, tmp_pa
     noted = [record | {"memory_mib": 9.0, "alone": record["cell"]["target"] == TARGETS[0]} for record in kept]
     text = whole(write_report(layout, noted, tmp_path, PROVENANCE, DESCRIPTION)[0])
     assert "Seconds and memory are the first measurement on that machine, which may be of an earlier study." in text
-    assert "Seconds are those of one hologram per row, timed alone. Memory is" in text
+    assert "Seconds are those of one hologram per row, timed alone. A phase is solved once" in text
 
 
 def test_a_reader_is_told_when_seconds_were_measured_and_how_busy_the_machine_was(records, tmp_path):

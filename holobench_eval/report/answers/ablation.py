@@ -19,13 +19,12 @@ NAMED = 6  # changes that the answer lists with their differences
 
 def variants(results: Results) -> list[str]:
     """The rows that are the baseline's own method with other settings; with another file it shows another's phases."""
-    names = results.frame.drop_duplicates("method").set_index("method")["name"]
-    baseline = results.layout.baseline
+    names, baseline = results.names, str(results.layout.baseline)
     files = {label: params.get("file") for label, params in results.layout.params.items()}
     return [
         label
         for label in results.layout.methods
-        if label != baseline and (names.get(label), files.get(label)) == (names.get(baseline), files.get(str(baseline)))
+        if label != baseline and (names.get(label), files.get(label)) == (names.get(baseline), files.get(baseline))
     ]
 
 

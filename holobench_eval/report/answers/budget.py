@@ -15,7 +15,7 @@ from .kind import Kind
 
 def families(results: Results) -> dict[str, list[str]]:
     """Rows by registered method, of methods with rows of different captures in total, fewest captures first."""
-    names = results.frame.drop_duplicates("method").set_index("method")["name"]
+    names = results.names
     condition, found = results.conditions[0], dict[str, list[str]]()
     for label in results.methods(condition):
         if label not in results.layout.privileged and results.is_complete(label, condition):

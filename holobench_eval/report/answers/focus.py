@@ -37,7 +37,7 @@ def _planes(results: Results) -> int:
 def _seconds(results: Results, label: str, condition: str) -> float:
     """Computing time of a scene [s]."""
     times = 1 if label in results.layout.stacked else _planes(results)
-    return times * float(results.row(label, condition)["seconds"])
+    return times * float(results.row(label, condition)["solving_s"])
 
 
 def _times(results: Results, label: str, condition: str) -> str:

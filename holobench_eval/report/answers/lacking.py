@@ -31,7 +31,7 @@ def lacking(results: Results) -> str:
         said = "No method is ranked, since none has every target"
     if results.layout.measure != FILES:
         return f"{said}: {_first(who, NAMED)}. {_by_the_others(results, lacks)}"
-    holes = results.holes[["state", "method", "target", "reason"]].itertuples(index=False, name=None)
+    holes = results.holes[["state", "label", "target", "reason"]].itertuples(index=False, name=None)
     way = remedies((str(state), str(method), str(target), str(reason)) for state, method, target, reason in holes)
     return f"{said}: {_first(who, NAMED)}. {_with_fewer(results, lacks, way)}"
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,7 +24,7 @@ from PIL import Image
 
 from .look.medium import DPI, medium
 
-QUALITIES = tuple(range(90, 20, -5))  # of a JPEG: the first that is small enough
+QUALITIES = range(90, 20, -5)  # of a JPEG: the first that is small enough
 LARGEST = 130_000  # bytes of a page of pictures
 FULL_COLOUR = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
@@ -109,12 +110,13 @@ def save_picture(pixels: NDArray[np.uint8], path: Path) -> None:
     if path.suffix.lower() == ".png":
         Image.fromarray(pixels).save(path, dpi=(DPI, DPI), optimize=True)
         return
-    for quality in QUALITIES:
-        settings = (*FULL_COLOUR, cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_QUALITY, quality)
-        encoded = cv2.imencode(".jpg", pixels[..., ::-1], settings)[1]
-        if encoded.size <= LARGEST:
-            break
-    path.write_bytes(encoded.tobytes())
+    chosen = bisect_left(QUALITIES, True, key=lambda quality: len(_jpeg(pixels, quality)) <= LARGEST)
+    path.write_bytes(_jpeg(pixels, QUALITIES[min(chosen, len(QUALITIES) - 1)]))
+
+
+def _jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
+    settings = (*FULL_COLOUR, cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_QUALITY, quality)
+    return cv2.imencode(".jpg", pixels[..., ::-1], settings)[1].tobytes()
 
 
 def slugs(names: Sequence[str]) -> dict[str, str]:

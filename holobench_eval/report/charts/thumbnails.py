@@ -73,5 +73,7 @@ class Thumbnails:
 def noted(scores: Sequence[Score], cell: pd.Series) -> str:
     """The scores of a cell for below its tile, which is narrow: that all are in focus stands there once."""
     focus = all(score.in_focus for score in scores)
-    values = (f"{score.name if focus else score.title} {score.with_unit(float(cell[score.key]))}" for score in scores)
+    values = (
+        f"{score.name if focus else score.title} {score.with_unit(float(cell[score.column]))}" for score in scores
+    )
     return ("in focus: " if focus else "") + "   ".join(values)

@@ -148,7 +148,7 @@ def compare(a: Run, b: Run, metric: str | None = None, displays: Mapping[str, st
             "--displays A=B pairs displays of different names"
         )
     clusters = clusters_in(b.records) | clusters_in(a.records)
-    groups = both.groupby(["method", f"{OWN}{A}", f"{OWN}{B}"], sort=False)
+    groups = both.groupby(["label", f"{OWN}{A}", f"{OWN}{B}"], sort=False)
     rows = _tested([_row(group, score, clusters) for _, group in groups], clusters)
     rows.sort(key=lambda row: (row.verdict != "worse", row.gain))
     unpaired = (*_unpaired("A", first, second), *_unpaired("B", second, first))
@@ -158,7 +158,7 @@ def compare(a: Run, b: Run, metric: str | None = None, displays: Mapping[str, st
 
 def _score(a: Run, b: Run, metric: str | None) -> Score:
     of_b = set(score_columns(b.records))
-    common = [key for key in score_columns(a.records) if key in of_b]
+    common = [parse(name).key for name in score_columns(a.records) if name in of_b]
     if not common:
         raise UserError(f"{a.folder} and {b.folder}: no score in common")
     if metric is not None and metric not in common:
@@ -183,7 +183,7 @@ def _cells(run: Run, score: Score, names: Mapping[str, str]) -> pd.DataFrame:
     """The cells of a run on the displays that are compared, a row each, the displays under their names in B."""
     rows = run.records[run.records["condition"].isin(names)]
     columns = {name: rows[name] for name in (*CELL, "cell", "state", "reason")}
-    values = rows[score.key].where(rows["state"] == DONE)
+    values = rows[score.column].where(rows["state"] == DONE)
     return pd.DataFrame({**columns, "condition": rows["condition"].map(names), OWN: rows["condition"], "value": values})
 
 
@@ -197,7 +197,7 @@ def _row(group: pd.DataFrame, score: Score, clusters: Mapping[str, str]) -> Row:
     a, b = (means[f"value{end}"].to_numpy(dtype=np.float64) for end in (A, B))
     change = mean_interval(b - a, [clusters.get(target, target) for target in targets])
     of_a, of_b = (str(group[f"{OWN}{end}"].iloc[0]) for end in (A, B))
-    method = str(group["method"].iloc[0])
+    method = str(group["label"].iloc[0])
     return Row(method, (of_a, of_b), targets, a, b, change, float("nan"), score.higher_is_better)
 
 
@@ -214,10 +214,10 @@ def _tested(rows: Sequence[Row], clusters: Mapping[str, str]) -> list[Row]:
 
 def _unpaired(run: str, cells: pd.DataFrame, others: pd.DataFrame) -> Iterator[Unpaired]:
     """What has a score in one run alone: ``cells`` of that run, ``others`` of the other one."""
-    pairs = set(zip(others["method"], others["condition"], strict=True))
+    pairs = set(zip(others["label"], others["condition"], strict=True))
     beside = _scored(cells).merge(others, on=list(CELL), how="left", suffixes=("", "_other"))
     alone = beside[beside["value_other"].isna()]
-    for (method, display), group in alone.groupby(["method", "condition"], sort=False):
+    for (method, display), group in alone.groupby(["label", "condition"], sort=False):
         states = group[group["state_other"].notna()]
         why = "no such target or repeat"
         if (method, display) not in pairs:

@@ -14,7 +14,7 @@ from ...study import provenance
 from ..data.tables import read_records
 
 # What names a cell in records.csv whatever code computed it: the same in two runs of a study.
-CELL = ("method", "condition", "target", "repeat")
+CELL = ("label", "condition", "target", "repeat")
 # What the provenance of a run says about its numbers; packages and displays are listed one by one.
 _FACTS = ("package", "revision", "dirty", "harness", "config", "config_sha256", "python", "platform", "cpu", "device")
 _UNKNOWN = "not recorded"

@@ -1,240 +1,352 @@
-"""The columns of records.csv, table.csv and tests.csv: their names, and what each holds.
+"""The columns of records.csv and table.csv, one list: what each holds, and where its values come from.
 
-Where a column has a unit, the unit is the last part of its name in a file: ``psnr_linear_lo_db``, ``solving_s``. Frames
-inside this package keep shorter names; :func:`file_name` and :func:`frame_name` translate.
+A function is a column: its name, its docstring the meaning that columns.md states, its value that of a record. Frames
+inside this package have the names of the files. Where a column has a unit, the unit is the last part of its name:
+``psnr_linear_lo_db``, ``solving_s``. A figure of a run is an entry of ``FIGURES`` and nothing else.
 """
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-from typing import Literal
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
 
 from ...display.simulated.changes import KINDS
-from .scores import DOMAIN_NAMES, METRICS, parse
-from .statistics import LEVEL
+from ...study.plan import REFERENCE
+from .categories import FLOOR
+from .column import DONE, Cells, Column, InTable, Record, column, first, if_known, if_trained, mean, median
+from .layout import Layout
+from .text import FILES
 
-File = Literal["records.csv", "table.csv", "tests.csv"]
-Kind = Literal["text", "number", "count"]  # count: a whole number
-PUBLISHED = "reported_"
-RATIO = "1"  # unit of a swept ratio
-
-# Names in frames and in files, where more than a unit differs.
-_RENAMED = {
-    "method": "label",
-    "name": "method",
-    "profile": "display",
-    "profile_version": "display_version",
-    "seconds": "solving_s",
-    "training_seconds": "training_s",
-    "track": "category",
-    "stopped": "stop_reason",
-}
-_ORIGINAL = {after: before for before, after in _RENAMED.items()}
-_SUFFIXES = tuple(f"_{metric.unit.lower()}" for metric in METRICS.values() if metric.unit)
-_BLUR, _BLUR_PX = re.compile(r"(_blur\d+(?:\.\d+)?)"), re.compile(r"(_blur\d+(?:\.\d+)?)px")
+Row = Mapping[Any, Any]  # of records.csv, as far as its records say
+CELL: list[Column] = []  # what a cell is, before the scores
+FIGURES: list[Column] = []  # what was measured beside scores, and its origin, after them
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column of a file. name: with its unit; kind: of its values; unit: empty for text and pure numbers."""
-
-    name: str
-    meaning: str
-    kind: Kind = "text"
-    unit: str = ""
+def identity_of(record: Record) -> str:
+    """The name of a record, which names its row and its thumbnail, too."""
+    return str(record["id"])
 
 
-def _columns(*columns: Column) -> dict[str, Column]:
-    return {column.name: column for column in columns}
+def timed(done: pd.DataFrame) -> pd.DataFrame:
+    """Of the done cells of a row those whose seconds count: what was solved alone if anything was, else all."""
+    alone = done[done["timed_alone"] == 1] if "timed_alone" in done else done
+    return done if alone.empty else alone
 
 
-_CHANGES = ", ".join(f"`{kind}`" for kind in KINDS)
-_ROW = _columns(
-    Column("study", "File name of the config without its ending; of scored folders, the folder of the report"),
-    Column(
-        "measure",
-        "What was scored: `picture` (captures against targets), `prediction` and `error_budget` (predictions against "
-        "captures), `focus` (planes of focal stacks), `files` (pictures that were given)",
-    ),
-    Column(
-        "display",
-        "Name of the display: a profile, a bench, or a trained network. Rows of the floor have the display whose "
-        "scored region they share",
-    ),
-    Column(
-        "condition",
-        "The display with what was changed on it, as report.md names it: the key that joins the three files. "
-        "`reference` for rows of the floor",
-    ),
-    Column("method", "Name of the method in configs"),
-    Column("label", "Name of the row in tables: a method with its parameters"),
-    Column(
-        "category",
-        "What the method knows of the display: `open loop`, `calibrated`, `online` (captures the scored image), "
-        "`ceiling` (oracle), `given` (pictures from files); `floor`: an image that no method made",
-    ),
-    Column(
-        "swept",
-        f"What was changed after the display was calibrated, if anything: {_CHANGES}; `plane` in focal stacks",
-    ),
-    Column("swept_value", "The change as a number; empty where the values are names", "number", "that of `swept_unit`"),
-    Column("swept_unit", f"Unit of `swept_value`; `{RATIO}` for a ratio, empty for the number of a draw or a panel"),
-    Column("swept_name", "The change where its values are names, such as a prescription"),
+def captures_behind(done: pd.DataFrame) -> float:
+    """Every capture behind the done cells of a row: those of the training once, and those of every target.
+
+    Repeats are averaged within a target, since only the measurement is repeated. NaN for no cells, and where no number
+    of captures is known.
+    """
+    if done.empty or done["captures"].isna().all():
+        return float("nan")
+    trained = done["training_captures"].mean() if "training_captures" in done else 0.0
+    return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())
+
+
+def _learned(record: Record, key: str, untrained: Any, unknown: Any) -> Any:
+    """A fact of the training behind a score, and what stands for it where nothing was trained or scored."""
+    return (record.get("learned") or {}).get(key, untrained) if record["state"] == DONE else unknown
+
+
+def _changed(cells: Cells, name: str) -> Any:
+    return getattr(cells.layout.change(cells.condition), name)
+
+
+def _one_line(text: object) -> str:
+    return " ".join(str(text).split())
+
+
+@column(CELL, is_of_study=True, table=InTable(first))
+def study(row: Row, layout: Layout) -> str:
+    """File name of the config without its ending; of scored folders, the folder of the report."""
+    return layout.study
+
+
+@column(CELL, is_of_study=True, table=InTable(first))
+def measure(row: Row, layout: Layout) -> str:
+    """What was scored: `picture` (captures against targets), `prediction` and `error_budget` (predictions against
+    captures), `focus` (planes of focal stacks), `files` (pictures that were given)."""
+    return layout.measure
+
+
+@column(CELL, table=InTable(first))
+def display(record: Record, layout: Layout) -> str:
+    """Name of the display: a profile, a bench, or a trained network. Rows of the floor have the display whose scored
+    region they share."""
+    return str(record["cell"].get("profile") or record["cell"]["condition"])
+
+
+@column(CELL, table=InTable(first))
+def condition(record: Record, layout: Layout) -> str:
+    """The display with what was changed on it, as report.md names it: the key that joins the three files. `reference`
+    for rows of the floor."""
+    return str(record["cell"]["condition"])
+
+
+@column(CELL, table=InTable(first))
+def method(record: Record, layout: Layout) -> str:
+    """Name of the method in configs."""
+    return str(record["cell"]["method"])
+
+
+@column(CELL, table=InTable(first))
+def label(record: Record, layout: Layout) -> str:
+    """Name of the row in tables: a method with its parameters."""
+    return str(record["label"])
+
+
+@column(CELL, table=InTable(first))
+def category(record: Record, layout: Layout) -> str:
+    """What the method knows of the display: `open loop`, `calibrated`, `online` (captures the scored image), `ceiling`
+    (oracle), `given` (pictures from files); `floor`: an image that no method made."""
+    return FLOOR if record["cell"]["condition"] == REFERENCE else layout.category(record["label"])
+
+
+@column(CELL, "count", is_of_study=True)
+def capture_limit(row: Row, layout: Layout) -> float:
+    """The most captures that the display allowed for a target; empty for no limit."""
+    return layout.capture_limits.get(row["label"], np.nan)
+
+
+@column(CELL, "count", is_of_study=True)
+def panel_height_px(row: Row, layout: Layout) -> float:
+    """Rows of the panel."""
+    return layout.panels.get(row["display"], (np.nan, np.nan))[0]
+
+
+@column(CELL, "count", is_of_study=True)
+def panel_width_px(row: Row, layout: Layout) -> float:
+    """Columns of the panel."""
+    return layout.panels.get(row["display"], (np.nan, np.nan))[1]
+
+
+@column(CELL, source=None)
+def parameters(cells: Cells, name: str) -> str:
+    """Parameters of the method as JSON, defaults filled in."""
+    return json.dumps(cells.layout.params.get(cells.label, {}), sort_keys=True, ensure_ascii=False)
+
+
+_KINDS = ", ".join(f"`{kind}`" for kind in KINDS)
+_SWEPT = f"What was changed after the display was calibrated, if anything: {_KINDS}; `plane` in focal stacks"
+
+
+@column(CELL, is_of_study=True, table=InTable(_changed), meaning=_SWEPT)
+def swept(row: Row, layout: Layout) -> str:
+    """The kind of a change."""
+    return layout.change(row["condition"], row["target"]).swept
+
+
+@column(CELL, "number", is_of_study=True, table=InTable(_changed), unit="that of `swept_unit`")
+def swept_value(row: Row, layout: Layout) -> float:
+    """The change as a number; empty where the values are names."""
+    return layout.change(row["condition"], row["target"]).swept_value
+
+
+@column(CELL, is_of_study=True, table=InTable(_changed))
+def swept_unit(row: Row, layout: Layout) -> str:
+    """Unit of `swept_value`; `1` for a ratio, empty for the number of a draw or a panel."""
+    return layout.change(row["condition"], row["target"]).swept_unit
+
+
+@column(CELL, is_of_study=True, table=InTable(_changed))
+def swept_name(row: Row, layout: Layout) -> str:
+    """The change where its values are names, such as a prescription."""
+    return layout.change(row["condition"], row["target"]).swept_name
+
+
+@column(CELL)
+def target(record: Record, layout: Layout) -> str:
+    """Name of the image."""
+    return str(record["cell"]["target"])
+
+
+@column(CELL)
+def cluster(record: Record, layout: Layout) -> str:
+    """What the target shares with others, such as the photograph of a crop; else the target itself."""
+    return layout.clusters.get(record["cell"]["target"], record["cell"]["target"])
+
+
+@column(CELL, "count")
+def repeat(record: Record, layout: Layout) -> int:
+    """Number of the measurement, from 0; repeats differ by their noise."""
+    return int(record["cell"].get("repeat", 0))
+
+
+@column(CELL, "count", is_of_study=True)
+def seed(row: Row, layout: Layout) -> int:
+    """Seed of the study."""
+    return layout.seed
+
+
+@column(CELL)
+def state(record: Record, layout: Layout) -> str:
+    """`done`, `failed`, `skipped`, `unavailable` or `missing`."""
+    return str(record["state"])
+
+
+@column(CELL)
+def reason(record: Record, layout: Layout) -> str:
+    """Why a cell has no score."""
+    return _one_line(record.get("reason", ""))
+
+
+@column(CELL, "count", source=None)
+def n(cells: Cells, name: str) -> int:
+    """Targets with a score."""
+    return int(cells.done["target"].nunique())
+
+
+@column(CELL, "count", source=None)
+def failed(cells: Cells, name: str) -> int:
+    """Cells without a score."""
+    return len(cells.cells) - len(cells.done)
+
+
+@column(CELL, "count", source=None)
+def clusters(cells: Cells, name: str) -> int:
+    """Clusters of the targets with a score."""
+    return int(cells.done["cluster"].nunique())
+
+
+_CAPTURES = InTable(mean, "Captures while solving, mean over cells", "number")
+_SOLVING = "Time to solve a target, mean over the cells timed alone, or over all"
+_TRAINING = InTable(mean, "Captures of the training, once for all targets", "number")
+_LEARNED = "Digests of what was learned, with spaces between them"
+
+
+@column(FIGURES, "count", table=_CAPTURES, heading="captures per {each}")
+def captures(record: Record, layout: Layout) -> int | None:
+    """Captures that the method took while it solved the target, those of attempts that failed included."""
+    return None if layout.measure == FILES else record.get("captures")  # of somebody else, it is not known
+
+
+@column(
+    FIGURES,
+    "number",
+    table=InTable(lambda row, name: timed(row.done)[name].mean(), _SOLVING),
+    heading="seconds per {each}",
 )
-_RECORD = _columns(
-    Column("capture_limit", "The most captures that the display allowed for a target; empty for no limit", "count"),
-    Column("panel_height_px", "Rows of the panel", "count", "px"),
-    Column("panel_width_px", "Columns of the panel", "count", "px"),
-    Column("target", "Name of the image"),
-    Column("cluster", "What the target shares with others, such as the photograph of a crop; else the target itself"),
-    Column("repeat", "Number of the measurement, from 0; repeats differ by their noise", "count"),
-    Column("seed", "Seed of the study", "count"),
-    Column("state", "`done`, `failed`, `skipped`, `unavailable` or `missing`"),
-    Column("reason", "Why a cell has no score"),
-    Column("stop_reason", "Why the display ended the method before it was done"),
-    Column("fell_back", "`yes` where a trained method fell back to Wirtinger holography, else empty"),
-    Column("captures", "Captures that the method took while it solved the target", "count"),
-    Column("solving_s", "Time to solve the target", "number", "s"),
-    Column("registration_residual_px", "Rms residual of registration, in pixels of the scored region", "number", "px"),
-    Column("saturated", "Share of the capture's samples at full scale", "number"),
-    Column("memory_mib", "Most memory that solving took beyond what was in use before", "number", "MiB"),
-    Column("timed_alone", "1 where nothing else was at work beside the solution, else 0", "count"),
-    Column("training_captures", "Captures that the method's training took, once for all targets", "count"),
-    Column("training_s", "Time that the training took", "number", "s"),
-    Column("learned_sha256", "Digest of what was learned; empty for untrained methods"),
-    Column("cell", "Digest of everything that the number depends on: the name of its record"),
-    Column("exposure", "`equal` light for all methods, or `matched` brightness"),
-    Column("display_version", "Version of the profile"),
-    Column("protocol", "Version of the metric protocol"),
-)
-_INTERVAL = f"{100 * LEVEL:.0f} % interval over clusters of targets"
-_TABLE = _columns(
-    Column("parameters", "Parameters of the method as JSON, defaults filled in"),
-    Column("n", "Targets with a score", "count"),
-    Column("failed", "Cells without a score", "count"),
-    Column("clusters", "Clusters of the targets with a score", "count"),
-    Column("captures", "Captures while solving, mean over cells", "number"),
-    Column("solving_s", "Time to solve a target, mean over the cells timed alone, or over all", "number", "s"),
-    Column("training_captures", "Captures of the training, once for all targets", "number"),
-    Column("training_s", "Time of the training", "number", "s"),
-    Column("learned_sha256", "Digests of what was learned, with spaces between them"),
-    Column("memory_mib", "Memory of solving, median over cells", "number", "MiB"),
-    Column("total_captures", "All captures behind the row: of the training, and of every target", "number"),
-    Column("rank", "Place by the mean headline score among the rows of its display and category", "count"),
-)
-_TEST = _columns(
-    *(_ROW[name] for name in ("study", "measure", "display", "condition")),
-    Column("method", "Name of the tested method in configs"),
-    Column("label", "Name of its row in tables"),
-    Column("baseline", "Label of the row that it is compared with"),
-    Column("metric", "The score that is compared: a column of records.csv"),
-    Column("n", "Targets with a score of both", "count"),
-    Column("clusters", "Their clusters", "count"),
-    Column("better", "Targets with a better score than the baseline's", "count"),
-    Column(
-        "p_adjusted",
-        "Two-sided p of the mean difference, sign-flip max-t over clusters, adjusted for all tests of the study; "
-        "empty: not tested",
-        "number",
-    ),
-)
-_DIFFERENCES = {
-    "difference": "Score minus that of the baseline, mean over targets",
-    "difference_lo": f"Lower end of its {_INTERVAL}, of one comparison and not adjusted",
-    "difference_hi": "Upper end of that interval",
-    "difference_median": "Median of the differences over targets",
-}
-_FILES: dict[File, dict[str, Column]] = {"records.csv": _ROW | _RECORD, "table.csv": _ROW | _TABLE, "tests.csv": _TEST}
-
-# Scores that are not image metrics: meaning, unit.
-_WHITE = "white^2"
-_FIGURES = {
-    "brightness_ratio": ("Mean of the capture over mean of the target, before the intensity match", ""),
-    "efficiency": ("Light in the scored region over light on the panel", ""),
-    "refine_dx_px": ("Horizontal motion that the refinement found", "px"),
-    "refine_dy_px": ("Vertical motion that the refinement found", "px"),
-    "refine_theta_deg": ("Rotation that the refinement found", "deg"),
-    "scale_0": ("Factor of the intensity match, red", ""),
-    "scale_1": ("Factor of the intensity match, green", ""),
-    "scale_2": ("Factor of the intensity match, blue", ""),
-    "second_aligner_px": (
-        "Most that a corner of the target lies elsewhere in the capture by a second aligner",
-        "px",
-    ),
-    "share_scored": ("Share of the target that is scored, which all its captures show", ""),
-    "share_seen": ("Share of the target that its capture shows", ""),
-    "speckle_contrast": ("Standard deviation over mean of intensity in flat patches of the target", ""),
-    "unexplained_by_target": ("Squared error of the capture that the target leaves, white being 1", _WHITE),
-    "unexplained_by_ideal_image": ("The same that the ideal image of the hologram leaves", _WHITE),
-    "unexplained": ("The same that the method's prediction leaves", _WHITE),
-    "unexplained_but_noise": ("The same that the picture without temporal noise would leave", _WHITE),
-    "error_of_ideal_image": ("Squared error of the ideal image against the target", _WHITE),
-}
-_VARIANTS = {
-    "refined": "after a rigid motion of at most 2 px and 0.1 degree",
-    "infocus": "of what is in focus at the plane",
-    "second": "by a second, independent registration",
-}
-_STATISTICS = {
-    "_lo": f"lower end of the {_INTERVAL}",
-    "_hi": f"upper end of the {_INTERVAL}",
-    "_median": "median over targets",
-}
+def solving_s(record: Record, layout: Layout) -> float | None:
+    """Time to solve the target, of the solving that made the phase, in this run or an earlier one."""
+    return record.get("seconds")
 
 
-def file_name(name: str) -> str:
-    """The name in files of a column of a frame."""
-    if name in _RENAMED:
-        return _RENAMED[name]
-    unit = parse(name.removeprefix(PUBLISHED)).unit
-    return _BLUR.sub(r"\1px", name) + (f"_{unit.lower()}" if unit else "")
+@column(FIGURES, "number")
+def registration_residual_px(record: Record, layout: Layout) -> float | None:
+    """Rms residual of registration, in pixels of the scored region."""
+    return record.get("registration_residual_px")
 
 
-def frame_name(name: str) -> str:
-    """The name in frames of a column of a file; inverse of :func:`file_name`."""
-    if name in _ORIGINAL:
-        return _ORIGINAL[name]
-    stem = next((name.removesuffix(suffix) for suffix in _SUFFIXES if name.endswith(suffix)), name)
-    return _BLUR_PX.sub(r"\1", stem)
+@column(FIGURES, "number")
+def saturated(record: Record, layout: Layout) -> float | None:
+    """Share of the capture's samples at full scale."""
+    return record.get("saturated")
 
 
-def column(file: File, name: str) -> Column | None:
-    """What a column of a file holds; None for one that the dictionary lacks."""
-    if name in _FILES[file]:
-        return _FILES[file][name]
-    stem = frame_name(name)
-    if file == "tests.csv":
-        unit = name.removeprefix(stem).removeprefix("_")
-        return Column(name, _DIFFERENCES[stem], "number", _unit(unit)) if stem in _DIFFERENCES else None
-    if file == "table.csv" and stem.startswith(PUBLISHED):
-        unit = parse(stem.removeprefix(PUBLISHED)).unit
-        return Column(name, "Published figure of the metric, of other hardware and images", "number", unit)
-    mean = "mean over targets" if file == "table.csv" else ""
-    for suffix, meaning in _STATISTICS.items() if mean else ():
-        if stem.endswith(suffix):
-            stem, mean = stem.removesuffix(suffix), meaning
-    return _score(name, stem, mean)
+@column(FIGURES, "number", kept=if_known)
+def memory_mib(record: Record, layout: Layout) -> float | None:
+    """Most memory that solving took beyond what was in use before."""
+    return record.get("memory_mib")
 
 
-def _score(name: str, key: str, statistic: str) -> Column | None:
-    """A score's column. key: without unit and statistic; statistic: over targets, empty for single cells."""
-    score = parse(key)
-    if key in _FIGURES:
-        parts, unit = [_FIGURES[key][0]], _FIGURES[key][1]
-    elif score.metric in METRICS and score.domain:
-        parts, unit = [f"{score.title} in {DOMAIN_NAMES[score.domain]}"], score.unit
-        if score.blur is not None:
-            parts.append(f"both pictures blurred by a Gaussian of standard deviation {score.blur:g} px")
-        elif score.variant:
-            if score.variant not in _VARIANTS:
-                return None
-            parts.append(_VARIANTS[score.variant])
-    else:
-        return None
-    return Column(name, ", ".join([*parts, *filter(None, [statistic])]), "number", unit)
+@column(FIGURES, "count", kept=if_known)
+def timed_alone(record: Record, layout: Layout) -> bool | None:
+    """1 where nothing else was at work beside the solution, else 0."""
+    return record.get("alone")
 
 
-def _unit(lower: str) -> str:
-    """A metric's unit as it is written, from the end of a column's name."""
-    return next((metric.unit for metric in METRICS.values() if metric.unit.lower() == lower), "")
+@column(FIGURES, "count", kept=if_trained, table=_TRAINING, heading="captures for training")
+def training_captures(record: Record, layout: Layout) -> int | None:
+    """Captures that the method's training took, once for all targets."""
+    return _learned(record, "captures", 0, None)
+
+
+@column(FIGURES, "number", kept=if_trained, table=InTable(mean, "Time of the training"), heading="seconds of training")
+def training_s(record: Record, layout: Layout) -> float | None:
+    """Time that the training took."""
+    return _learned(record, "seconds", 0, None)
+
+
+@column(FIGURES, kept=if_trained, table=InTable(lambda row, name: " ".join(sorted({*row.done[name]} - {""})), _LEARNED))
+def learned_sha256(record: Record, layout: Layout) -> str:
+    """Digest of what was learned; empty for untrained methods."""
+    return str(_learned(record, "sha256", "", ""))
+
+
+_MEMORY = "Memory of solving, median over cells"  # a method's first solution also loads libraries
+FIGURES.append(Column("memory_mib", _MEMORY, "number", "MiB", table=InTable(median), heading="memory [MiB]"))
+
+
+@column(FIGURES, "number", source=None, heading="captures in total")
+def total_captures(cells: Cells, name: str) -> float:
+    """All captures behind the row: of the training, and of every target."""
+    return captures_behind(cells.done)
+
+
+@column(FIGURES, "count", source=None)
+def rank(cells: Cells, name: str) -> float:
+    """Place by the mean headline score among the rows of its display and category."""
+    return float("nan")  # known once all rows are
+
+
+@column(FIGURES, kept=if_known)
+def stop_reason(record: Record, layout: Layout) -> str:
+    """Why the display ended the method before it was done."""
+    return _one_line(record.get("stopped", ""))
+
+
+@column(FIGURES, kept=if_known)
+def fell_back(record: Record, layout: Layout) -> str:
+    """`yes` where a trained method fell back to Wirtinger holography, else empty."""
+    return "yes" if (record.get("learned") or {}).get("fell_back") else ""
+
+
+@column(FIGURES)
+def cell(record: Record, layout: Layout) -> str:
+    """Name of the capture: the digest of all that it depends on."""
+    return identity_of(record)
+
+
+@column(FIGURES)
+def exposure(record: Record, layout: Layout) -> str:
+    """`equal` light for all methods, or `matched` brightness."""
+    return str(record["cell"].get("exposure", ""))
+
+
+@column(FIGURES)
+def display_version(record: Record, layout: Layout) -> str:
+    """Version of the profile."""
+    return str(record["cell"].get("profile_version", ""))
+
+
+@column(FIGURES)
+def protocol(record: Record, layout: Layout) -> str:
+    """Version of the metric protocol."""
+    return str(record["cell"].get("protocol", ""))
+
+
+def recorded() -> list[Column]:
+    """The columns of records.csv, in their order and without the scores."""
+    return [column for column in (*CELL, *FIGURES) if column.source]
+
+
+def tabled() -> list[Column]:
+    """The columns of table.csv without the scores, with what they mean there."""
+    return [
+        replace(column, meaning=column.table.meaning or column.meaning, kind=column.table.kind or column.kind)
+        for column in (*CELL, *FIGURES)
+        if column.table
+    ]
+
+
+def costs(table: pd.DataFrame, each: str) -> dict[str, str]:
+    """Headings of the known figures of a table that have one. each: what a method makes for a target."""
+    headed = [column for column in FIGURES if column.heading and column.name in table]
+    return {column.name: column.heading.format(each=each) for column in headed if table[column.name].notna().any()}

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
 
 from ...study.plan import Plan
-from .tables import (
-    ALONE_COLUMN,
-    FELL_BACK_COLUMN,
-    LEARNED_COLUMN,
-    MEASURED_COLUMNS,
-    MEMORY_COLUMN,
-    STOPPED_COLUMN,
-    score_columns,
-)
+from .scores import parse
+from .tables import score_columns
 
 
 def difference(frame: pd.DataFrame, plan: Plan) -> str:
@@ -34,31 +26,19 @@ def committed_records(frame: pd.DataFrame, plan: Plan) -> list[dict[str, Any]]:
     frame: a records frame that has all of them, see ``difference``.
     """
     rows = {row["cell"]: row for row in frame.to_dict("records")}
-    scores = score_columns(frame)
-    # In the order of the keys of a record's file, in which a report lists parameters.
-    cells = ((label, cell.id, json.dumps(cell.description(), sort_keys=True)) for label, cell in plan.labelled())
-    return [_record(json.loads(described), label, rows[identity], scores) for label, identity, described in cells]
+    scores = {parse(name).key: name for name in score_columns(frame)}
+    return [_record(cell.facts(), label, rows[cell.id], scores) for label, cell in plan.labelled()]
 
 
-def _record(cell: dict[str, Any], label: str, row: Mapping[Any, Any], scores: list[str]) -> dict[str, Any]:
-    def known(column: str) -> Any:
-        value = row.get(column)
-        return None if value is None or pd.isna(value) else value
-
-    learned = {
-        "sha256": known(LEARNED_COLUMN),
-        "captures": known("training_captures"),
-        "seconds": known("training_seconds"),
-        "fell_back": row.get(FELL_BACK_COLUMN) == "yes",
-    }
+def _record(cell: dict[str, Any], label: str, row: Mapping[Any, Any], scores: Mapping[str, str]) -> dict[str, Any]:
+    """What a report asks records for; the numbers of its tables come from ``row``."""
+    sha256 = row.get("learned_sha256")
     return {
+        "id": row["cell"],
         "cell": cell,
         "label": label,
         "state": row["state"],
-        "reason": row["reason"],
-        "scores": {key: row[key] for key in scores if known(key) is not None},
-        **{column: known(column) for column in (*MEASURED_COLUMNS, MEMORY_COLUMN)},
-        "alone": known(ALONE_COLUMN),
-        "stopped": row.get(STOPPED_COLUMN, ""),
-        "learned": learned if learned["sha256"] else None,
+        "scores": {key: row[name] for key, name in scores.items() if not pd.isna(row[name])},
+        "learned": {"sha256": sha256} if sha256 else None,
+        "row": {**row, "label": label},
     }

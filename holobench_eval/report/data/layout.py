@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 from ...core import plugins
 from ...datasets.base import clusters_of
-from ...display.simulated.changes import draws
+from ...display.simulated.changes import KINDS, draws
 from ...display.simulated.profile import load_profile
+from ...display.traits import traits_of
 from ...study import isolation
 from ...study.definition import PREDICTIONS, Study
 from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
+from ...study.plan import REFERENCE
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .text import FILES, Text, plain, text_of
+
+RATIO = "1"  # unit of a swept ratio
+
+
+class Change(NamedTuple):
+    """What was changed on a display, as the files say it: a number with its unit, or a name."""
+
+    swept: str = ""
+    swept_value: float = math.nan
+    swept_unit: str = ""
+    swept_name: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,6 +61,13 @@ class Swept:
     before: str
     points: tuple[tuple[float | str, str], ...]
     drawn: tuple[Mapping[str, float], ...] = ()
+
+    def change(self, value: float | str) -> Change:
+        """What was changed at a point."""
+        kind = KINDS[self.kind]
+        if not (kind.numeric or kind.counted):
+            return Change(self.kind, swept_name=str(value))
+        return Change(self.kind, float(f"{float(value):.6g}"), RATIO if kind.unit.startswith("of ") else kind.unit)
 
 
 @dataclass(frozen=True)
@@ -161,6 +183,17 @@ class Layout:
         """Conditions that are a change of another."""
         return frozenset(condition for sweep in self.sweeps for _, condition in sweep.points)
 
+    @cached_property
+    def _changes(self) -> dict[str, Change]:
+        """By condition."""
+        return {condition: sweep.change(value) for sweep in self.sweeps for value, condition in sweep.points}
+
+    def change(self, condition: str, target: str = "") -> Change:
+        """What was changed under a condition; the plane of a target of a focal stack is a change of its display."""
+        if condition in self._changes or condition == REFERENCE or target not in self.planes:
+            return self._changes.get(condition, Change())
+        return Change("plane", self.planes[target][1], "mm")
+
     @property
     def reported_metrics(self) -> tuple[str, ...]:
         """Names of the published figures, in the order in which the config first names them."""
@@ -172,12 +205,8 @@ def layout_of(study: Study) -> Layout:
     reported = study.reported
     conditions = displays(study)
     names = {source: condition.name for source, condition in conditions.items()}
-    methods = {entry.label: isolation.find(entry.name, study.folder) for entry in study.methods}
-
-    def labels_with(attribute: str) -> frozenset[str]:
-        return frozenset(label for label, method in methods.items() if getattr(method, attribute, False))
-
-    trained = labels_with("trains")
+    traits = {entry.label: isolation.traits(entry.name, study.folder) for entry in study.methods}
+    trained = frozenset(label for label, method in traits.items() if method.trains)
     probe = study.holograms
     return Layout(
         title=study.title,
@@ -192,14 +221,14 @@ def layout_of(study: Study) -> Layout:
         headline=study.headline,
         baseline=study.baseline,
         second_baseline=study.second_baseline or None,
-        privileged=labels_with("privileged"),
+        privileged=frozenset(label for label, method in traits.items() if method.privileged),
         reported=reported.rows if reported else {},
         reported_source=reported.source if reported else "",
         reported_beside=names[reported.beside] if reported and reported.beside else None,
         question=study.question,
         would_change=study.would_change,
         about=_about(study, conditions),
-        tuned={label: method.tuned for label, method in methods.items() if hasattr(method, "tuned")},
+        tuned={label: method.tuned for label, method in traits.items() if method.tuned is not None},
         note=study.note,
         measure=study.measure,
         metrics=study.protocol.metrics,
@@ -208,12 +237,12 @@ def layout_of(study: Study) -> Layout:
         trained=trained,
         identities=frozenset(entry.label for entry in study.methods if _network(entry.params) == "identity"),
         training=_training_set(study) if trained or study.display.learned else None,
-        camera=labels_with("camera"),
+        camera=frozenset(label for label, method in traits.items() if method.camera),
         sweeps=tuple(_sweeps(study, conditions)),
         planes=planes_of(study.dataset, study.targets.dataset) if study.measure == "focus" else {},
         real=study.display.real,
         clusters=clusters_of(study.dataset),
-        stacked=labels_with("planes") if study.measure == "focus" else frozenset(),
+        stacked=frozenset(label for label, method in traits.items() if method.planes and study.measure == "focus"),
         study=study.name,
         params={entry.label: entry.params for entry in study.methods},
         capture_limits={entry.label: entry.captures for entry in study.methods if entry.captures is not None},
@@ -228,7 +257,7 @@ def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
         entry.label: (inspect.getdoc(cls) or "").partition("\n\n")[0]
         for entry in study.methods
         for cls in [isolation.find(entry.name, study.folder)]
-        if entry.label == entry.name.rpartition(":")[2] or hasattr(cls, "files")  # phases that others have made
+        if entry.label == entry.name.rpartition(":")[2] or "files" in traits_of(cls).functions  # others made the phases
     }
     profiles = {
         condition.name: load_profile(source, study.folder).description

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from ...study.plan import REFERENCE
 from .results import Results
-from .tables import FELL_BACK_COLUMN
 from .text import words
 
 CONSTANT = "floor_constant"
@@ -25,7 +24,7 @@ def counted(results: Results, label: str, condition: str) -> str:
 
 def _marks(results: Results, label: str, condition: str) -> Iterator[str]:
     cells = results.cells(label, condition)
-    if FELL_BACK_COLUMN in cells and (cells[FELL_BACK_COLUMN] != "").any():
+    if "fell_back" in cells and (cells["fell_back"] != "").any():
         yield "fell back to Wirtinger"
     if results.layout.measure == "prediction" and (below := _below(results, label, condition)):
         yield f"not trained to convergence: below {words(below)}"

@@ -37,12 +37,12 @@ class Results:
     @cached_property
     def scores(self) -> list[Score]:
         """Every score of the records, in the order of the tables."""
-        return [parse(key) for key in score_columns(self.frame)]
+        return [parse(name) for name in score_columns(self.frame)]
 
     @cached_property
     def headline(self) -> Score:
         """The headline metric. UserError when no record has it, though some were scored."""
-        keys = score_columns(self.frame)
+        keys = [score.key for score in self.scores]
         if keys and self.layout.headline not in keys:
             plain = [score.key for score in self.scores if score.domain and not score.variant]
             raise UserError(
@@ -81,8 +81,8 @@ class Results:
     @cached_property
     def names(self) -> dict[str, str]:
         """The registered name of every method, or its file and class, by label."""
-        rows = self.frame.drop_duplicates("method")
-        return {str(label): str(name) for label, name in zip(rows["method"], rows["name"], strict=True)}
+        rows = self.frame.drop_duplicates("label")
+        return dict(zip(rows["label"], rows["method"], strict=True))
 
     @cached_property
     def clusters(self) -> NDArray[np.str_]:
@@ -121,27 +121,31 @@ class Results:
     @cached_property
     def _rows(self) -> dict[tuple[str, str], pd.Series]:
         """The rows of the table, in its order."""
-        return {(row["method"], row["condition"]): row for _, row in self.table.iterrows()}
+        return {(row["label"], row["condition"]): row for _, row in self.table.iterrows()}
 
     def cells(self, label: str, condition: str) -> pd.DataFrame:
         """The records of a method under a condition."""
-        return self._groups.get((label, condition), self.frame.iloc[:0])
+        found = self._groups.get((label, condition))
+        return self.frame.iloc[:0] if found is None else found
 
     @cached_property
     def _groups(self) -> dict[tuple[str, str], pd.DataFrame]:
-        return {(str(label), str(name)): rows for (label, name), rows in self.frame.groupby(["method", "condition"])}
+        return {(str(label), str(name)): rows for (label, name), rows in self.frame.groupby(["label", "condition"])}
 
     def values(self, label: str, condition: str, key: str | None = None) -> Array:
         """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
-        means, column = self._means.get((label, condition)), key or self.headline.key
-        if means is None or column not in means:
-            return np.full(len(self.targets), np.nan)
-        return means[column].to_numpy(dtype=np.float64)
+        column = (parse(key) if key else self.headline).column
+        found = self._means.get((label, condition), {}).get(column)
+        return np.full(len(self.targets), np.nan) if found is None else found
 
     @cached_property
-    def _means(self) -> dict[tuple[str, str], pd.DataFrame]:
-        """Every number of a method under a condition, a row for each of ``targets``."""
-        return {pair: per_target(rows).reindex(self.targets) for pair, rows in self._groups.items()}
+    def _means(self) -> dict[tuple[str, str], dict[str, Array]]:
+        """Every number of a method under a condition, a value for each of ``targets``."""
+        return {
+            pair: {str(name): means[name].to_numpy(dtype=np.float64) for name in means}
+            for pair, rows in per_target(self.frame).items()
+            for means in [rows.reindex(self.targets)]
+        }
 
     def is_complete(self, label: str, condition: str, key: str | None = None) -> bool:
         """Whether a method has a value for every target: only then may its mean be compared."""
@@ -204,7 +208,7 @@ class Results:
     def floors(self) -> list[str]:
         """Names of the reference rows that have a headline score."""
         rows = (name for name in FLOORS if name in self.methods(REFERENCE))
-        return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.key])]
+        return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.column])]
 
     def has_floor(self, condition: str) -> bool:
         """Whether the reference rows were scored against the same images as the methods under ``condition``.
@@ -218,7 +222,7 @@ class Results:
 
         The reference rows make them: for predictions, captures of one display.
         """
-        captured = self.frame.loc[self.frame["condition"] == REFERENCE, "profile"]
+        captured = self.frame.loc[self.frame["condition"] == REFERENCE, "display"]
         return not self.layout.predicts or condition in set(captured)
 
     @cached_property

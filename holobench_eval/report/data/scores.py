@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pandas as pd
 
-from ...metrics.catalogue import catalogue, direction
+from ...metrics.catalogue import catalogue
 from .statistics import Estimate
 
 DOMAINS = ("linear", "amplitude", "srgb", "stored")
@@ -20,11 +21,16 @@ _FACTORS = {"scale_0": "match factor (red)", "scale_1": "match factor (green)", 
 
 _PATTERN = re.compile(rf"(?P<metric>\w+?)_(?P<domain>{'|'.join(DOMAINS)})(?:_(?P<variant>\w[\w.]*))?")
 _BLUR = re.compile(r"blur_?(?P<width>\d+(?:[.p]\d+)?)")
+_WIDTH = re.compile(r"(_blur\d+(?:\.\d+)?)(?:px)?")
+_SUFFIXES = tuple({f"_{metric.unit.lower()}" for metric in METRICS.values() if metric.unit})
 
 
 @dataclass(frozen=True)
 class Score:
-    """A score key in its parts; ``domain`` is empty for figures that are not image metrics, such as an efficiency."""
+    """A score key in its parts; ``domain`` is empty for figures that are not image metrics, such as an efficiency.
+
+    A key is what configs and records say, ``psnr_linear``; a column of a frame or file has its unit, too.
+    """
 
     key: str
     metric: str
@@ -53,6 +59,20 @@ class Score:
         return METRICS[self.metric].unit if self.metric in METRICS else ""
 
     @property
+    def suffix(self) -> str:
+        """The end of its columns: ``_db``, empty for pure numbers."""
+        return f"_{self.unit.lower()}" if self.unit else ""
+
+    @cached_property
+    def column(self) -> str:
+        """Its column in frames and files: ``psnr_linear_blur1px_db``."""
+        return self.statistic("")
+
+    def statistic(self, end: str) -> str:
+        """The column of a statistic over targets, which ``end`` says: ``psnr_linear_lo_db``."""
+        return _WIDTH.sub(r"\1px", self.key) + end + self.suffix
+
+    @property
     def axis(self) -> str:
         """Title with domain and unit, for an axis or a sentence: ``PSNR, linear light [dB]``."""
         domain = f", {DOMAIN_NAMES[self.domain]}" if self.domain else ""
@@ -66,7 +86,9 @@ class Score:
     @property
     def higher_is_better(self) -> bool:
         """The direction of the metric."""
-        return direction(self.key) != "lower"
+        if self.metric in METRICS:
+            return METRICS[self.metric].direction == "higher"
+        return self.key != "speckle_contrast"
 
     @property
     def blur(self) -> float | None:
@@ -97,19 +119,38 @@ class Score:
 
     def mean_in(self, row: pd.Series) -> str:
         """Mean of the score in a row of the table."""
-        return self.number(row[self.key])
+        return self.number(row[self.column])
 
     def in_row(self, row: pd.Series) -> str:
         """Mean and interval of the score in a row of the table."""
-        return self.interval(row[self.key], row[f"{self.key}_lo"], row[f"{self.key}_hi"])
+        return self.interval(*self.ends(row))
+
+    @property
+    def columns(self) -> tuple[str, str, str]:
+        """The columns of its mean in the table, and of the ends of the interval."""
+        return self.column, self.statistic("_lo"), self.statistic("_hi")
+
+    def ends(self, row: pd.Series) -> tuple[float, float, float]:
+        """Mean of the score in a row of the table, and the ends of its interval."""
+        mean, low, high = (float(row[name]) for name in self.columns)
+        return mean, low, high
 
     def better(self, a: float, b: float) -> bool:
         """Is ``a`` better than ``b``?"""
         return a > b if self.higher_is_better else a < b
 
 
-def parse(key: str) -> Score:
-    """A score key in its parts."""
+@lru_cache(maxsize=1024)
+def parse(name: str) -> Score:
+    """A score in its parts, from its key or from its column."""
+    key = _WIDTH.sub(r"\1", name)
+    for suffix in _SUFFIXES:
+        if key.endswith(suffix) and (score := _parts(key.removesuffix(suffix))).suffix == suffix:
+            return score
+    return _parts(key)
+
+
+def _parts(key: str) -> Score:
     match = _PATTERN.fullmatch(key)
     if match is None:
         return Score(key, key)
@@ -117,7 +158,7 @@ def parse(key: str) -> Score:
 
 
 def order_scores(keys: Iterable[str]) -> list[str]:
-    """Score keys in the order of tables: plain before variants, metrics as in their catalogue, linear light first."""
+    """Scores in the order of tables: plain before variants, metrics as in their catalogue, linear light first."""
     known = [metric.name for metric in catalogue()]
 
     def rank(key: str) -> tuple[bool, bool, str, int, int, str]:

@@ -96,6 +96,7 @@ def ratio_interval(numerator: Array, denominator: Array, clusters: Clusters | No
     return Estimate(ratio, float((cross - half) / square), float((cross + half) / square), n, count)
 
 
+@lru_cache(maxsize=1024)
 def _quantile(clusters: int) -> float:
     """Of Student's t; NaN for too few clusters."""
     return float(stats.t.ppf((1 + LEVEL) / 2, clusters - 1)) if clusters >= FEWEST else np.nan

@@ -7,21 +7,21 @@ from pathlib import Path
 import pandas as pd
 
 from ...core.io import write_atomically
-from ..data.columns import File
+from ..data.comparisons import comparison_frame
+from ..data.meanings import File
 from ..data.results import Results
 from ..data.tables import csv_text
 from .dictionary import dictionary
 from .latex import latex_tables
 from .parquet import is_available, write_parquet
-from .tidy import tidy_records, tidy_table, tidy_tests
 
 
 def texts(results: Results) -> dict[str, str]:
     """The text of every file but the Parquet twin, by its name."""
     frames: dict[File, pd.DataFrame] = {
-        "records.csv": tidy_records(results.frame, results.layout),
-        "table.csv": tidy_table(results),
-        "tests.csv": tidy_tests(results),
+        "records.csv": results.frame,
+        "table.csv": results.table,
+        "tests.csv": comparison_frame(results),
     }
     written = {str(name): csv_text(frame) for name, frame in frames.items()}
     return written | {"columns.md": f"{dictionary(frames)}\n", "table.tex": latex_tables(results)}
@@ -33,6 +33,6 @@ def write_files(results: Results, output: Path) -> None:
         write_atomically(output / name, text.encode())
     parquet = output / "records.parquet"
     if is_available():
-        write_parquet(parquet, tidy_records(results.frame, results.layout))
+        write_parquet(parquet, results.frame)
     else:
         parquet.unlink(missing_ok=True)  # of other records

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from ..data.columns import Column, File, column
+from ..data.column import Column
+from ..data.meanings import File, column
 from ..markdown import Markdown, blocks, code, heading, table
 
 _UNKNOWN = "Not described"

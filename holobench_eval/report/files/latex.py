@@ -90,7 +90,7 @@ def _columns(results: Results, condition: str) -> Iterator[_Column]:
         "method",
         [_label(marked(results, label, condition)) for label in labels],
     )
-    means = [(row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"]) for row in rows]
+    means = [score.ends(row) for row in rows]
     yield _pair(score, f"{escape(score.title)}{unit}", means)
     if tests := _tests(results, condition):
         estimates = {label: test.estimate for label, test in tests.items()}
@@ -106,7 +106,7 @@ def _columns(results: Results, condition: str) -> Iterator[_Column]:
             [f"{cell} & {star}" for cell, star in zip(pairs.cells, stars, strict=True)],
         )
     if ssim:
-        yield _single(escape(ssim.title), [_digits(ssim, row[ssim.key]) for row in rows])
+        yield _single(escape(ssim.title), [_digits(ssim, row[ssim.column]) for row in rows])
     if _counts_captures(results, condition):
         yield _single("captures", [f"{row['total_captures']:.0f}" for row in rows])
 

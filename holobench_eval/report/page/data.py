@@ -8,26 +8,18 @@ from typing import Any
 
 from ...study.plan import REFERENCE
 from ..charts.look.methods import looks
+from ..data.columns import costs
 from ..data.marks import counted
 from ..data.ranks import Ranks
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Estimate
 from ..data.sweeps import Sweep
-from ..data.tables import MEMORY_COLUMN
 from ..data.text import number, p_value
 from ..section import Report
 
 Json = dict[str, Any]
 
-COSTS = {
-    "total_captures": "captures in total",
-    "training_captures": "captures for training",
-    "captures": "captures per {each}",
-    "seconds": "seconds per {each}",
-    "training_seconds": "seconds of training",
-    MEMORY_COLUMN: "memory [MiB]",
-}
 GAIN, P = "gain", "p"
 
 
@@ -56,11 +48,11 @@ def page_data(report: Report) -> Json:
         },
         "floors": {
             name: [
-                {"name": results.layout.text.floor_name(floor), "mean": _number(results.row(floor, REFERENCE)[key])}
+                {"name": results.layout.text.floor_name(floor), "mean": _number(results.row(floor, REFERENCE)[column])}
                 for floor in results.floors
                 if results.has_floor(name)
             ]
-            for key in [results.headline.key]
+            for column in [results.headline.column]
             for name in results.conditions
         },
         "oracles": {name: results.oracle(name) for name in results.conditions},
@@ -79,9 +71,9 @@ def _labels(results: Results, conditions: list[str]) -> list[str]:
 
 
 def _method(results: Results, label: str) -> Json:
-    registered = results.frame.loc[results.frame["method"] == label, "name"].iloc[0]
+    registered = results.names[label]
     return {
-        "registered": str(registered),
+        "registered": registered,
         "track": results.layout.category(label),
         "oracle": label in results.layout.privileged,
         "colour": colour(results, label),
@@ -108,26 +100,21 @@ def _columns(results: Results) -> Iterator[Json]:
             heading = f"difference to {results.layout.baseline}{unit}"
             yield {"key": GAIN, "heading": heading, "higher": score.higher_is_better}
             yield {"key": P, "heading": "adjusted p", "higher": False}
-    each = results.layout.text.each
-    for key, heading in COSTS.items():
-        if key in results.table and results.table[key].notna().any():
-            yield {"key": key, "heading": heading.format(each=each), "higher": False}
+    for key, heading in costs(results.table, results.layout.text.each).items():
+        yield {"key": key, "heading": heading, "higher": False}
 
 
 def _row(results: Results, label: str, condition: str) -> Json:
     """A row of the table: of every column the value, the interval where there is one, and the text."""
     row = results.row(label, condition)
-    cells = {
-        score.key: _cell(score.in_row(row), row[score.key], row[f"{score.key}_lo"], row[f"{score.key}_hi"])
-        for score in results.leading
-    }
+    cells = {score.key: _cell(score.in_row(row), *score.ends(row)) for score in results.leading}
     gain = results.gain(label, condition)
     if gain is not None and label != results.layout.baseline:
         cells[GAIN] = _estimate(results.headline, gain)
         for test in results.against_baseline:
             if (test.condition, test.second) == (condition, label) and not math.isnan(test.p):
                 cells[P] = _cell(p_value(test.p).removeprefix("p ").removeprefix("= "), test.p)
-    cells |= {key: _cell(number(row[key]), row[key]) for key in COSTS if key in results.table}
+    cells |= {key: _cell(number(row[key]), row[key]) for key in costs(results.table, "")}
     return {
         "method": label,
         "marked": counted(results, label, condition),

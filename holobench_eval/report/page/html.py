@@ -124,7 +124,7 @@ def _scripts() -> Iterator[str]:
 
 def _stages(report: Report) -> Iterator[str]:
     """The stage sheets of the benches, where the report has them."""
-    for name in dict.fromkeys(report.results.frame["profile"]):
+    for name in dict.fromkeys(report.results.frame["display"]):
         path = report.figures / f"stages-{name}.png"
         if path.is_file():
             caption = escape(f"Stages of the simulated bench {name}")

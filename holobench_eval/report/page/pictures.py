@@ -10,7 +10,6 @@ from pathlib import Path
 
 from ...study.scoring.pictures import LONGEST_THUMBNAIL
 from ..charts.gallery import spread
-from ..data.tables import DONE
 from ..section import Report
 from .data import Json
 
@@ -116,7 +115,6 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
 
 def _planned(report: Report) -> Iterator[Cell]:
     results = report.results
-    yield from (("", "", target) for target in results.targets)
     for condition, target in itertools.product([*_pictured(report), *_changed(report)], results.targets):
         yield from ((label, condition, target) for label in results.methods(condition))
 
@@ -132,16 +130,10 @@ def _changed(report: Report) -> list[str]:
 
 
 def _files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
-    """The files that are there: of a capture that of the first repeat with a score."""
-    results, store = report.results, report.thumbnails.store
-    found = {}
-    for label, condition, target in cells:
-        if condition:
-            rows = results.cells(label, condition)
-            done = rows[(rows["target"] == target) & (rows["state"] == DONE)]
-            path = store.thumbnail(str(done.iloc[0]["cell"])) if len(done) else None
-        else:
-            path = store.target_thumbnail(target)
-        if path is not None and path.is_file():
-            found[label, condition, target] = path
-    return found
+    """The files of targets and captures that are there: of a capture that of the first repeat with a score."""
+    store, done = report.thumbnails.store, report.results.done.drop_duplicates(["label", "condition", "target"])
+    names = zip(done["label"], done["condition"], done["target"], strict=True)
+    captures = dict(zip(names, done["cell"], strict=True))
+    paths = {cell: store.thumbnail(captures[cell]) for cell in cells if cell in captures}
+    targets = {("", "", target): store.target_thumbnail(target) for target in report.results.targets}
+    return {cell: path for cell, path in (targets | paths).items() if path.is_file()}

@@ -113,7 +113,7 @@ def _count(captures: int) -> str:
 def _doubled(results: Results) -> Score | None:
     """The PSNR in the headline's domain, where a second aligner was asked."""
     score = parse(f"psnr_{results.headline.domain}")
-    return score if f"{score.key}_second" in results.frame else None
+    return score if parse(f"{score.key}_second") in results.scores else None
 
 
 def agreement(results: Results) -> str:
@@ -126,8 +126,8 @@ def agreement(results: Results) -> str:
         return ""
     apart: dict[str, float] = {}
     if score is not None:
-        differences = done[f"{score.key}_second"] - done[score.key]
-        names = done["method"] + ", " + done["target"].astype(str)
+        differences = done[parse(f"{score.key}_second").column] - done[score.column]
+        names = done["label"] + ", " + done["target"].astype(str)
         apart = {name: value for name, value in zip(names, differences, strict=True) if np.isfinite(value)}
     silent = f" It cannot judge {_count(len(done) - len(apart))}." if len(apart) < len(done) else ""
     if not apart:
@@ -177,7 +177,7 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     done = report.results.frame[report.results.frame["state"] == DONE]
     drawn = [
         (found[method, target], path, method, target)
-        for method, target in zip(done["method"], done["target"], strict=True)
+        for method, target in zip(done["label"], done["target"], strict=True)
         if (path := report.figures / alignment_name(method, target)).is_file()
     ]
     drawn.sort(key=lambda one: one[0])

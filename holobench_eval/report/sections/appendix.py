@@ -101,7 +101,7 @@ def _exposure(results: Results) -> str:
     if results.layout.measure == FILES:
         return "Unknown. The intensity match removes its effect on brightness, not its effect on noise."
     known = EXPOSURES if not results.layout.predicts else EXPOSURES_PREDICTED
-    rows = results.frame.groupby("exposure")["method"].unique()
+    rows = results.frame.groupby("exposure")["label"].unique()
     policies = sorted(set(rows.index) - {""})
     named = "" if len(policies) < 2 else f" This is the exposure of {words(sorted(rows.get('matched', ())))}."
     return " ".join(known.get(policy, policy) for policy in policies) + named or "Not recorded."

@@ -117,7 +117,7 @@ def _selection(report: Report, condition: str) -> list[str]:
 
 def _stages(report: Report) -> Iterator[tuple[Path, str]]:
     """Pictures of the bench's stages, drawn before the report, where they are."""
-    for name in dict.fromkeys(report.results.frame["profile"]):
+    for name in dict.fromkeys(report.results.frame["display"]):
         path = report.figures / f"stages-{name}.png"
         if path.is_file():
             yield path, f"Stages of the simulated bench {name}."

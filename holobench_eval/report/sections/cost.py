@@ -8,13 +8,12 @@ from typing import Any
 import pandas as pd
 
 from ..data.results import Results
-from ..data.tables import ALONE_COLUMN, DONE, MEMORY_COLUMN
+from ..data.tables import DONE
 from ..data.text import FILES, number, words
 from ..markdown import Markdown, heading
 from ..section import Blocks, Figures, Report, Section, by_method, column
 from .results import cost_columns
 
-MEMORY = "memory [MiB]"
 ELSEWHERE = ("refine_", "second_", "share_")  # how keys of figures begin that stand where the geometry is
 
 
@@ -24,7 +23,7 @@ def _render(report: Report, _: Figures) -> Blocks:
     if report.layout.measure == FILES:
         yield f"{text.cost} Match factors and brightness ratios are computed {text.compared}."
     else:
-        memory, timed = MEMORY_COLUMN in results.table, results.done["seconds"].notna().any()
+        memory, timed = "memory_mib" in results.table, results.done["solving_s"].notna().any()
         sentences = [
             text.cost,
             *(
@@ -33,6 +32,8 @@ def _render(report: Report, _: Figures) -> Blocks:
                 else []
             ),
         ]
+        if timed:
+            sentences.append("A phase is solved once for all displays and studies; its seconds are of that solving.")
         if memory:
             sentences.append(
                 f"Memory is the peak of a {text.each} above what the process held before it, the median over targets; "
@@ -48,7 +49,7 @@ def _render(report: Report, _: Figures) -> Blocks:
 
 
 def _measured(provenance: Mapping[str, Any], memory: bool) -> str:
-    """When the seconds were measured, a sentence; earlier versions showed the first measurement of a machine."""
+    """When the seconds were measured, a sentence; without a noted load they may be of an earlier study."""
     what = f"Seconds {'and memory ' * memory}"
     runs = [*provenance.get("earlier", ()), provenance]
     loads = [run["load"] for run in runs if "load" in run]
@@ -66,17 +67,17 @@ def _light_and_time(results: Results, condition: str) -> Markdown:
     """Captures, computing time and the figures that describe a capture and are no image metric."""
 
     def saturated(row: pd.Series) -> str:
-        cells = results.cells(row["method"], condition)
+        cells = results.cells(row["label"], condition)
         return number(cells.loc[cells["state"] == DONE, "saturated"].max() * 100)
 
     costs = cost_columns(results, " per target")
-    costs |= {MEMORY_COLUMN: MEMORY} if MEMORY_COLUMN in results.table else {}
+    costs |= {"memory_mib": "memory [MiB]"} if "memory_mib" in results.table else {}
     sensor = results.layout.learned_display is None
     figures = [score for score in results.scores if not score.domain and not score.key.startswith(ELSEWHERE)]
     columns = [
         *(column(title, key) for key, title in costs.items()),
         *([("most saturated samples [%]", saturated)] if sensor else []),
-        *(column(score.title, score.key) for score in figures),
+        *(column(score.title, score.column) for score in figures),
     ]
     return by_method(results, condition, columns)
 
@@ -84,18 +85,18 @@ def _light_and_time(results: Results, condition: str) -> Markdown:
 def timing(results: Results, workers: int) -> str:
     """What was at work beside the solutions that were timed, a sentence; workers: of the run.
 
-    Empty where a single worker left no note of it, as in records of earlier versions.
+    Empty where a single worker left no note of it.
     """
-    each, done, row = results.layout.text.each, results.done, ["method", "condition"]
+    each, done, row = results.layout.text.each, results.done, ["label", "condition"]
     inflated = f"timed with {f'{workers} ' * (workers > 1)}concurrent workers and are inflated"
-    if ALONE_COLUMN not in done:
+    if "timed_alone" not in done:
         return f"Seconds were {inflated}." if workers > 1 else ""
-    alone = done[done[ALONE_COLUMN] == 1]
+    alone = done[done["timed_alone"] == 1]
     if alone.empty:
         return f"Seconds were {inflated}."
     if len(alone) == len(done):
         return f"Each {each} was timed alone."
-    single = alone.groupby(row)["seconds"].nunique().max() == 1  # cells of one solution have one time
+    single = alone.groupby(row)["solving_s"].nunique().max() == 1  # cells of one solution have one time
     chosen = f"one {each} per row," if single else f"the {each}s"
     timed = set(alone[row].itertuples(index=False, name=None))
     others = [pair for pair in done[row].drop_duplicates().itertuples(index=False, name=None) if pair not in timed]

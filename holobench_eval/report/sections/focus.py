@@ -38,7 +38,7 @@ def by_plane(results: Results, condition: str) -> Markdown:
     for name in results.methods(condition):
         values, stacked = results.values(name, condition), name in results.layout.stacked
         estimates = [_at(results, values, plane) for plane in distances]
-        seconds = float(results.row(name, condition)["seconds"])
+        seconds = float(results.row(name, condition)["solving_s"])
         rows.append(
             [
                 marked(results, name, condition),
@@ -66,7 +66,7 @@ def _compared(results: Results, condition: str, baseline: str, name: str) -> str
     gained = results.values(name, condition) - results.values(baseline, condition)
     if not np.isfinite(gained).all():
         return ""
-    seconds, other = (float(results.row(label, condition)["seconds"]) for label in (name, baseline))
+    seconds, other = (float(results.row(label, condition)["solving_s"]) for label in (name, baseline))
     estimate = results.estimate(gained)
     difference = score.estimate(estimate, signed=True)
     unit = f" {score.unit}" if score.unit else ""

@@ -12,13 +12,13 @@ from ...study.plan import REFERENCE
 from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
 from ..charts.look.methods import looks
 from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
+from ..data.columns import captures_behind, costs
 from ..data.marks import CONSTANT, marked
 from ..data.results import Results
-from ..data.tables import DONE, MEMORY_COLUMN, total_captures
+from ..data.tables import DONE
 from ..data.text import number, percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
-from .cost import MEMORY
 
 FEWEST_TIMED = 4  # computing time gets a chart from so many timed methods on
 
@@ -37,21 +37,13 @@ def _render(report: Report, figures: Figures) -> Blocks:
 
 
 def leaderboard(results: Results, condition: str) -> Markdown | None:
-    """The table of a display; none for a study without captures, or whose records are of an earlier version."""
-    if not results.layout.spends_captures or "rank" not in results.table:
+    """The table of a display; none for a study without captures."""
+    if not results.layout.spends_captures:
         return None
-    each, names = results.layout.text.each, _order(results, condition)
+    names = _order(results, condition)
     closed = {name: results.gap_closed(name, condition) for name in names}
     gap = ["way to the ceiling [%]"] if any(closed.values()) else []
-    columns = {
-        "total_captures": "total captures",
-        "training_captures": "captures for training",
-        "captures": f"captures per {each}",
-        "seconds": f"seconds per {each}",
-        "training_seconds": "seconds of training",
-        MEMORY_COLUMN: MEMORY,
-    }
-    known = {key: heading for key, heading in columns.items() if key in results.table}
+    known = costs(results.table, results.layout.text.each)
     rows = []
     for name in names:
         row = results.row(name, condition)
@@ -84,7 +76,7 @@ def reading(results: Results) -> str:
     each = results.layout.text.each
     sentences = [
         "Ranks order the means of the headline within a display and a track; a method that lacks a target has no rank.",
-        "Total captures are those of the training and of every target.",
+        "Captures in total are those of the training and of every target.",
         f"Seconds of training are spent once, seconds per {each} on every image.",
     ]
     if results.layout.baseline and any(results.oracle(condition) for condition in results.conditions):
@@ -135,12 +127,12 @@ def draw(results: Results, folder: Path) -> Iterator[tuple[Path, str]]:
 
 def _captures(results: Results, name: str, condition: str) -> float:
     cells = results.cells(name, condition)
-    return total_captures(cells[cells["state"] == DONE])
+    return captures_behind(cells[cells["state"] == DONE])
 
 
 def _seconds(results: Results, name: str, condition: str) -> float:
     """NaN without any, since there is no logarithm of zero."""
-    return float(results.row(name, condition)["seconds"]) or float("nan")
+    return float(results.row(name, condition)["solving_s"]) or float("nan")
 
 
 def _spends_captures(results: Results, marks: list[Mark]) -> bool:
@@ -184,8 +176,8 @@ def _ends(results: Results, name: str, condition: str) -> dict[str, float]:
     """Ends of the bar of a method: of its mean difference to the baseline, moved to its mean; else of the mean."""
     gained = results.gain(name, condition)
     if gained is None:
-        row, key = results.row(name, condition), results.headline.key
-        return {"low": float(row[f"{key}_lo"]), "high": float(row[f"{key}_hi"])}
+        _, low, high = results.headline.ends(results.row(name, condition))
+        return {"low": low, "high": high}
     mean = float(results.values(name, condition).mean())
     if name == results.layout.baseline:
         return {"low": float("nan"), "high": float("nan")}
@@ -200,7 +192,7 @@ def _line(results: Results, name: str, condition: str, role: str, band: bool) ->
 
 def _constant(results: Results) -> Line:
     """The floor: the mean of a constant image."""
-    mean = float(results.row(CONSTANT, REFERENCE)[results.headline.key])
+    mean = float(results.row(CONSTANT, REFERENCE)[results.headline.column])
     return Line(f"constant image, {results.headline.with_unit(mean)}", mean)
 
 

@@ -45,14 +45,14 @@ def _refined(results: Results, condition: str) -> Markdown | None:
         return None
 
     def difference(fixed: Score, refined: Score) -> Column:
-        return "difference", lambda row: fixed.number(row[refined.key] - row[fixed.key], signed=True)
+        return "difference", lambda row: fixed.number(row[refined.column] - row[fixed.column], signed=True)
 
     def moved(row: pd.Series) -> str:
-        cells = results.cells(row["method"], condition)
+        cells = results.cells(row["label"], condition)
         return number(np.hypot(cells["refine_dx_px"], cells["refine_dy_px"]).max())
 
     def turned(row: pd.Series) -> str:
-        return number(results.cells(row["method"], condition)["refine_theta_deg"].abs().max())
+        return number(results.cells(row["label"], condition)["refine_theta_deg"].abs().max())
 
     scores = [
         column

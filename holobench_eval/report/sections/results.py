@@ -11,8 +11,8 @@ from ...study.plan import REFERENCE
 from ..charts import paired
 from ..charts.quality import draw_quality
 from ..data.results import Results
-from ..data.scores import Score
-from ..data.tables import DONE, MEDIAN, STOPPED_COLUMN
+from ..data.scores import parse
+from ..data.tables import DONE, MEDIAN, PUBLISHED
 from ..data.text import FILES
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Column, Figures, Report, Section, column, method_rows
@@ -76,12 +76,12 @@ def cost_columns(results: Results, each: str = "") -> dict[str, str]:
     if results.layout.measure == FILES:
         return {}
     trained = "training_captures" in results.table
-    training = {"training_captures": "captures for training", "training_seconds": "seconds of training"}
-    solving = {"captures": f"captures{each}{' while solving' * trained}", "seconds": f"seconds{each}"}
+    training = {"training_captures": "captures for training", "training_s": "seconds of training"}
+    solving = {"captures": f"captures{each}{' while solving' * trained}", "solving_s": f"seconds{each}"}
     if results.layout.predicts:
         del solving["captures"]
-    if results.table["seconds"].isna().all():  # phases from files alone
-        del solving["seconds"]
+    if results.table["solving_s"].isna().all():  # phases from files alone
+        del solving["solving_s"]
     return training | solving if trained else solving
 
 
@@ -95,7 +95,7 @@ def headline_rows(results: Results, condition: str) -> tuple[list[str], list[lis
         *_beside_the_mean(results, condition),
         *((score.heading, score.in_row) for score in results.leading[1:]),
         *(column(title, key) for key, title in cost_columns(results).items()),
-        *(column(f"reported {Score(metric, metric).axis}", f"reported_{metric}") for metric in reported),
+        *(column(f"reported {parse(metric).axis}", f"{PUBLISHED}{parse(metric).column}") for metric in reported),
     ]
     return method_rows(results, condition, columns)
 
@@ -107,23 +107,23 @@ def _beside_the_mean(results: Results, condition: str) -> list[Column]:
     above = {name: results.above_floor(name, condition) for name in results.methods(condition)}
 
     def difference(row: pd.Series) -> str:
-        found = above[row["method"]]
+        found = above[row["label"]]
         return score.estimate(found, signed=True) if found else "–"
 
-    columns = [(f"median{unit}", lambda row: score.number(row[f"{score.key}{MEDIAN}"]))]
+    columns = [(f"median{unit}", lambda row: score.number(row[score.statistic(MEDIAN)]))]
     return [*columns, (f"above a constant image{unit}", difference)] if any(above.values()) else columns
 
 
 def stopped(results: Results, condition: str) -> list[str]:
     """A sentence for every method that the display ended on this display, with the reason it gave."""
-    if STOPPED_COLUMN not in results.frame:
+    if "stop_reason" not in results.frame:
         return []
     frame, targets = results.frame, len(results.targets)
-    ended = frame[(frame["condition"] == condition) & (frame["state"] == DONE) & (frame[STOPPED_COLUMN] != "")]
+    ended = frame[(frame["condition"] == condition) & (frame["state"] == DONE) & (frame["stop_reason"] != "")]
     return [
         f"The display stopped {name} on {cells['target'].nunique()} of {targets} targets: {reason}. Its best hologram "
         "until then was scored."
-        for (name, reason), cells in ended.groupby(["method", STOPPED_COLUMN], sort=False)
+        for (name, reason), cells in ended.groupby(["label", "stop_reason"], sort=False)
     ]
 
 
@@ -145,7 +145,7 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         paired.draw(results, condition, path)
         yield path, paired.caption(results, condition)
     floors = {
-        text.floor_name(name): float(results.row(name, REFERENCE)[results.headline.key])
+        text.floor_name(name): float(results.row(name, REFERENCE)[results.headline.column])
         for name in ("floor_constant", "floor_speckle")
         if name in results.floors and all(map(results.has_floor, results.conditions))
     }

@@ -57,12 +57,12 @@ def counts(results: Results) -> str:
     done = int((cells["state"] == DONE).sum())
     parts = (
         (len(results.targets), "target"),
-        (cells["method"].nunique(), "method"),
+        (cells["label"].nunique(), "method"),
         (len(results.conditions), "display"),
         (cells["repeat"].nunique(), "repeat"),
     )
     size = ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in parts)
-    partly = len(cells[["method", "condition"]].drop_duplicates()) < cells["method"].nunique() * len(results.conditions)
+    partly = len(cells[["label", "condition"]].drop_duplicates()) < cells["label"].nunique() * len(results.conditions)
     some = " (not every method on every display)" if partly else ""
     return f"{size}{some}: {len(cells)} cells, {done} with a score, {len(cells) - done} without."
 
@@ -125,7 +125,7 @@ def _methods(report: Report) -> Markdown:
     planned = report.results.table["condition"] != REFERENCE
     rows = [
         [label, code(cells[label]["method"]), plain(cells[label]["params"]) + _limit(cells[label])]
-        for label in dict.fromkeys(report.results.table.loc[planned, "method"])
+        for label in dict.fromkeys(report.results.table.loc[planned, "label"])
     ]
     return table(["method", "registered as", "parameters"], rows)
 

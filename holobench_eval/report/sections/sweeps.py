@@ -171,7 +171,7 @@ def claims(results: Results, sweeps: Sequence[Sweep]) -> str:
     """
     if results.headline.unit != "dB":
         return ""
-    labels = list(dict.fromkeys(results.frame.loc[results.frame["name"] == "hil", "method"]))
+    labels = list(dict.fromkeys(results.frame.loc[results.frame["method"] == "hil", "label"]))
     verdicts = [
         _claim(sweep, label)
         for sweep in sweeps
@@ -268,7 +268,7 @@ def _panel(sweep: Sweep) -> Panel:
         curves=tuple(curves),
         ticks=None if kind.numeric else tuple(value_text(value) for value, _ in points),
         nominal=kind.nominal,
-        floor=float(results.row(CONSTANT, REFERENCE)[results.headline.key]) if has_floor else None,
+        floor=float(results.row(CONSTANT, REFERENCE)[results.headline.column]) if has_floor else None,
     )
 
 

@@ -78,7 +78,7 @@ def _values(results: Results, values: Mapping[str, Array], signed: bool = False)
 
 def _holes(report: Report, _: Figures) -> Blocks:
     """Every cell without a score, with its reason."""
-    columns = ["method", "condition", "target", "repeat", "state", "reason"]
+    columns = ["label", "condition", "target", "repeat", "state", "reason"]
     rows = [
         [method, condition, target, f"{repeat:.0f}", state, reason or "no reason given"]
         for method, condition, target, repeat, state, reason in report.results.holes[columns].itertuples(index=False)

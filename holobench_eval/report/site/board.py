@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from ..data.statistics import Estimate
-from ..data.tables import SECONDS_COLUMN
 from ..data.text import FILES
 from .html import joined, link, plain_number, quiet, slug, swatch
 from .intake import Source
@@ -127,7 +126,7 @@ def _row(row: Row, group: Group, names: Names) -> Markup:
         "gain": _value(sign * row.gain.mean if row.gain else gain),
         "above": _value(sign * row.above.mean if row.above else math.nan),
         "captures": _value(_number(row, "total_captures", "captures")),
-        "seconds": _value(_number(row, "seconds")),
+        "seconds": _value(_number(row, "solving_s")),
         "targets": len(row.values),
         "text": words,
     }
@@ -182,9 +181,9 @@ def _captures(row: Row) -> Markup:
 
 
 def _seconds(row: Row) -> Markup:
-    training = _number(row, SECONDS_COLUMN)
+    training = _number(row, "training_s")
     trained = quiet(f"{plain_number(training)} s to train") if training > 0 else ""
-    return Markup("{} {}{}").format(plain_number(_number(row, "seconds")), quiet(row.source.processor), trained)
+    return Markup("{} {}{}").format(plain_number(_number(row, "solving_s")), quiet(row.source.processor), trained)
 
 
 def _targets(row: Row) -> Markup:

@@ -14,9 +14,9 @@ import pandas as pd
 from ...core.errors import UserError
 from ...study import provenance
 from ..data.categories import CATEGORIES, FLOOR, OPEN_LOOP
-from ..data.columns import column, file_name
+from ..data.meanings import column
 from ..data.scores import METRICS, parse
-from ..data.tables import CATEGORY_COLUMN, DONE, STUDY_COLUMNS, score_columns
+from ..data.tables import DONE, score_columns
 from ..data.text import FILES
 
 RECORDS: Final = "records.csv"
@@ -27,11 +27,9 @@ STATES = (DONE, "failed", "skipped", "unavailable", "missing")
 MEASURES = ("picture", "focus", "prediction", "error_budget", FILES)
 EXPOSURES = ("equal", "matched", "")
 LOUDEST = 200.0  # dB, of any score that makes sense
-NAMES = ("display", "condition", "method", "name", "label", "target", "cluster")
+NAMES = ("display", "condition", "method", "label", "target", "cluster")
 CAPTURES = ("captures", "training_captures")
-COUNTS = (*CAPTURES, "seconds", "training_seconds")
-# Columns of records.csv that a folder of others has, beside those that ``tables.read_records`` asks for.
-OF_OTHERS = ("measure", "display", "category", "panel_height_px", "panel_width_px")
+COUNTS = (*CAPTURES, "solving_s", "training_s")
 
 _SIDE = re.compile(r"[1-9][0-9]{0,4}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
@@ -56,8 +54,7 @@ def check_names(folder: Path, raw: pd.DataFrame) -> None:
                 raise UserError(f"{where} {name!r}: characters that cannot be seen; take them out")
             if (other := seen.setdefault(folded(name), name)) != name or name != name.strip():
                 raise UserError(f"{where} {name!r}: differs by case or space alone from {other.strip()!r}; use one")
-    label = next((name for name in ("label", "method") if name in raw), None)
-    count = raw[label].nunique() if label else 0
+    count = raw["label"].nunique() if "label" in raw else 0
     for number, most, what in ((len(raw), MOST_ROWS, "rows"), (count, MOST_LABELS, "labels")):
         if number > most:
             raise UserError(f"{folder / RECORDS}: {number} {what}; expected at most {most} in a study")
@@ -82,43 +79,39 @@ def check_provenance(folder: Path, known: Mapping[str, Any], strict: bool) -> No
         raise UserError(f'{path}: "displays" says what each display is; expected one of {", ".join(KINDS)} for each')
 
 
-def check_columns(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame, strict: bool) -> None:
-    """UserError: columns are lacking or unknown. strict: of a folder of others."""
+def check_columns(folder: Path, frame: pd.DataFrame) -> None:
+    """UserError: a column is unknown, or there is none of a score."""
     path = folder / RECORDS
-    lacking = [name for name in OF_OTHERS if name not in raw]
-    if strict and lacking:
-        raise UserError(f"{path}: lacks the columns {', '.join(lacking)}; write it with 'holoeval report'")
-    unknown = [name for name in raw if column(RECORDS, str(name)) is None and name not in STUDY_COLUMNS]
-    if unknown and "label" in raw:
+    unknown = [name for name in frame if column(RECORDS, str(name)) is None]
+    if unknown:
         raise UserError(
             f"{path}: unknown column {unknown[0]!r}; expected those of columns.md (docs/results/data.md); take it out"
         )
-    if not any(parse(key).metric in METRICS for key in score_columns(frame)):
+    if not any(parse(name).metric in METRICS for name in score_columns(frame)):
         raise UserError(f"{path}: no column of a score; expected one such as psnr_linear_db")
 
 
 def check_rows(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame) -> None:
     """UserError: a word that is not known, a number that cannot be, or two cells that contradict each other."""
     path = folder / RECORDS
-    category = "category" if "category" in raw else CATEGORY_COLUMN
     for name, allowed in (
         ("state", STATES),
         ("exposure", EXPOSURES),
         ("measure", MEASURES),
-        (category, (*CATEGORIES, FLOOR, "")),
+        ("category", (*CATEGORIES, FLOOR)),
     ):
-        wrong = sorted(set(raw[name]) - set(allowed)) if name in raw else []
-        if wrong and (name != "exposure" or "label" in raw):
+        wrong = sorted(set(frame[name]) - set(allowed))
+        if wrong:
             named = ", ".join(word or "nothing" for word in allowed)
             raise UserError(f"{path}: {name} {wrong[0]!r}; expected one of {named}")
-    for key in [*score_columns(frame), *(name for name in COUNTS if name in frame)]:
-        _check_numbers(path, raw, frame, key)
+    for name in [*score_columns(frame), *(name for name in COUNTS if name in frame)]:
+        _check_numbers(path, raw, frame, name)
     for side in ("panel_height_px", "panel_width_px"):
-        wrong = sorted(text for text in set(raw.get(side, [])) if text and not _SIDE.fullmatch(text))
+        wrong = sorted(text for text in set(raw[side]) if text and not _SIDE.fullmatch(text))
         if wrong:
             raise UserError(f"{path}: {side} {wrong[0]!r}; expected a number of pixels from 1 to 99999")
     spent = frame[[name for name in CAPTURES if name in frame]].gt(0).any(axis=1)
-    contradicting = frame[spent & (raw[category] == OPEN_LOOP)] if category in raw else frame[:0]
+    contradicting = frame[spent & (frame["category"] == OPEN_LOOP)]
     if len(contradicting):
         raise UserError(
             f"{path}: {_named(contradicting)} is {OPEN_LOOP} and has captures; expected none, or another category"
@@ -132,33 +125,31 @@ def check_rows(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame) -> None:
             raise UserError(f"{path}: {_named(rows)} {what}; expected a score of done cells alone")
 
 
-def _check_numbers(path: Path, raw: pd.DataFrame, frame: pd.DataFrame, key: str) -> None:
+def _check_numbers(path: Path, raw: pd.DataFrame, frame: pd.DataFrame, name: str) -> None:
     """UserError: a number that is not finite, or that no such score or count can be."""
-    values, score = frame[key].to_numpy(dtype=np.float64), parse(key)
-    metric = METRICS.get(score.metric)
+    values, metric = frame[name].to_numpy(dtype=np.float64), METRICS.get(parse(name).metric)
     low, high = -np.inf, np.inf
-    if key in COUNTS:
+    if name in COUNTS:
         low, high = 0.0, MOST_COUNTED
     elif metric is not None:
         bound = LOUDEST if metric.unit == "dB" else 100.0
         best = min(metric.best, bound) if metric.direction == "higher" else max(metric.best, -bound)
         low, high = (-bound, best + 1e-5) if metric.direction == "higher" else (best - 1e-5, bound)
-    written = raw[file_name(key)] if file_name(key) in raw else raw[key]
-    wrong = np.isinf(values) | (values < low) | (values > high) | (np.isnan(values) & (written != "").to_numpy())
+    wrong = np.isinf(values) | (values < low) | (values > high) | (np.isnan(values) & (raw[name] != "").to_numpy())
     if wrong.any():
         row = frame[wrong]
         limits = f"from {low:g} to {high:g}" if np.isfinite(high) else "finite"
-        raise UserError(f"{path}: {_named(row)} has {file_name(key)} {row[key].iloc[0]:g}; expected a number {limits}")
+        raise UserError(f"{path}: {_named(row)} has {name} {row[name].iloc[0]:g}; expected a number {limits}")
 
 
 def _named(rows: pd.DataFrame) -> str:
     """The first of some rows, as a message names it."""
-    return ", ".join(str(rows.iloc[0][name])[:60] for name in ("method", "condition", "target"))
+    return ", ".join(str(rows.iloc[0][name])[:60] for name in ("label", "condition", "target"))
 
 
 def check_displays(folder: Path, known: Mapping[str, Any], frame: pd.DataFrame, measure: str) -> None:
     """UserError: a display of the records is not in the provenance."""
-    unknown = sorted(set(frame["profile"]) - {"", *known.get("profiles", {})})
+    unknown = sorted(set(frame["display"]) - {*known.get("profiles", {})})
     if unknown and measure != FILES:
         raise UserError(
             f"{folder / provenance.FILE}: no digest of the display {unknown[0]!r} of {RECORDS}; copy the "

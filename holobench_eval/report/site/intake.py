@@ -2,7 +2,7 @@
 
 Folders come from anybody. Nothing of them is run, no config is opened, and what does not pass is a ``UserError`` in one
 line. What lies below the folder of own reports is own. Any other folder says whose it is by the key ``by`` of its
-provenance, and has to say more of where its numbers come from than a report of an earlier version did.
+provenance, and has to say the harness that its numbers come from.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ from ...study import provenance
 from ...study.plan import REFERENCE
 from ..compare.runs import records_of
 from ..data.categories import CALIBRATED, CATEGORIES, ONLINE, ORACLE
-from ..data.columns import file_name
 from ..data.layout import Layout
 from ..data.results import Results
-from ..data.scores import METRICS, parse
-from ..data.tables import CATEGORY_COLUMN, clusters_in, score_columns
+from ..data.scores import METRICS, Score, parse
+from ..data.tables import clusters_in, score_columns
 from . import checks
 from .checks import LONGEST, NAMES, RECORDS, folded
 
@@ -46,8 +45,7 @@ class Source:
 
     name: of the study; by: whose results they are (empty: of whoever makes the site); results: its numbers without
     changed displays; measure: what was scored; panels: rows x columns of each display (empty: not recorded);
-    known: its provenance; parameters: of every label, as JSON; changed: conditions that are a change of a display;
-    earlier: whether its records have the columns of an earlier version of this package.
+    known: its provenance; parameters: of every label, as JSON; changed: conditions that are a change of a display.
     """
 
     folder: Path
@@ -59,7 +57,6 @@ class Source:
     known: Mapping[str, Any]
     parameters: Mapping[str, str]
     changed: int
-    earlier: bool
 
     @property
     def harness(self) -> str:
@@ -109,9 +106,9 @@ def read(folder: Path, own: Path) -> Source:
     checks.check_names(folder, raw)
     frame = records_of(folder, text)
     checks.check_provenance(folder, known, strict=bool(by))
-    checks.check_columns(folder, raw, frame, strict=bool(by))
+    checks.check_columns(folder, frame)
     checks.check_rows(folder, raw, frame)
-    measure = _measure(folder, raw, frame)
+    measure = _measure(folder, frame)
     nominal = frame[frame["condition"].isin([REFERENCE, *_nominal(frame)])].reset_index(drop=True)
     if set(nominal["condition"]) <= {REFERENCE}:
         raise UserError(
@@ -120,12 +117,13 @@ def read(folder: Path, own: Path) -> Source:
     checks.check_displays(folder, known, nominal, measure)
     headline, baseline = _tested(folder, nominal)
     # A site shows the headline; error budgets are made of further scores.
-    spare = [key for key in score_columns(nominal) if key != headline and measure != "error_budget"]
-    parameters = _parameters(folder, raw)
-    results = Results(nominal.drop(columns=spare), _layout(folder, parameters, nominal, measure, headline, baseline))
+    spare = [name for name in score_columns(nominal) if name != headline.column and measure != "error_budget"]
+    parameters = _parameters(folder)
+    results = Results(
+        nominal.drop(columns=spare), _layout(folder, parameters, nominal, measure, headline.key, baseline)
+    )
     changed = frame["condition"].nunique() - nominal["condition"].nunique()
-    name, earlier = folder.resolve().name, "label" not in raw
-    return Source(folder, name, by, results, measure, _panels(raw), known, parameters, changed, earlier)
+    return Source(folder, folder.resolve().name, by, results, measure, _panels(frame), known, parameters, changed)
 
 
 def _check_file(path: Path, most: int = MOST_BYTES) -> None:
@@ -182,29 +180,24 @@ def _whose(folder: Path, known: Mapping[str, Any], own: Path) -> str:
     return by
 
 
-def _measure(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame) -> str:
-    """What was scored. Records of earlier versions do not say it: planes have scores in focus, pictures efficiency."""
-    if "measure" in raw:
-        found = sorted(set(raw["measure"]))
-        if len(found) > 1:
-            raise UserError(f"{folder / RECORDS}: measures {' and '.join(found)}; expected one study a folder")
-        return str(found[0])
-    scores = [parse(key) for key in score_columns(frame)]
-    if any(score.in_focus for score in scores):
-        return "focus"
-    return "picture" if any(score.key == "efficiency" for score in scores) else "prediction"
+def _measure(folder: Path, frame: pd.DataFrame) -> str:
+    """What was scored."""
+    found = sorted(set(frame["measure"]))
+    if len(found) > 1:
+        raise UserError(f"{folder / RECORDS}: measures {' and '.join(found)}; expected one study a folder")
+    return str(found[0])
 
 
 def _nominal(frame: pd.DataFrame) -> list[str]:
-    """The conditions that are displays as they were calibrated. Pictures from files have no profile."""
-    own = frame[(frame["condition"] == frame["profile"]) | (frame["profile"] == "")]
+    """The conditions that are displays as they were calibrated."""
+    own = frame[frame["condition"] == frame["display"]]
     return [str(name) for name in own["condition"].unique() if name != REFERENCE]
 
 
-def _tested(folder: Path, frame: pd.DataFrame) -> tuple[str, str | None]:
+def _tested(folder: Path, frame: pd.DataFrame) -> tuple[Score, str | None]:
     """Score and baseline of the study's paired tests; without tests.csv the first score, and no baseline."""
-    keys, path = score_columns(frame), folder / TESTS
-    first = next(key for key in keys if parse(key).metric in METRICS)
+    scores, path = [parse(name) for name in score_columns(frame)], folder / TESTS
+    first = next(score for score in scores if score.metric in METRICS)
     if not path.exists():
         return first, None
     _check_file(path)
@@ -217,10 +210,10 @@ def _tested(folder: Path, frame: pd.DataFrame) -> tuple[str, str | None]:
     if not pairs:
         return first, None
     metric, baseline = sorted(pairs)[0]
-    key = next((key for key in keys if file_name(key) == metric), None)
-    if len(pairs) > 1 or key is None or baseline not in set(frame["method"]):
+    tested = next((score for score in scores if score.column == metric), None)
+    if len(pairs) > 1 or tested is None or baseline not in set(frame["label"]):
         raise UserError(f"{path}: its metric or baseline is not in {RECORDS}; write both with 'holoeval report'")
-    return key, baseline
+    return tested, baseline
 
 
 def _layout(
@@ -228,12 +221,11 @@ def _layout(
 ) -> Layout:
     """What the tables need of the study, from its records alone."""
     shown = frame[frame["condition"] != REFERENCE]
-    category = shown[CATEGORY_COLUMN] if CATEGORY_COLUMN in shown else pd.Series("", index=shown.index)
-    by_category = {name: frozenset(shown.loc[category == name, "method"]) for name in CATEGORIES}
+    by_category = {name: frozenset(shown.loc[shown["category"] == name, "label"]) for name in CATEGORIES}
     identities = [label for label, text in parameters.items() if _network(text) == "identity"]
     return Layout(
         title=folder.resolve().name,
-        pairs=tuple(dict.fromkeys(zip(shown["method"], shown["condition"], strict=True))),
+        pairs=tuple(dict.fromkeys(zip(shown["label"], shown["condition"], strict=True))),
         targets=tuple(dict.fromkeys(frame["target"])),
         headline=headline,
         baseline=baseline,
@@ -255,20 +247,19 @@ def _network(parameters: str) -> str:
     return str(network.get("name", "")) if isinstance(network, dict) else ""
 
 
-def _panels(raw: pd.DataFrame) -> dict[str, str]:
-    if not {"panel_height_px", "panel_width_px", "display"} <= set(raw):
-        return {}
-    rows = raw.drop_duplicates("display")
+def _panels(frame: pd.DataFrame) -> dict[str, str]:
+    rows = frame.drop_duplicates("display").dropna(subset=["panel_height_px", "panel_width_px"])
     sides = zip(rows["display"], rows["panel_height_px"], rows["panel_width_px"], strict=True)
-    return {str(name): f"{height} x {width}" for name, height, width in sides if height and width}
+    return {str(name): f"{height:.0f} x {width:.0f}" for name, height, width in sides}
 
 
-def _parameters(folder: Path, raw: pd.DataFrame) -> dict[str, str]:
-    """Parameters of every label as JSON, from table.csv; earlier versions wrote them into the records, ``raw``."""
+def _parameters(folder: Path) -> dict[str, str]:
+    """Parameters of every label as JSON, from table.csv, which folders of others may lack."""
     path = folder / TABLE
-    if "parameters" not in raw and path.exists():
-        _check_file(path)
-        raw = _raw(path, _text(path))
-    if not {"label", "parameters"} <= set(raw):
+    if not path.exists():
         return {}
-    return {str(label): str(text) for label, text in zip(raw["label"], raw["parameters"], strict=True)}
+    _check_file(path)
+    table = _raw(path, _text(path))
+    if not {"label", "parameters"} <= set(table):
+        return {}
+    return {str(label): str(text) for label, text in zip(table["label"], table["parameters"], strict=True)}

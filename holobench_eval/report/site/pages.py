@@ -25,7 +25,7 @@ from .pictures import Picture
 from .standing import Group
 
 REPORT = ("report.html", "report.md")
-ANSWERS = ("## Question", "## Answer", "## Findings")
+ANSWERS = ("## Question", "## Answer")
 FACTS = ("package", "harness", "revision", "dirty", "command", "config_sha256", "python", "platform", "cpu", "gpu",
          "device", "threads", "workers", "started", "ended")  # fmt: skip
 LONGEST_TEXT = 40_000  # characters of report.md, of which question and answer are the first
@@ -202,7 +202,7 @@ def _reports(source: Source) -> Markup:
 
 
 def _answer(folder: Path) -> Markup:
-    """Question and answer of report.md, or the findings of earlier versions. Links and pictures stay text."""
+    """Question and answer of report.md. Links and pictures stay text."""
     path = folder / "report.md"
     if path.is_symlink() or not path.is_file():
         return Markup("<p>The folder has no report.md, so that question and answer of the study are not known.</p>")

@@ -62,9 +62,9 @@ def thumbnails(source: Source) -> list[Picture]:
             raise UserError(
                 f"{path}: no such cell; a thumbnail is named by the column 'cell' of a done row of records.csv"
             )
-        caption = f"{row['method']} on {row['condition']}, {row['target']}"
+        caption = f"{row['label']} on {row['condition']}, {row['target']}"
         taken = _picture(path, caption, LONGEST_THUMBNAIL, anew=True)
-        found.append(replace(taken, name=f"captures/{taken.name}", of=str(row["name"])))
+        found.append(replace(taken, name=f"captures/{taken.name}", of=str(row["method"])))
     return found
 
 

@@ -158,7 +158,7 @@ def version(source: Source, display: Display) -> str:
         return CURRENT if isinstance(digest, dict) and digest.get("metrics") == HARNESS else ANOTHER
     if source.harness:
         return CURRENT if source.harness == HARNESS else ANOTHER
-    return ANOTHER if source.earlier else UNRECORDED
+    return UNRECORDED
 
 
 def _constant(source: Source) -> dict[str, float]:
@@ -178,8 +178,7 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
     results, rows = source.results, []
     targets = tuple(sorted(zip(results.targets, map(str, results.clusters), strict=True)))
     for condition in results.conditions:
-        name = str(results.frame.loc[results.frame["condition"] == condition, "profile"].iloc[0]) or condition
-        display = display_of(source, name, known)
+        display = display_of(source, condition, known)
         for label in results.methods(condition):
             cells = results.cells(label, condition)
             first, values = cells.iloc[0], results.values(label, condition)
@@ -189,7 +188,7 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
                 source.measure,
                 (display.title, display.digest, display.kind),
                 condition,
-                source.panels.get(name, ""),
+                source.panels.get(condition, ""),
                 str(first["exposure"]),
                 results.headline.key,
                 str(first["protocol"]),
@@ -203,12 +202,12 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
                     display=display,
                     label=label,
                     marked=marked(results, label, condition),
-                    method=str(first["name"]),
-                    category=str(first.get("track", "")) or "not recorded",
+                    method=str(first["method"]),
+                    category=str(first["category"]),
                     metric=results.headline,
                     values={t: float(v) for t, v in zip(results.targets, values, strict=True) if np.isfinite(v)},
                     planned=len(results.targets),
-                    score=_estimate(results.row(label, condition), results.headline.key, len(set(results.clusters))),
+                    score=_estimate(results.row(label, condition), results.headline),
                     above=results.above_floor(label, condition),
                     table={str(name): value for name, value in results.row(label, condition).items()},
                     cells=frozenset(cells["cell"]) if (cells["state"] == DONE).all() else frozenset(),
@@ -218,9 +217,9 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
     return rows
 
 
-def _estimate(row: pd.Series, key: str, clusters: int) -> Estimate:
+def _estimate(row: pd.Series, score: Score) -> Estimate:
     """The mean of table.csv with its interval."""
-    return Estimate(row[key], row[f"{key}_lo"], row[f"{key}_hi"], int(row["n"]), int(row.get("clusters", clusters)))
+    return Estimate(*score.ends(row), int(row["n"]), int(row["clusters"]))
 
 
 def _group(rows: Sequence[Row]) -> Group:
@@ -276,7 +275,7 @@ def _ranked(rows: Sequence[Row]) -> list[Row]:
     """The rows, best first, each with its place in its category; holes, oracles and further runs have none."""
     ranked: dict[tuple[str, ...], Row] = {}
     for row in rows:
-        if row.is_complete and row.category not in (ORACLE, "not recorded"):
+        if row.is_complete and row.category != ORACLE:
             ranked.setdefault(row.contestant, row)
     sign = -1 if rows[0].metric.higher_is_better else 1
     ordered = sorted(rows, key=lambda row: (not row.values, sign * row.score.mean if row.values else 0.0))

@@ -99,14 +99,14 @@ def test_a_method_that_lacks_a_target_is_not_counted_among_every_method() -> Non
     found = results_of({"old": 17.0, "new": 19.0, "floor_constant": 15.0})
     assert "Every method is better" in answer(found)
     whole = found.frame
-    hole = whole[(whole["method"] != "new") | (whole["target"] != TARGETS[0])].reset_index(drop=True)
+    hole = whole[(whole["label"] != "new") | (whole["target"] != TARGETS[0])].reset_index(drop=True)
     text = answer(Results(hole, found.layout))
     assert "Every method with a score for every target is better" in text
 
 
 def test_a_method_of_the_question_without_a_comparison_is_named() -> None:
     found = results_of({"old": 17.0, "new": 19.0, "other": 18.0}, question="Is new better?")
-    hole = found.frame[(found.frame["method"] != "new") | (found.frame["target"] != TARGETS[0])].reset_index(drop=True)
+    hole = found.frame[(found.frame["label"] != "new") | (found.frame["target"] != TARGETS[0])].reset_index(drop=True)
     text = answer(Results(hole, found.layout))
     assert "new lacks 1 of 8 targets (t0)" in text
     assert "name the other 7 targets with --targets to rank all by these" in text

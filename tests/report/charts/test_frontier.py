@@ -148,7 +148,7 @@ def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_p
     alone = found.row("learned_kernel", "leto-aged")
     one = marks["learned_kernel"]
     assert one.low < one.quality < one.high
-    assert one.high - one.low < 0.6 * (alone["psnr_linear_hi"] - alone["psnr_linear_lo"])
+    assert one.high - one.low < 0.6 * (alone["psnr_linear_hi_db"] - alone["psnr_linear_lo_db"])
     gained = found.gain("learned_kernel", "leto-aged")
     assert one.high - one.quality == pytest.approx(gained.high - gained.mean)
     assert np.isnan(marks["wirtinger"].low)

@@ -1,14 +1,25 @@
-"""Names and meanings of the columns of a report's files."""
+"""Names and meanings of the columns of a report's files, and what a column more takes."""
 
 from __future__ import annotations
 
 import csv
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from holobench_eval.metrics.catalogue import catalogue
-from holobench_eval.report.data.columns import File, column, file_name, frame_name
+from holobench_eval.report import Description, Layout, write_report
+from holobench_eval.report.data import columns
+from holobench_eval.report.data.column import Column, InTable, Record, column, if_known, mean
+from holobench_eval.report.data.meanings import File
+from holobench_eval.report.data.meanings import column as described
+from holobench_eval.report.data.scores import parse
+from holobench_eval.report.data.tables import read_records, records_frame
+from holobench_eval.report.page.data import page_data
+from holobench_eval.report.section import Report
+from holobench_eval.report.sections.leaderboard import leaderboard
+from tests.support import budget_study as budget
 
 REPORTS = Path(__file__).parents[3] / "reports"
 
@@ -19,57 +30,100 @@ def header(path: Path) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"),
+    ("key", "expected"),
     [
         ("psnr_linear", "psnr_linear_db"),
-        ("psnr_linear_lo", "psnr_linear_lo_db"),
         ("psnr_linear_blur0.5", "psnr_linear_blur0.5px_db"),
         ("ssim_srgb", "ssim_srgb"),
-        ("ssim_linear_blur1_hi", "ssim_linear_blur1px_hi"),
-        ("reported_psnr", "reported_psnr_db"),
-        ("reported_1-lpips", "reported_1-lpips"),
-        ("seconds", "solving_s"),
-        ("method", "label"),
-        ("name", "method"),
-        ("registration_residual_px", "registration_residual_px"),
+        ("psnr_srgb_refined", "psnr_srgb_refined_db"),
+        ("psnr", "psnr_db"),
+        ("1-lpips", "1-lpips"),
+        ("refine_dx_px", "refine_dx_px"),
     ],
 )
-def test_a_unit_is_the_last_part_of_a_name_in_a_file_and_the_name_in_frames_comes_back(
-    name: str, expected: str
-) -> None:
-    assert file_name(name) == expected
-    assert frame_name(expected) == name
+def test_a_unit_is_the_last_part_of_a_column_and_the_key_comes_back(key: str, expected: str) -> None:
+    assert parse(key).column == expected
+    assert parse(expected) == parse(key)
 
 
-@pytest.mark.parametrize("file", ["records.csv", "table.csv"])
+def test_a_statistic_stands_before_the_unit() -> None:
+    assert parse("psnr_linear").statistic("_lo") == "psnr_linear_lo_db"
+    assert parse("ssim_linear_blur1").statistic("_hi") == "ssim_linear_blur1px_hi"
+
+
+@pytest.mark.parametrize("file", ["records.csv", "table.csv", "tests.csv"])
 def test_every_column_of_the_committed_reports_has_an_entry(file: File) -> None:
     reports = sorted(REPORTS.glob(f"*/{file}"))
     assert len(reports) > 10
     names = {name for path in reports for name in header(path)}
-    written = {name if column(file, name) else file_name(frame_name(name)) for name in names}
-    assert len(written) > 50
-    assert [name for name in sorted(written) if column(file, name) is None] == []
+    assert len(names) > (10 if file == "tests.csv" else 50)
+    assert [name for name in sorted(names) if described(file, name) is None] == []
 
 
 @pytest.mark.parametrize("end", ["", "_lo", "_hi"])
 def test_every_metric_of_the_catalogue_has_an_entry_with_its_unit(end: str) -> None:
     for metric in catalogue():
         for domain in metric.domains:
-            found = column("table.csv", file_name(f"{metric.name}_{domain}{end}"))
+            found = described("table.csv", parse(f"{metric.name}_{domain}").statistic(end))
             assert found is not None
             assert (found.unit, found.kind) == (metric.unit, "number")
             assert not metric.unit or found.name.endswith(f"_{metric.unit.lower()}")
 
 
 def test_a_column_that_the_dictionary_lacks_is_found_out() -> None:
-    assert column("records.csv", "glare") is None
-    assert column("records.csv", "psnr_linear_glare_db") is None
-    assert column("tests.csv", "psnr_linear_db") is None
-    assert column("records.csv", "psnr_linear_lo_db") is None
+    assert described("records.csv", "glare") is None
+    assert described("records.csv", "psnr_linear_glare_db") is None
+    assert described("tests.csv", "psnr_linear_db") is None
+    assert described("records.csv", "psnr_linear_lo_db") is None
 
 
 def test_an_entry_says_what_a_difference_is_a_difference_of() -> None:
-    found = column("tests.csv", "difference_lo_db")
+    found = described("tests.csv", "difference_lo_db")
     assert found is not None
     assert (found.unit, found.kind) == ("dB", "number")
     assert "not adjusted" in found.meaning
+
+
+@pytest.fixture
+def energy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A figure of a run more: one entry."""
+    figures: list[Column] = []
+    table = InTable(mean, "Energy of solving, mean over cells")
+
+    @column(figures, "number", unit="J", kept=if_known, table=table, heading="energy per {each} [J]")
+    def energy_j(record: Record, layout: Layout) -> float | None:
+        """Energy that solving took."""
+        return record.get("energy")
+
+    monkeypatch.setattr(columns, "FIGURES", [*columns.FIGURES, *figures])
+
+
+@pytest.mark.usefixtures("energy")
+def test_a_figure_of_a_run_takes_one_entry(tmp_path: Path) -> None:
+    layout, records = (
+        budget.layout(),
+        [{**record, "energy": 2.5 + index} for index, record in enumerate(budget.study())],
+    )
+    _, results = write_report(layout, records, tmp_path, {}, Description())
+    cells, table = (pd.read_csv(tmp_path / name) for name in ("records.csv", "table.csv"))
+    first = cells[(cells["label"] == "double_phase") & (cells["condition"] == "leto-aged")]
+    assert first["energy_j"].tolist() == [2.5, 3.5, 4.5, 5.5, 6.5, 7.5]
+    assert table.set_index(["label", "condition"]).loc[("double_phase", "leto-aged"), "energy_j"] == 5.0
+    dictionary = (tmp_path / "columns.md").read_text()
+    assert "| `energy_j` | Energy that solving took | J | number |" in dictionary
+    assert "| `energy_j` | Energy of solving, mean over cells | J | number |" in dictionary
+    page = page_data(Report(results, records, tmp_path, {}, Description()))
+    assert {"key": "energy_j", "heading": "energy per hologram [J]", "higher": False} in page["columns"]
+    row = next(row for row in page["rows"]["leto-aged"] if row["method"] == "double_phase")
+    assert row["cells"]["energy_j"] == {"text": "5", "value": 5.0}
+    assert "energy per hologram [J]" in str(leaderboard(results, "leto-aged"))
+    pd.testing.assert_frame_equal(read_records((tmp_path / "records.csv").read_text()), results.frame)
+    committed = [{"row": row} for row in results.frame.to_dict("records")]
+    pd.testing.assert_frame_equal(records_frame(committed, budget.layout()), results.frame)
+
+
+@pytest.mark.usefixtures("energy")
+def test_a_figure_that_no_record_has_is_in_no_file(tmp_path: Path) -> None:
+    _, results = write_report(budget.layout(), budget.study(), tmp_path, {}, Description())
+    assert "energy_j" not in results.frame
+    assert not any("energy" in (tmp_path / name).read_text() for name in ("records.csv", "table.csv", "columns.md"))

@@ -7,7 +7,6 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, read_records, recompute_files, records_frame, table_from_records
-from holobench_eval.report.files.tidy import tidy_records, tidy_table
 from holobench_eval.report.sections.cost import timing
 from holobench_eval.study.plan import FLOORS, REFERENCE
 from tests.support import synthetic_study as synthetic
@@ -29,7 +28,7 @@ def rows(values, label="a", repeats=1, **changes):
 
 
 def row_of(table, label):
-    return table[table["method"] == label].iloc[0]
+    return table[table["label"] == label].iloc[0]
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +47,13 @@ def test_equal_records_give_equal_bytes_in_any_order(records):
 
 def test_table_computed_from_the_written_records_has_the_same_bytes(records):
     found = Results(records_frame(records, synthetic.layout()), synthetic.layout())
-    written = csv_text(tidy_records(found.frame, found.layout))
-    assert recompute_files(written, found.layout)["table.csv"] == csv_text(tidy_table(found))
+    written = csv_text(found.frame)
+    assert recompute_files(written, found.layout)["table.csv"] == csv_text(found.table)
 
 
 def test_rows_follow_the_config_and_end_with_the_floor(records):
     table = table_from_records(records_frame(records, synthetic.layout()), synthetic.layout())
-    found = list(zip(table["method"], table["condition"], strict=True))
+    found = list(zip(table["label"], table["condition"], strict=True))
     assert found == [*synthetic.layout().pairs, *((name, REFERENCE) for name in FLOORS)]
 
 
@@ -66,10 +65,10 @@ def test_clusters_and_the_median_stand_in_the_table_and_widen_the_interval():
         row_of(Results(records_frame(found, layout), layout).table, "a")
         for layout in (synthetic.layout(**grouped), synthetic.layout(**alone))
     )
-    assert (wide["n"], wide["clusters"], wide["psnr_linear_median"]) == (6, 3, 2.25)
-    assert wide["psnr_linear"] == narrow["psnr_linear"]
-    assert wide["psnr_linear_lo"] < narrow["psnr_linear_lo"]
-    assert "clusters" not in narrow
+    assert (wide["n"], wide["clusters"], wide["psnr_linear_median_db"]) == (6, 3, 2.25)
+    assert wide["psnr_linear_db"] == narrow["psnr_linear_db"]
+    assert wide["psnr_linear_lo_db"] < narrow["psnr_linear_lo_db"]
+    assert narrow["clusters"] == 6
 
 
 def test_targets_keep_the_order_of_the_dataset():
@@ -79,7 +78,7 @@ def test_targets_keep_the_order_of_the_dataset():
 
 def test_a_failed_cell_is_counted_and_is_in_no_mean(records):
     table = table_from_records(records_frame(records, synthetic.layout()), synthetic.layout())
-    row = table[(table["method"] == "GS") & (table["condition"] == "leto-aged")].iloc[0]
+    row = table[(table["label"] == "GS") & (table["condition"] == "leto-aged")].iloc[0]
     assert (row["n"], row["failed"]) == (2, 1)
 
 
@@ -87,14 +86,14 @@ def test_a_method_that_is_unavailable_keeps_its_row():
     lost = rows({"t1": 0.0, "t2": 0.0}, label="b", state="unavailable", reason="needs a camera")
     table = table_from_records(records_frame([*lost, *rows({"t1": 1.0, "t2": 2.0})], PLAIN), PLAIN)
     assert (row_of(table, "b")["n"], row_of(table, "b")["failed"]) == (0, 2)
-    assert np.isnan(row_of(table, "b")["psnr_linear"])
+    assert np.isnan(row_of(table, "b")["psnr_linear_db"])
 
 
 def test_repeats_are_averaged_within_a_target_first():
     several = [*rows({"t1": 10.0}, repeats=3), *rows({"t2": 20.0})]
     row = row_of(table_from_records(records_frame(several, PLAIN), PLAIN), "a")
     assert row["n"] == 2
-    assert row["psnr_linear"] == pytest.approx((11.0 + 20.0) / 2)
+    assert row["psnr_linear_db"] == pytest.approx((11.0 + 20.0) / 2)
 
 
 def test_a_metric_that_some_targets_lack_has_no_mean():
@@ -127,9 +126,9 @@ def timed(label="a", alone=ALONE):
 def test_the_seconds_of_a_row_are_those_of_what_was_timed_alone_if_anything_was():
     frame = records_frame([*timed(), *timed("b", {"t1": (5.0, False), "t2": (3.0, False)})], PLAIN)
     table = table_from_records(frame, PLAIN)
-    assert row_of(table, "a")["seconds"] == 3.0
-    assert row_of(table, "b")["seconds"] == 4.0
-    again = read_records(csv_text(tidy_records(frame, PLAIN)))
+    assert row_of(table, "a")["solving_s"] == 3.0
+    assert row_of(table, "b")["solving_s"] == 4.0
+    again = read_records(csv_text(frame))
     assert csv_text(table_from_records(again, PLAIN)) == csv_text(table)
 
 
@@ -137,7 +136,7 @@ def test_records_that_do_not_say_what_was_beside_them_have_no_column_for_it_and_
     old = [{key: value for key, value in record.items() if key != "alone"} for record in timed()]
     frame = records_frame(old, PLAIN)
     assert "timed_alone" not in frame
-    assert row_of(table_from_records(frame, PLAIN), "a")["seconds"] == 4.0
+    assert row_of(table_from_records(frame, PLAIN), "a")["solving_s"] == 4.0
 
 
 SHARED = {"t1": (5.0, False), "t2": (3.0, False)}
@@ -170,16 +169,16 @@ def test_nothing_is_said_of_records_that_a_single_worker_left_without_a_note():
 
 def test_published_figures_have_columns_of_their_own(records):
     table = table_from_records(records_frame(records, synthetic.layout()), synthetic.layout())
-    assert row_of(table, "HIL")["reported_psnr"] == 20.5
-    assert np.isnan(row_of(table, "GS")["reported_psnr"])
-    assert row_of(table, "HIL")["psnr_linear"] != 20.5
+    assert row_of(table, "HIL")["reported_psnr_db"] == 20.5
+    assert np.isnan(row_of(table, "GS")["reported_psnr_db"])
+    assert row_of(table, "HIL")["psnr_linear_db"] != 20.5
 
 
 @pytest.mark.parametrize("label", ["NA", "nan", "a,b", 'say "x"', "1e5", " padded ", "é"])
 def test_labels_survive_being_written_and_read(label):
     layout = synthetic.layout(pairs=((label, "bench"),), targets=("t1",), reported={})
     text = csv_text(records_frame(rows({"t1": 1.0}, label=label), layout))
-    assert list(read_records(text)["method"]) == [label]
+    assert list(read_records(text)["label"]) == [label]
     assert csv_text(read_records(text)) == text
 
 
@@ -191,8 +190,8 @@ def test_a_reason_with_line_breaks_stays_on_its_row():
 
 def test_a_score_named_like_a_column_is_refused():
     bad = rows({"t1": 1.0})
-    bad[0]["scores"]["seconds"] = 1.0
-    with pytest.raises(UserError, match="seconds"):
+    bad[0]["scores"]["captures"] = 1.0
+    with pytest.raises(UserError, match="captures"):
         records_frame(bad, PLAIN)
 
 
@@ -204,5 +203,5 @@ def test_records_of_another_version_are_refused():
 def test_published_figures_stand_beside_the_display_they_belong_to(records):
     layout = synthetic.layout(reported_beside=synthetic.layout().conditions[0])
     table = table_from_records(records_frame(records, layout), layout)
-    beside = table[table["reported_psnr"].notna()]
+    beside = table[table["reported_psnr_db"].notna()]
     assert set(beside["condition"]) == {layout.conditions[0]}

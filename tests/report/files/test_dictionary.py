@@ -20,7 +20,7 @@ def test_every_column_of_a_report_is_described_once_and_in_its_order(tmp_path: P
         (section,) = re.findall(rf"## {file}\n\n(.*?)(?:\n\n|\Z)", text, re.DOTALL)
         described = re.findall(r"^\| `(.+?)` \|", section, re.MULTILINE)
         assert ",".join(described) == (tmp_path / file).read_text().splitlines()[0]
-    assert "| `solving_s` | Time to solve the target | s | number |" in text
+    assert "| `solving_s` | Time to solve the target, of the solving that made the phase, in this run" in text
     assert results.headline.key in text
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.report import Results, records_frame
+from holobench_eval.report.data.comparisons import comparison_frame
 from holobench_eval.report.files.latex import escape, latex_tables
-from holobench_eval.report.files.tidy import tidy_table, tidy_tests
 from tests.support import synthetic_study as synthetic
 from tests.support.budget_study import ROWS, TARGETS, layout, study
 
@@ -51,7 +51,7 @@ def rows(text: str, display: str) -> dict[str, list[str]]:
 
 def test_the_numbers_are_those_of_the_csv_files() -> None:
     found = results()
-    table, tests = (frame.set_index(["condition", "label"]) for frame in (tidy_table(found), tidy_tests(found)))
+    table, tests = (frame.set_index(["condition", "label"]) for frame in (found.table, comparison_frame(found)))
     shown = rows(latex_tables(found), "leto-aged")
     assert len(shown) == len(ROWS)
     for label in ("hil", "parametric_model (16 captures)", "online_camera_network"):

@@ -9,10 +9,9 @@ import pandas as pd
 import pytest
 
 from holobench_eval.report import csv_text
-from holobench_eval.report.data.columns import column
+from holobench_eval.report.data.meanings import column
 from holobench_eval.report.files import parquet, write_files
-from holobench_eval.report.files.tidy import tidy_records
-from tests.report.files.test_tidy import results
+from tests.report.files.test_csv import results
 
 FILE = "records.parquet"
 
@@ -50,9 +49,8 @@ def test_whole_numbers_are_integers_and_unknown_ones_are_null(tmp_path: Path) ->
 def test_text_that_looks_like_a_formula_needs_no_apostrophe_in_parquet(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     found = results(clusters={f"t{number}": "=1" for number in range(8)})
-    tidy = tidy_records(found.frame, found.layout)
-    parquet.write_parquet(tmp_path / FILE, tidy)
-    assert "'=1" in csv_text(tidy)
+    parquet.write_parquet(tmp_path / FILE, found.frame)
+    assert "'=1" in csv_text(found.frame)
     assert "=1" in set(pd.read_parquet(tmp_path / FILE)["cluster"])
 
 

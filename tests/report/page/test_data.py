@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 
-from holobench_eval.report.data.columns import file_name
+from holobench_eval.report.data.scores import parse
 
 from .conftest import Written
 
@@ -28,10 +28,11 @@ def test_every_number_of_the_table_is_that_of_table_csv(written: Written) -> Non
             expected = rows.pop((row["method"], condition))
             assert row["n"] == int(expected["n"])
             for key, cell in row["cells"].items():
-                if file_name(key) in expected:
-                    assert cell["value"] == number(expected[file_name(key)])
-                    assert cell.get("low") == number(expected.get(file_name(f"{key}_lo"), ""))
-                    assert cell.get("high") == number(expected.get(file_name(f"{key}_hi"), ""))
+                score = parse(key)
+                if score.column in expected:
+                    assert cell["value"] == number(expected[score.column])
+                    assert cell.get("low") == number(expected.get(score.statistic("_lo"), ""))
+                    assert cell.get("high") == number(expected.get(score.statistic("_hi"), ""))
                     compared += cell["value"] is not None
     assert compared > 60
     assert {condition for _, condition in rows} == {"reference"}  # the floor is beside the table
@@ -44,7 +45,7 @@ def test_the_value_of_every_target_is_that_of_records_csv(written: Written) -> N
         if row["condition"] in written.data["values"]:
             values = written.data["values"][row["condition"]][row["label"]]
             for key, found in values.items():
-                assert found[names.index(row["target"])] == number(row[file_name(key)])
+                assert found[names.index(row["target"])] == number(row[parse(key).column])
                 compared += 1
     assert compared > 100
 

@@ -97,7 +97,8 @@ def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
     assert parse("psnr_linear_infocus").axis == "PSNR in focus, linear light [dB]"
     leading = [score.key for score in results_of({"lens": 20.0}).leading]
     assert leading[:3] == ["psnr_linear_infocus", "ssim_linear_infocus", "psnr_linear"]
-    scores, cell = [parse(key) for key in leading[:2]], pd.Series({leading[0]: 16.384, leading[1]: 0.4})
+    scores = [parse(key) for key in leading[:2]]
+    cell = pd.Series({score.column: value for score, value in zip(scores, (16.384, 0.4), strict=True)})
     assert noted(scores, cell) == "in focus: PSNR 16.38 dB   SSIM 0.400"
 
 

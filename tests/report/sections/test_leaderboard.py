@@ -1,17 +1,13 @@
 import pytest
 
-from holobench_eval.report import Results, csv_text, read_records, recompute_files, records_frame, table_from_records
+from holobench_eval.report import Results, csv_text, recompute_files, records_frame
 from holobench_eval.report.data.categories import meanings
-from holobench_eval.report.data.columns import file_name
-from holobench_eval.report.files.tidy import tidy_records, tidy_table
 from holobench_eval.report.sections.display.findings import findings
 from holobench_eval.report.sections.leaderboard import leaderboard, reading
 from holobench_eval.report.sections.results import stopped
 from holobench_eval.study.plan import REFERENCE
 from tests.support import budget_study as budget
 from tests.support import synthetic_study as synthetic
-
-NEW = ("track", "rank", "total_captures", "memory_mib", "stopped")
 
 
 def results(records, **changes):
@@ -51,7 +47,7 @@ def test_ranks_are_counted_anew_in_every_track_and_the_ceiling_has_none(found):
 
 
 def test_total_captures_are_those_of_the_training_and_of_every_target(found):
-    total = found.table.set_index(["method", "condition"])["total_captures"]
+    total = found.table.set_index(["label", "condition"])["total_captures"]
     assert total["online_camera_network", "ideal"] == 64 + 50 * len(budget.TARGETS)
     assert total["online_camera (25 captures)", "ideal"] == 25 * len(budget.TARGETS)
     assert total["parametric_model (64 captures)", "ideal"] == 64
@@ -60,7 +56,7 @@ def test_total_captures_are_those_of_the_training_and_of_every_target(found):
 
 def test_repeats_are_one_hologram_measured_again_and_do_not_add_captures(records):
     again = [record | {"cell": record["cell"] | {"repeat": 1}} for record in records]
-    total = results([*records, *again]).table.set_index(["method", "condition"])["total_captures"]
+    total = results([*records, *again]).table.set_index(["label", "condition"])["total_captures"]
     assert total["online_camera_network", "ideal"] == 64 + 50 * len(budget.TARGETS)
 
 
@@ -97,7 +93,7 @@ def test_there_is_no_gap_to_an_oracle_below_the_baseline(records):
 
 def test_memory_is_the_median_since_a_first_solution_also_loads_libraries(records):
     heavy = [r | {"memory_mib": 900.0} if r["cell"]["target"] == budget.TARGETS[0] else r for r in records]
-    memory = results(heavy).table.set_index(["method", "condition"])["memory_mib"]
+    memory = results(heavy).table.set_index(["label", "condition"])["memory_mib"]
     assert memory["wirtinger", "ideal"] == 10
 
 
@@ -138,17 +134,8 @@ def test_the_table_follows_from_the_written_records(records):
     ended = [record | {"stopped": "over, and out"} for record in records]
     floor = synthetic.record("floor_black", synthetic.cell("floor_black", "coffee", REFERENCE), {"psnr_linear": 1.0})
     found = results([*ended, floor])
-    written = csv_text(tidy_records(found.frame, found.layout))
-    assert recompute_files(written, found.layout)["table.csv"] == csv_text(tidy_table(found))
-
-
-def test_records_of_an_earlier_version_give_the_table_of_that_version(found):
-    old = found.frame.drop(columns=[column for column in NEW if column in found.frame])
-    table = table_from_records(read_records(csv_text(old)), found.layout)
-    assert not set(NEW) & set(table)
-    assert csv_text(found.table.drop(columns=[column for column in NEW if column in found.table])) == csv_text(table)
-    header = recompute_files(csv_text(old), found.layout)["table.csv"].splitlines()[0]
-    assert not set(map(file_name, NEW)) & set(header.split(","))
+    written = csv_text(found.frame)
+    assert recompute_files(written, found.layout)["table.csv"] == csv_text(found.table)
 
 
 def test_a_study_in_which_no_memory_was_measured_has_no_column_for_it(records):

@@ -125,7 +125,7 @@ def test_claims_of_the_paper_are_answered_from_the_numbers(results: Results) -> 
         '4 cm" cannot be judged for HIL on leto-aged (camera moved sideways): the sweep does not go far enough' in told
     )
     assert "goes from +4.00 to -5.00 dB" in told
-    without = Results(results.frame[results.frame["name"] != "hil"], replace(layout(), pairs=()))
+    without = Results(results.frame[results.frame["method"] != "hil"], replace(layout(), pairs=()))
     assert section_sweeps.claims(without, sweeps(without)) == ""
 
 
@@ -142,9 +142,9 @@ def test_a_claim_whose_interval_is_on_both_sides_of_the_bound_is_neither_shown_t
 
 def test_a_hole_leaves_no_slope_no_claim_and_no_end_of_an_advantage(results: Results) -> None:
     frame = results.frame.copy()
-    hole = (frame["method"] == "HIL") & (frame["condition"] == title("drift", 90.0)) & (frame["target"] == "b")
+    hole = (frame["label"] == "HIL") & (frame["condition"] == title("drift", 90.0)) & (frame["target"] == "b")
     frame.loc[hole, "state"] = "failed"
-    frame.loc[hole, "psnr_linear"] = np.nan
+    frame.loc[hole, "psnr_linear_db"] = np.nan
     holed = Results(frame, layout())
     drift = of(holed, "drift")
     assert drift.slope("HIL", 1) is None

@@ -11,7 +11,6 @@ from holobench_eval.report import Results, csv_text, recompute_files, records_fr
 from holobench_eval.report.charts.training import CURVES, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
-from holobench_eval.report.files.tidy import tidy_records, tidy_table
 from holobench_eval.study.artifacts import Round, rounds_in, rounds_of
 from tests.support import synthetic_study as synthetic
 from tests.support.reports import whole
@@ -80,16 +79,16 @@ def test_captures_for_training_are_told_apart_from_those_while_solving(found, tm
     last = max(index for index, record in enumerate(found) if record["label"] == "HIL")
     lost = trained(found[last] | {"state": "failed", "reason": "x", "scores": {}}, "hil")
     frame = records_frame([*found[:last], lost, *found[last + 1 :]], layout())
-    took = frame[frame["state"] == "done"].groupby("method")[["captures", "training_captures", "training_seconds"]]
+    took = frame[frame["state"] == "done"].groupby("label")[["captures", "training_captures", "training_s"]]
     assert took.mean().loc["HIL"].tolist() == [50, 140, 3600.5]
     assert took.mean().loc["GS"].tolist() == [0, 0, 0]
     holes = frame[frame["state"] == "failed"]
     assert len(holes) == 2
     assert holes["training_captures"].isna().all()
     table = table_from_records(frame, layout())
-    assert table.set_index("method").loc["HIL", "learned_sha256"] == "hil" * 16
-    written_records = csv_text(tidy_records(frame, layout()))
-    assert recompute_files(written_records, layout())["table.csv"] == csv_text(tidy_table(Results(frame, layout())))
+    assert table.set_index("label").loc["HIL", "learned_sha256"] == "hil" * 16
+    written_records = csv_text(frame)
+    assert recompute_files(written_records, layout())["table.csv"] == csv_text(Results(frame, layout()).table)
 
     text = written(found, tmp_path)
     header, _, *rows = rows_under(text, "Captures, time and light")

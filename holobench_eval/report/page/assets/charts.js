@@ -3,7 +3,7 @@
 const SYMBOLS = { "open loop": "circle", calibrated: "square", online: "diamond", given: "circle" };
 const COSTS = [
   { key: "total_captures", type: "symlog", note: "captures in total, of training and of all targets (zero at the left)" },
-  { key: "seconds", type: "log", note: "computing time" },
+  { key: "solving_s", type: "log", note: "computing time" },
 ];
 
 function setUpCharts() {

@@ -90,7 +90,7 @@ def _leading(
         if test.condition == condition and test.second in compared and test.estimate.n:
             if best == baseline:
                 return [f"{sentence} {test.second} follows at {margin(score, test)}."]
-            other = score.with_unit(results.row(test.first, condition)[score.key])
+            other = score.with_unit(results.row(test.first, condition)[score.column])
             sentence += f" Difference from the baseline {baseline} ({other}): {margin(score, test)}."
     return [sentence + _lead(results, condition, ranking)]
 
@@ -111,7 +111,7 @@ def _second_baseline(results: Results, condition: str) -> list[str]:
     second, score = results.layout.second_baseline, results.headline
     if second is None or second not in results.methods(condition) or not results.is_complete(second, condition):
         return []
-    value, own = score.with_unit(results.row(second, condition)[score.key]), results.values(second, condition)
+    value, own = score.with_unit(results.row(second, condition)[score.column]), results.values(second, condition)
     differences = [
         f"{label} {difference(score, results.estimate(results.values(label, condition) - own))}"
         for label in results.ranking(condition)
@@ -143,7 +143,7 @@ def _oracle(results: Results, condition: str) -> list[str]:
     ranking, score = results.ranking(condition), results.headline
     sentences = []
     for label in results.methods(condition):
-        value = results.row(label, condition)[score.key]
+        value = results.row(label, condition)[score.column]
         if label in results.layout.privileged and ranking and np.isfinite(value):
             gap = results.estimate(results.values(label, condition) - results.values(ranking[0], condition))
             sentences.append(
@@ -195,7 +195,7 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
     verdicts += [f"better on average, without an interval clear of zero: {words(unclear)}"] if unclear else []
     verdict = "; ".join(verdicts) or f"all scored methods ({len(known)}) are better"
     named, row = results.layout.text.floor_name(floor), results.row(floor, REFERENCE)
-    return [f"Floor: {named} scores {score.with_unit(row[score.key])}; {verdict}."]
+    return [f"Floor: {named} scores {score.with_unit(row[score.column])}; {verdict}."]
 
 
 def _blur_sensitivity(results: Results, condition: str) -> list[str]:

@@ -71,7 +71,7 @@ def chosen(results: Results, condition: str) -> list[str]:
 
 
 def _has_scores(report: Report) -> bool:
-    values = report.results.table.get(report.results.headline.key)
+    values = report.results.table.get(report.results.headline.column)
     return bool(report.results.conditions) and values is not None and bool(np.isfinite(values).any())
 
 

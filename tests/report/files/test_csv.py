@@ -12,8 +12,9 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, layout_of, read_records, records_frame
+from holobench_eval.report.data.comparisons import comparison_frame
 from holobench_eval.report.data.layout import Layout, Swept
-from holobench_eval.report.files.tidy import tidy_records, tidy_table, tidy_tests
+from holobench_eval.report.data.tables import of_study
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE
 from tests.report.sections import test_sweeps as swept_study
@@ -66,7 +67,7 @@ def read(frame: pd.DataFrame) -> pd.DataFrame:
 
 def test_a_record_says_what_it_is_without_the_config() -> None:
     found = results()
-    row = read(tidy_records(found.frame, found.layout)).iloc[0]
+    row = read(found.frame).iloc[0]
     expected = {
         "study": "toy",
         "measure": "picture",
@@ -89,7 +90,7 @@ def test_a_record_says_what_it_is_without_the_config() -> None:
 
 def test_a_row_of_the_table_has_the_parameters_of_its_method() -> None:
     found = results()
-    table, records = read(tidy_table(found)), read(tidy_records(found.frame, found.layout))
+    table, records = read(found.table), read(found.frame)
     assert json.loads(table.set_index("label").loc["wirtinger, 200", "parameters"]) == PARAMS
     assert set(table["label"]) <= set(records["label"])
     assert "parameters" not in records
@@ -97,7 +98,7 @@ def test_a_row_of_the_table_has_the_parameters_of_its_method() -> None:
 
 def test_a_limit_of_captures_and_the_floor_are_told_apart() -> None:
     found = results()
-    cells = read(tidy_records(found.frame, found.layout)).set_index("label")
+    cells = read(found.frame).set_index("label")
     assert set(cells.loc["hil", "capture_limit"]) == {25}
     assert cells.loc["wirtinger, 200", "capture_limit"].isna().all()
     assert cells.loc["floor_constant", ["category", "condition"]].tolist() == ["floor", REFERENCE]
@@ -105,7 +106,7 @@ def test_a_limit_of_captures_and_the_floor_are_told_apart() -> None:
 
 def test_a_swept_quantity_is_a_number_with_a_unit_or_a_name() -> None:
     made = swept_study.layout()
-    cells = read(tidy_records(records_frame(swept_study.records(), made), made))
+    cells = read(records_frame(swept_study.records(), made))
     points = cells.drop_duplicates("condition").set_index("condition")[["swept", "swept_value", "swept_unit"]]
     assert points.loc["leto-aged, drift 30.0"].tolist() == ["drift", 30.0, "days"]
     assert points.loc["leto-aged, camera_shift_x -20.0"].tolist() == ["camera_shift_x", -20.0, "mm"]
@@ -127,40 +128,36 @@ def test_a_ratio_has_the_unit_one_and_a_draw_its_number() -> None:
         synthetic.record("hil", synthetic.cell("hil", "t0", condition, profile="leto-aged"), {"psnr_linear": 1.0})
         for condition in conditions
     ]
-    cells = tidy_records(records_frame(found, made), made).set_index("swept")
+    cells = records_frame(found, made).set_index("swept")
     assert cells.loc["laser_power", ["swept_value", "swept_unit"]].tolist() == [0.5, "1"]
     assert cells.loc["draw", ["swept_value", "swept_unit"]].tolist() == [7.0, ""]
 
 
 def test_the_plane_of_a_focal_stack_is_a_swept_quantity() -> None:
     made = layout(planes={target: ("scene", float(index)) for index, target in enumerate(TARGETS)}, measure="focus")
-    cells = tidy_records(records_frame(records(), made), made)
+    cells = records_frame(records(), made)
     found = cells[cells["label"] == "hil"].set_index("target").loc["t3", ["swept", "swept_value", "swept_unit"]]
     assert found.tolist() == ["plane", 3.0, "mm"]
 
 
 @pytest.mark.parametrize("report", ["table3", "table1", "error-budget"])
-def test_committed_records_become_tidy_and_come_back_without_a_loss(report: str) -> None:
+def test_committed_records_are_read_and_written_without_a_loss(report: str) -> None:
     text = (ROOT / "reports" / report / "records.csv").read_text()
     made = layout_of(load_study(ROOT / "configs" / f"{report}.yaml"))
     frame = read_records(text)
-    tidy = csv_text(tidy_records(frame, made))
-    assert text in (csv_text(frame), tidy)  # in the columns of earlier reports, or of this version
-    pd.testing.assert_frame_equal(read_records(tidy), frame)
-    assert csv_text(read_records(tidy)) == csv_text(frame)
+    assert text == csv_text(frame)
+    pd.testing.assert_frame_equal(of_study(frame, made), frame)
     assert len(frame) > 400
 
 
-def test_clusters_of_one_target_each_come_back_as_none() -> None:
+def test_targets_without_clusters_are_a_cluster_each() -> None:
     found = results(clusters={})
-    tidy = tidy_records(found.frame, found.layout)
-    assert (tidy["cluster"] == tidy["target"]).all()
-    assert "cluster" not in read_records(csv_text(tidy))
-    assert read(tidy_table(found))["clusters"].iloc[0] == len(TARGETS)
+    assert (found.frame["cluster"] == found.frame["target"]).all()
+    assert read(found.table)["clusters"].iloc[0] == len(TARGETS)
 
 
 def test_the_table_leads_with_what_it_is_a_table_of() -> None:
-    table = read(tidy_table(results())).set_index("label")
+    table = read(results().table).set_index("label")
     assert table.loc["hil", ["study", "method", "display", "n", "clusters"]].tolist() == [
         "toy",
         "hil",
@@ -175,7 +172,7 @@ def test_the_table_leads_with_what_it_is_a_table_of() -> None:
 def test_a_paired_test_has_the_numbers_of_the_report() -> None:
     found = results()
     (expected,) = found.against_baseline
-    tests = read(tidy_tests(found))
+    tests = read(comparison_frame(found))
     assert len(tests) == 1
     row = tests.iloc[0]
     assert row[["study", "display", "method", "label", "baseline", "metric"]].tolist() == [
@@ -189,7 +186,7 @@ def test_a_paired_test_has_the_numbers_of_the_report() -> None:
 
 
 def test_the_tests_of_a_study_without_a_baseline_are_a_heading_alone() -> None:
-    assert len(csv_text(tidy_tests(results(baseline=None))).splitlines()) == 1
+    assert len(csv_text(comparison_frame(results(baseline=None))).splitlines()) == 1
 
 
 HOSTILE = [
@@ -212,13 +209,13 @@ HOSTILE = [
 def test_text_is_never_a_formula_and_comes_back_as_it_was(name: str) -> None:
     made = layout(pairs=((name, "leto-aged"),), targets=(name,), clusters={name: "="}, baseline=None)
     found = [synthetic.record(name, synthetic.cell(name, name, "leto-aged"), {"psnr_linear": -1.5})]
-    text = csv_text(tidy_records(records_frame(found, made), made))
+    text = csv_text(records_frame(found, made))
     cells = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False).iloc[0]
     written = [cells[column] for column in ("method", "label", "target", "cluster")]
     assert not any(value.lstrip()[:1] in tuple("=+-@＝＋－＠") for value in written)
     again = read_records(text).iloc[0]
-    assert again[["name", "method", "target", "cluster"]].tolist() == [name, name, name, "="]
-    assert (cells["psnr_linear_db"], again["psnr_linear"]) == ("-1.5", -1.5)
+    assert again[["method", "label", "target", "cluster"]].tolist() == [name, name, name, "="]
+    assert (cells["psnr_linear_db"], again["psnr_linear_db"]) == ("-1.5", -1.5)
 
 
 def test_the_name_of_a_column_is_never_a_formula() -> None:
@@ -227,13 +224,13 @@ def test_the_name_of_a_column_is_never_a_formula() -> None:
 
 def test_a_number_that_is_none_is_refused_by_the_name_of_its_column() -> None:
     found = results()
-    text = csv_text(tidy_records(found.frame, found.layout))
+    text = csv_text(found.frame)
     with pytest.raises(UserError, match=r"records.csv, column solving_s: could not convert"):
         read_records(text.replace(",done,,17,0,,", ",done,,17,0,soon,"))
 
 
 def test_a_column_that_lacks_is_named_as_in_the_file() -> None:
     found = results()
-    tidy = tidy_records(found.frame, found.layout).drop(columns="solving_s")
+    lacking = found.frame.drop(columns="solving_s")
     with pytest.raises(UserError, match="lacks the columns solving_s"):
-        read_records(csv_text(tidy))
+        read_records(csv_text(lacking))
