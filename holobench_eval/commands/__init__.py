@@ -24,6 +24,7 @@ COMMANDS = {
         "list_",
         "plan",
         "run",
+        "rescore",
         "reports.report",
         "solve",
         "show",

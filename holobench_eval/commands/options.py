@@ -44,6 +44,7 @@ Learned = Annotated[Path, typer.Option(help="Folder of what trained methods lear
 ARTIFACTS = Path("artifacts")  # the default
 Methods = Annotated[list[str] | None, typer.Option(metavar="A,B", help="Only these methods, by their labels or names.")]
 Targets = Annotated[list[str] | None, typer.Option(metavar="X,Y", help="Only these targets.")]
+RETRAIN = typer.Option("--retrain", help="Train again what the study's methods learn.")
 Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="Only the first N targets.")]
 Values = Annotated[
     list[str] | None,

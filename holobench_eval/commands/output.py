@@ -106,7 +106,7 @@ def print_holes(console: Console, results: Results) -> None:
     Reasons that differ in numbers alone count as one.
     """
     groups: dict[tuple[str, str], list[tuple[str, str, str]]] = {}
-    columns = ["method", "condition", "state", "reason"]
+    columns = ["label", "condition", "state", "reason"]
     for method, condition, state, reason in results.holes[columns].itertuples(index=False):
         alike = re.sub(r"\d+(?:\.\d+)?", "0", reason)
         groups.setdefault((state, alike), []).append((method, condition, reason))

@@ -119,13 +119,14 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
     from ..study import cost, isolation
 
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
-    states, timed = store.states(plan.cells, cost.timed(study, plan)), cost.names()
+    states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder)
+    timed = cost.names()
     rows = []
     for label in dict.fromkeys(task.label for task in plan.tasks):
         tasks = [task for task in plan.tasks if task.label == label]
         cells = [cell for task in tasks for cell in task.cells]
         count = Counter(states[cell.id] for cell in cells)
-        unsolved = [task for task in tasks if any(states[cell.id] == "missing" for cell in task.cells)]
+        unsolved = [task for task in tasks if any(states[cell.id] in ("missing", "untimed") for cell in task.cells)]
         apart = not tasks[0].is_floor and not isolation.runs_inside(
             tasks[0].cells[0].method, study.folder, study.isolation
         )
@@ -139,9 +140,9 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
                 targets=len({cell.target for cell in cells}),
                 cells=len(cells),
                 captures=limit if isinstance(limit, int) else None,
-                done=count["done"],
+                done=count["done"] + count["unscored"],
                 failed=count["failed"],
-                missing=count["missing"],
+                missing=count["missing"] + count["untimed"],
                 seconds=sum(seconds) / len(seconds) * len(unsolved) if seconds else None,
             )
         )

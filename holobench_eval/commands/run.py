@@ -25,6 +25,7 @@ from ..core.panels import is_small
 from .options import (
     ARTIFACTS,
     RESULTS,
+    RETRAIN,
     Config,
     Device,
     Learned,
@@ -65,7 +66,8 @@ def run(
     address: Annotated[str | None, typer.Option(help="Of a running Dask scheduler, for --executor address.")] = None,
     device: Device = "auto",
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
-    retrain: Annotated[bool, typer.Option("--retrain", help="Train again what the study's methods learn.")] = False,
+    retrain: Annotated[bool, RETRAIN] = False,
+    train: Annotated[bool, typer.Option("--train/--no-train", help="Train what is not trained, or refuse it.")] = True,
     artifacts: Learned = ARTIFACTS,
 ) -> None:
     """Compute what is missing of a study and write its report. A stopped run goes on with the same command.
@@ -94,7 +96,7 @@ def run(
         if word := replaced(study, folder):
             console.print(word, markup=False, highlight=False, soft_wrap=True)
         many = thread_count(threads, where.workers, study)
-        options: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "device": device}
+        options: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": device}
         drawings = sheets(study, folder)
         beside = drawings if where.workers > 1 else []
         if where.workers > 1:  # meanwhile this process only waits

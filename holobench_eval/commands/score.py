@@ -6,7 +6,6 @@ import shlex
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,7 +53,7 @@ def score(
     report, results = score_folders(captures, targets, output, values, baseline, weights, console, visible, aligned)
     print_headline(console, results)
     for hole in results.holes.to_dict("records"):
-        text = f"{hole['state']}: {hole['method']} · {hole['target']}: {hole['reason']}"
+        text = f"{hole['state']}: {hole['label']} · {hole['target']}: {hole['reason']}"
         console.print(text, style="red", markup=False, highlight=False, soft_wrap=True)
     print_answer(console, results)
     print(f"{report}\n{output / 'report.html'}\n{output / 'table.csv'}\n{output / 'records.csv'}")
@@ -109,7 +108,7 @@ def score_folders(
         console.print(f"--values {values}: {VALUES[values]}.", markup=False, highlight=False, soft_wrap=True)
         with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
             found = scoring.records(step)
-        records = [asdict(record) for record in found]
+        records = [record.row(record.capture) for record in found]
         notes = [*folders.notes, *_in_part(records), *doubts(found, folders, scoring.domain)]
         for note in notes:
             console.print(note, markup=False, highlight=False, soft_wrap=True)

@@ -11,7 +11,7 @@ import typer
 import yaml
 
 from ..core.errors import UserError
-from .options import ARTIFACTS, PANEL, RESULTS, Learned
+from .options import ARTIFACTS, PANEL, RESULTS, RETRAIN, Learned
 
 STUDY = "study.yaml"  # in the output folder
 
@@ -25,6 +25,7 @@ def solve(
         Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the picture>]")
     ] = None,
     artifacts: Learned = ARTIFACTS,
+    retrain: Annotated[bool, RETRAIN] = False,
 ) -> None:
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from ..core.io import file_name
@@ -45,7 +46,7 @@ def solve(
         study = load_study(config)
         plan(study)
         print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
-        run(config, output=folder, executor="serial", artifacts=artifacts)
+        run(config, output=folder, executor="serial", artifacts=artifacts, retrain=retrain)
     except UserError as error:
         if earlier is not None:  # the report that is there is of this one
             config.write_bytes(earlier)

@@ -25,7 +25,7 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def write_atomically(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes, lasting: bool = True) -> None:
     """Write a file under a temporary name in the same folder, then rename it: readers see all of it or nothing.
 
     Parameters
@@ -34,6 +34,8 @@ def write_atomically(path: Path, content: bytes) -> None:
         The file. Its folder is created where there is none, and a file of this name is replaced.
     content : bytes
         What the file holds afterwards.
+    lasting : bool
+        Wait until the disk has it, so that it outlives a loss of power; what can be made again need not.
 
     Raises
     ------
@@ -56,7 +58,8 @@ def write_atomically(path: Path, content: bytes) -> None:
             with os.fdopen(handle, "wb") as file:
                 file.write(content)
                 file.flush()
-                os.fsync(file.fileno())
+                if lasting:
+                    os.fsync(file.fileno())
             temporary.chmod(0o644)
             temporary.replace(path)
         except BaseException:
@@ -76,14 +79,15 @@ def file_name(text: str) -> str:
     return name if name and name == text else f"{name}-{digest(text)[:8]}"
 
 
-def write_png(path: Path, levels: Tensor, bits: int) -> None:
-    """Write integer levels ``(C, h, w)``, C = 1 or 3 (red, green, blue), as a PNG of 8 or 16 bits."""
+def write_png(path: Path, levels: Tensor, bits: int, lasting: bool = True) -> None:
+    """Write integer levels ``(C, h, w)``, C = 1 or 3 (red, green, blue), as a PNG of 8 or 16 bits; see
+    ``write_atomically``."""
     kind = np.uint8 if bits == 8 else np.uint16
     picture = np.ascontiguousarray(levels.flip(0).permute(1, 2, 0).numpy().astype(kind))  # OpenCV: blue first
     encoded, buffer = cv2.imencode(".png", picture)
     if not encoded:
         raise OSError(f"{path}: a picture of the shape {tuple(levels.shape)} cannot be written as PNG")
-    write_atomically(path, buffer.tobytes())
+    write_atomically(path, buffer.tobytes(), lasting)
 
 
 def decode_levels(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16] | None:

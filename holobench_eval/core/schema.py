@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass
+from functools import cache
 from inspect import signature
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -69,7 +70,7 @@ def checked(cls: type[T], data: Any, owner: str = "", adapter: TypeAdapter[T] | 
     Traceback (most recent call last):
     holobench_eval.core.schema.FieldError: lamp 'desk' has no parameter 'powr'; did you mean 'power'? allowed: power
     """
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
     for where, allowed in _unknown_keys(cls, [((), data)]):
         raise FieldError(where, _unknown_line(where, allowed, owner), at_key=True)
@@ -82,6 +83,11 @@ def checked(cls: type[T], data: Any, owner: str = "", adapter: TypeAdapter[T] | 
     except ValidationError as error:
         fault = error.errors()[0]
         raise FieldError(fault["loc"], _value_line(fault["loc"], fault, owner)) from None
+
+
+@cache
+def _adapter(cls: type[T]) -> TypeAdapter[T]:
+    return TypeAdapter(cls)
 
 
 def typed(document: Document, cls: type[T], data: Mapping[str, Any] | None = None) -> T:
@@ -107,7 +113,7 @@ def typed(document: Document, cls: type[T], data: Mapping[str, Any] | None = Non
         ``file:line:column: `` and the first fault.
     """
     try:
-        return checked(cls, document.data if data is None else data)
+        return checked(cls, document.data if data is None else data, adapter=_adapter(cls))  # type: ignore[arg-type]
     except FieldError as error:
         raise document.error(error.where, str(error), error.at_key) from None
 

@@ -10,6 +10,7 @@ import math
 import torch
 from torch import Tensor
 
+VERSION = "1"  # raised whenever a value would change
 PATCH = 16
 FLATNESS = 0.05
 DIMMEST = 0.05

@@ -20,9 +20,11 @@ from typing import Any
 import torch
 
 from ..core.errors import UserError, reason
-from ..core.hashing import digest
+from ..core.hashing import State, digest, file_digest, file_state
 from ..core.io import TEMPORARY, file_name, write_atomically
+from ..display.account import Journal
 from .displays import Preparation
+from .isolation import changed
 
 STATE, PROVENANCE, LOG, FAILURE = "learned.pt", "provenance.json", "training.csv", "failure.log"
 UNFINISHED = "unfinished"
@@ -30,6 +32,7 @@ UNFINISHED = "unfinished"
 # had to learn. Both are small enough to be committed; a report does not need the tensors.
 RECORDS = "training"
 FORMAT = 1
+OTHER = {"version": "other code", "external": "other files beside the code"}  # by the entry of a description
 
 
 @dataclass(frozen=True)
@@ -55,18 +58,34 @@ class Artifacts:
         return self.folder / file_name(preparation.name)
 
     def has(self, preparation: Preparation) -> bool:
-        """Whether the artifact exists; ``load`` checks it."""
-        return (self.folder_of(preparation) / PROVENANCE).is_file()
+        """Whether the artifact exists, and the files that its training read are still the same; ``load`` checks it."""
+        folder = self.folder_of(preparation)
+        reads = (provenance_of(folder) or {}).get("reads")
+        is_current = not isinstance(reads, dict) or not changed(reads, preparation.folder)
+        return (folder / PROVENANCE).is_file() and is_current
+
+    def outdated(self, preparation: Preparation) -> str:
+        """In words, the artifact that would do, were it not of other code or other files; empty where there is none."""
+        wanted, stem = preparation.description(), preparation.name.rpartition("-")[0]
+        for folder in sorted(self.folder.glob(f"{file_name(stem)}-*")):
+            trained = (provenance_of(folder) or {}).get("description", {})
+            differing = {key for key in {*wanted, *trained} if trained.get(key) != wanted.get(key)}
+            if trained and differing and differing <= {"version", "external"}:
+                of = " and ".join(OTHER[key] for key in sorted(differing, reverse=True))
+                return f"{folder} was learned with {of}"
+        return ""
 
     def load(self, preparation: Preparation) -> Artifact:
         """The artifact, once for a process. UserError: damaged, foreign, or made for something else."""
         folder = self.folder_of(preparation)
+        states = file_state(folder / STATE), file_state(folder / LOG)
         try:
-            stamp = (folder / STATE).stat().st_mtime_ns
-            described = (folder / PROVENANCE).read_bytes()
+            described = (folder / PROVENANCE).read_bytes() if states[0] else None
         except OSError:
-            raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; delete the folder and run again") from None
-        artifact = _loaded(folder, stamp, described)
+            described = None
+        if described is None:
+            raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; delete the folder and run again")
+        artifact = _loaded(folder, states, described)
         check_matches(folder, artifact.provenance, preparation)
         return artifact
 
@@ -77,13 +96,22 @@ class Artifacts:
         content = buffer.getvalue()
         write_atomically(folder / STATE, content)
         sha256 = hashlib.sha256(content).hexdigest()
-        described = {"format": FORMAT, "sha256": sha256, "description": preparation.description(), **facts}
+        described = {
+            "format": FORMAT,
+            "sha256": sha256,
+            "log_sha256": file_digest(folder / LOG),
+            "description": preparation.description(),
+            **facts,
+        }
         write_atomically(folder / PROVENANCE, f"{json.dumps(described, indent=1)}\n".encode())
         (folder / FAILURE).unlink(missing_ok=True)
         shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
 
     def remove(self, preparation: Preparation) -> None:
-        """Delete an artifact, finished or not, so that it is trained again."""
+        """Delete an artifact, finished or not, so that it is trained again.
+
+        Its captures go with it: they are not those of the artifact that takes its place.
+        """
         shutil.rmtree(self.folder_of(preparation), ignore_errors=True)
 
     def fail(self, preparation: Preparation, error: BaseException) -> str:
@@ -123,6 +151,10 @@ class Artifacts:
     def memory(self, preparation: Preparation) -> FolderMemory:
         """Where an unfinished training is kept."""
         return FolderMemory(self.folder_of(preparation))
+
+    def journal(self, preparation: Preparation) -> Journal:
+        """The captures of an unfinished training, those of attempts that failed included."""
+        return _journal(self.folder_of(preparation))
 
 
 @dataclass(frozen=True)
@@ -167,6 +199,10 @@ class FolderMemory:
         return self.folder / UNFINISHED / f"{file_name(name)}.pt"
 
 
+def _journal(folder: Path) -> Journal:
+    return Journal(folder / UNFINISHED / "captures")
+
+
 def _round_and_step(row: Mapping[str, Any]) -> dict[str, str]:
     """Round and step of a row, as far as it has them."""
     return {name: str(row[name]) for name in ("round", "step") if row.get(name) not in (None, "")}
@@ -196,14 +232,14 @@ def read_tensors(path: Path) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def _loaded(folder: Path, _stamp: int, described: bytes) -> Artifact:
+def _loaded(folder: Path, _states: tuple[State | None, ...], described: bytes) -> Artifact:
     provenance = _provenance(folder / PROVENANCE, described)
     content = read_tensors(folder / STATE)
-    sha256 = hashlib.sha256((folder / STATE).read_bytes()).hexdigest()
-    if sha256 != provenance["sha256"]:
-        raise UserError(
-            f"{folder / STATE}: is not the file that {PROVENANCE} describes; delete the folder and run again"
-        )
+    for name, key in ((STATE, "sha256"), (LOG, "log_sha256")):
+        if file_digest(folder / name) != provenance[key]:
+            raise UserError(
+                f"{folder / name}: is not the file that {PROVENANCE} describes; delete the folder and run again"
+            )
     if content.get("format") != FORMAT or not isinstance(content.get("state"), dict):
         raise UserError(f"{folder / STATE}: of another version; delete the folder and run again")
     return Artifact(content["state"], provenance)
@@ -219,7 +255,8 @@ def _provenance(path: Path, text: bytes) -> dict[str, Any]:
         raise UserError(f"{path}: not an artifact's provenance; delete the folder and run again")
     if content.get("format") != FORMAT:
         raise UserError(f"{path}: of another version; delete the folder and run again")
-    for key, kind in {"description": dict, "sha256": str, "captures": int, "seconds": int | float}.items():
+    digests = {"sha256": str, "log_sha256": str}
+    for key, kind in {"description": dict, **digests, "captures": int, "seconds": int | float}.items():
         if not isinstance(content.get(key), kind):
             raise UserError(f"{path}: has no valid '{key}'; delete the folder and run again")
     return content
@@ -328,6 +365,7 @@ def _number(value: Any) -> float:
 
 
 def progress(folder: Path) -> tuple[float, float]:
-    """Captures and seconds of an unfinished training, by the last round in its log; NaN where there is none."""
+    """Captures of an unfinished training, and its seconds up to the last round in its log; NaN where unknown."""
     rows = rounds_in(read_log(folder))
-    return (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)
+    captures, seconds = (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)
+    return _journal(folder).captures or captures, seconds

@@ -16,6 +16,7 @@ from ..core.schema import placed, typed
 from ..core.yaml_source import Document, Keys, load
 from ..display.simulated.changes import KINDS, altered, checked
 from ..display.simulated.profile import load_profile
+from ..display.traits import traits_of
 from ..imaging.grid import SMALLEST_REGION
 from ..metrics import Metric, catalogue
 from ..metrics.lpips import find_weights
@@ -125,7 +126,7 @@ def _holograms(study: Study, document: Document) -> Probe:
     chosen = study.holograms
     with placed(document, ("holograms", "name"), ("holograms", "params")):
         method = isolation.build(chosen.name, chosen.params, study.folder)
-        if getattr(method, "trains", False):
+        if traits_of(method, chosen.name).trains:
             raise UserError(f"method '{chosen.name}' has to be trained; holograms should be of one that learns nothing")
     return replace(chosen, params=isolation.params_of(method))
 
@@ -146,7 +147,8 @@ def _display(study: Study, document: Document) -> DisplayGrid:
     where = ("display", "learned")
     with placed(document, (*where, "method"), (*where, "params")):
         method = isolation.build(display.learned.method, display.learned.params, study.folder)
-        if not (getattr(method, "trains", False) and hasattr(method, "predict")):
+        traits = traits_of(method, display.learned.method)
+        if not (traits.trains and "predict" in traits.functions):
             raise UserError(f"method '{display.learned.method}' learns no display; name one that predicts captures")
     return replace(display, learned=replace(display.learned, params=isolation.params_of(method)))
 
@@ -210,20 +212,21 @@ def _entry(study: Study, document: Document, index: int) -> MethodEntry:
     entry, where = study.methods[index], ("methods", index)
     with placed(document, (*where, "name"), (*where, "params")):
         method = isolation.build(entry.name, entry.params, study.folder)
-        if study.predicts and not hasattr(method, "predict"):
+        traits = traits_of(method, entry.name)
+        if study.predicts and "predict" not in traits.functions:
             raise UserError(
                 f"method '{entry.name}' predicts no captures; measure: {study.measure} needs methods that do"
             )
     place: Keys = (*where, "name") if (*where, "name") in document.keys else where
     apart = isinstance(method, isolation.Apart) and study.isolation != "none"
-    if apart and (getattr(method, "privileged", False) or method.refused):
+    if apart and (traits.privileged or method.refused):
         what = f"imports {method.refused}" if method.refused else "looks into the simulated bench"
         message = f"'{entry.name}' {what}, which a process of its own does not hold"
         raise document.error(place, f"{message}; a study with 'isolation: none' runs it")
-    if study.display.real and getattr(method, "privileged", False):
+    if study.display.real and traits.privileged:
         message = f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one"
         raise document.error(place, message)
-    if entry.captures is not None and (not getattr(method, "camera", False) or study.predicts):
+    if entry.captures is not None and (not traits.camera or study.predicts):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)
     profiles = subset(study, document, entry.profiles, (*where, "profiles"))

@@ -34,7 +34,6 @@ from ..core.installed import __version__
 from ..core.io import write_atomically
 from .definition import Study
 from .plan import Plan, Task
-from .versions import HARNESS
 
 PROCESS = Path("/proc/self")
 _KIB_PER_MIB, _BYTES_PER_MIB = 1024, 1024**2
@@ -165,27 +164,10 @@ def timed(study: Study, plan: Plan) -> frozenset[str]:
 
 
 def key(task: Task, threads: int, workers: int, gpu: str = "", apart: bool = False) -> str:
-    """Name of a task's timing: the hash of everything its wall time should depend on. gpu: its name, empty for none;
-    apart: in a process of its own."""
-    cell, display = task.cells[0], task.conditions[0]
-    return digest(
-        {
-            "method": [cell.method, cell.method_sha256, dict(cell.params), *([cell.captures] if cell.captures else [])],
-            "target": [cell.target_sha256, dict(cell.dataset_params)],
-            "display": [
-                repr(display.spec),
-                display.digest,
-                cell.exposure,
-                *([dict(cell.change)] if cell.change else []),
-            ],
-            "noise": [cell.seed, cell.repeat],
-            "learned": [cell.measure, *cell.prepared],
-            **({"starts": list(cell.starts)} if cell.starts else {}),
-            "measure": cell.measure,
-            "machine": [cpu_model(), platform.machine(), threads, workers, *filter(None, (gpu, "apart" * apart))],
-            "versions": [_torch(), __version__, HARNESS],
-        }
-    )
+    """Name of a task's timing: its phase and the machine. gpu: its name, empty for none; apart: in a process of its
+    own."""
+    machine = [cpu_model(), platform.machine(), threads, workers, *filter(None, (gpu, "apart" * apart))]
+    return digest([task.cells[0].phase_id, machine, _torch(), __version__])
 
 
 def names() -> frozenset[str]:
@@ -194,7 +176,7 @@ def names() -> frozenset[str]:
 
 
 def recorded(name: str) -> Cost | None:
-    """The last measurement under a name, None if there is none; earlier versions recorded no memory."""
+    """The last measurement under a name, None if there is none."""
     try:
         content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
         seconds, memory = float(content["seconds"]), content.get("memory_mib")
@@ -208,4 +190,4 @@ def recorded(name: str) -> Cost | None:
 def keep(name: str, effort: Cost) -> None:
     """Record a measurement for estimates, in the place of an earlier one."""
     with suppress(StorageError):  # a cache, which a run can do without
-        write_atomically(folder() / f"{name}.json", json.dumps(asdict(effort)).encode())
+        write_atomically(folder() / f"{name}.json", json.dumps(asdict(effort)).encode(), lasting=False)

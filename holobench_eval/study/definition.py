@@ -152,12 +152,14 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Save:
-    """What else is written beside the scores, in folders beside the report.
+    """What else is written beside the scores.
 
-    captures: every rectified capture (PNG, 16 bit); phases: every hologram's phase (PNG of 8 bits, and
-    exact as .npy, which the method ``phases`` reads).
+    kept: every registered capture, exact, in the folder of records, so that ``holoeval rescore`` can fill the column of
+    another metric; captures: every registered capture (PNG, 16 bit), in a folder beside the report, by name; phases:
+    every hologram's phase there (PNG of 8 bits, and exact as .npy, which the method ``phases`` reads).
     """
 
+    kept: bool = True
     captures: bool = False
     phases: bool = False
 

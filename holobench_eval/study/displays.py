@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ from ..lab.bench_file import load_bench_file
 from ..lab.session import read_manifest
 from . import isolation
 from .definition import LEARNED, Study
+from .isolation.read_files import external
+from .versions import method_version
 
 Panel = tuple[int, int]
 
@@ -54,6 +56,11 @@ class Condition:
     real: RealSource | None = None
 
     @property
+    def in_session(self) -> bool:
+        """Whether people photograph it, in the folder of a session."""
+        return self.real is not None and self.real.folder is not None
+
+    @property
     def nominal(self) -> Condition:
         """The display before the change."""
         return replace(self, change=None)
@@ -72,14 +79,14 @@ class Condition:
 class Preparation:
     """What a method has to learn before it can solve: the name of its artifact follows from it.
 
-    method, params: as in a cell; version: the method's own ``version``, raised when its training changes; folder: the
-    config's folder; display: the one it is trained on; dataset, dataset_params: source of the images; images: name
-    and digest of each; held_out: how many of the last only watch the training; captures: the most it may take; seed:
-    the study's.
+    method, params: as in a cell; version: of the method's code (``versions.method_version``); folder: the config's
+    folder; display: the one it is trained on; dataset, dataset_params: source of the images; images: name and digest
+    of each; held_out: how many of the last only watch the training; captures: the most it may take; seed: the
+    study's; external: digests of files that the method takes where a machine has them (empty: it takes none).
     """
 
     method: str
-    version: int
+    version: str
     params: Mapping[str, Any]
     folder: Path
     display: Condition
@@ -89,6 +96,7 @@ class Preparation:
     held_out: int
     captures: int | None
     seed: int
+    external: Mapping[str, str] = field(default_factory=dict)
 
     def description(self) -> dict[str, Any]:
         """Everything that the learned state depends on, as plain JSON values.
@@ -114,6 +122,7 @@ class Preparation:
             "held_out": self.held_out,
             "captures": self.captures,
             "seed": self.seed,
+            **({"external": dict(self.external)} if self.external else {}),
             **({"session": self.display.real.session} if self.display.real else {}),
         }
 
@@ -135,13 +144,13 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], display: C
 
     For a learned display, a method is trained on the display that the network was trained on.
     """
-    cls = isolation.find(method, study.folder)
-    if not getattr(cls, "trains", False):
+    traits = isolation.traits(method, study.folder)
+    if not traits.trains:
         return None
     training = study.training
     return Preparation(
         method=method,
-        version=int(getattr(cls, "version", 1)),
+        version=method_version(isolation.find(method, study.folder)),
         params=params,
         folder=study.folder,
         display=display.learned.display if display.learned else display,
@@ -151,6 +160,7 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], display: C
         held_out=training.held_out,
         captures=training.captures,
         seed=study.seed,
+        external=external(isolation.build(method, params, study.folder)) if "external" in traits.functions else {},
     )
 
 

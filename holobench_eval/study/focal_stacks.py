@@ -8,10 +8,11 @@ from typing import Any
 
 from ..core.errors import UserError
 from ..display import load_profile
+from ..display.traits import traits_of
 from .displays import Condition
 
 SCORES = ("psnr_linear_infocus", "ssim_linear_infocus")  # of the part of a picture that is in focus
-VERSION = "infocus 1"  # of these scores; raised whenever a value would change
+INFOCUS, VERSION = "infocus", "1"  # the name of these scores, and what is raised whenever a value would change
 LENS, STAYS = "refocus", "other_plane"  # the display adds a lens for the plane, or leaves the hologram unchanged
 
 Target = tuple[str, str]  # name and digest
@@ -38,7 +39,7 @@ def showings(
     A method with ``planes = True`` computes a hologram for all planes of a scene, for displays with equal plane
     spacing. Other methods compute a hologram for each target, and the display moves it to the target's plane.
     """
-    if not getattr(method, "planes", False):
+    if not traits_of(method).planes:
         for target in targets:
             yield [(target, _at(display, LENS, planes[target[0]][1])) for display in group]
         return

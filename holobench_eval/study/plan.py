@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ..core import plugins
 from ..core.errors import UserError
-from ..core.hashing import digest
+from ..core.hashing import canonical, digest
 from ..display.api import Exposure
-from ..metrics import catalogue
-from . import isolation
+from ..display.traits import traits_of
+from . import identity, isolation
 from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
-from .focal_stacks import VERSION as IN_FOCUS
-from .focal_stacks import Showing, Target, planes_a_scene, planes_of, showings
+from .focal_stacks import Showing, Target, offset, planes_a_scene, planes_of, showings
 from .isolation import read_files
-from .versions import HARNESS, PHOTOGRAPHS, method_version
+from .versions import method_version
 
 REFERENCE = "reference"  # the condition of the floor cells
-Maker = tuple[str, str, Mapping[str, Any]]  # method, its version, parameters
+PATHS = ("path", "manifest")  # parameters of datasets that say where images lie; each image has its digest
 FLOORS = (  # what a study without any display would score: see ``holobench_eval.metrics.references``
     "floor_constant",
     "floor_black",
@@ -34,24 +35,22 @@ FLOORS = (  # what a study without any display would score: see ``holobench_eval
 
 @dataclass(frozen=True)
 class Cell:
-    """The plain description of a measurement; its hash names the record.
+    """A number of a table, before it is measured: a phase, a capture of it, and what reports say of both.
 
-    method: registered name or ``file.py:Class``; method_sha256: its version (``versions.method_version``); params:
-    all of them; target_sha256: digest of the source image; profile_version, profile_sha256: of the display;
-    panel: rows and columns in pixels; condition: name of the display, or ``reference`` for the floor;
-    repeat, seed: names of the noise; harness_sha256: version of optics, bench, registration and metrics
-    (``versions.HARNESS``); metrics: name and version of every metric that can be computed here; measure: what
-    is scored, see ``Study``; holograms: whose captures are predicted (empty for pictures);
-    prepared: what the method and the display had to learn first (``Preparation.id``, empty for nothing); captures:
-    the most that the display allows while the target is solved (None: no limit); change: kind and value of what has
-    changed on the display since methods were prepared for it (empty: nothing); files: digests of the files that the
-    method reads for the target, by their paths (empty: it reads none); session: name of the series of photographs
-    that stands for the display (empty: none does); starts: ids of the cells of other methods whose phases the
-    method starts from (empty: it follows nobody).
+    phase: its description (``identity.phase``), or what a floor image is made of; shown_on: the display (None for a
+    floor image that needs none); method: registered name or ``file.py:Class``; code: its version
+    (``versions.method_version``); params: all of them; target_sha256: digest of the source image; condition: name of
+    the display, or ``reference`` for the floor; repeat, seed: names of the noise; measure: what is scored, see
+    ``Study``; holograms: of predictions, the method whose captures are predicted, with the description of its phase;
+    prepared: what the method and the display had to learn first (``Preparation.id``); captures: the most that the
+    display allows while the target is solved (None: no limit); files: digests of the files that the method reads for
+    the target, by their paths; starts: ids of the cells of other methods whose phases the method starts from.
     """
 
+    phase: Mapping[str, Any]
+    shown_on: Condition | None
     method: str
-    method_sha256: str
+    code: str
     params: Mapping[str, Any]
     dataset: str
     dataset_params: Mapping[str, Any]
@@ -59,57 +58,61 @@ class Cell:
     target_sha256: str
     profile: str
     profile_version: int
-    profile_sha256: str
     panel: tuple[int, int]
     condition: str
     repeat: int
     seed: int
     protocol: str
-    harness_sha256: str
-    metrics: tuple[str, ...]
     exposure: Exposure
     measure: Measure = "picture"
     holograms: Mapping[str, Any] = field(default_factory=dict)
     prepared: tuple[str, ...] = ()
     captures: int | None = None
-    change: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
-    session: str = ""
     starts: tuple[str, ...] = ()
 
+    @property
+    def change(self) -> dict[str, Any]:
+        """Kind and value of what has changed on the display since methods were prepared for it; empty: nothing."""
+        return dict([self.shown_on.change]) if self.shown_on and self.shown_on.change else {}
+
+    @cached_property
+    def phase_id(self) -> str:
+        """The name of the phase."""
+        return digest(self.phase)
+
     def description(self) -> dict[str, Any]:
-        """The cell as plain JSON values, without ``captures`` if there is no limit, and without an empty ``change``,
-        ``files``, ``session`` or ``starts``."""
-        plain: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
-        plain |= {name: list(plain[name]) for name in ("panel", "metrics", "prepared", "starts")}
-        plain |= {name: dict(plain[name]) for name in ("params", "dataset_params", "holograms", "change", "files")}
-        if self.captures is None:
-            del plain["captures"]
-        for name in ("change", "files", "session", "starts"):
-            if not plain[name]:
-                del plain[name]
-        return plain
+        """The description of the capture, see ``identity.capture``."""
+        noise = [self.seed, self.target, self.repeat] if self.shown_on else []
+        measure = self.measure if self.measure != "picture" else ""
+        further = {"noise": noise, "exposure": self.exposure if self.shown_on else "", "measure": measure}
+        return identity.capture(self.phase, self.shown_on, holograms=self.holograms.get("phase"), **further)
 
     @cached_property
     def id(self) -> str:
-        """sha256 of the description: the name of the record."""
+        """The name of the capture, and of its record."""
         return digest(self.description())
+
+    def facts(self) -> dict[str, Any]:
+        """What reports say of the cell, as plain values."""
+        names = [item.name for item in fields(self) if item.name not in ("phase", "shown_on", "holograms", "files")]
+        facts = {name: getattr(self, name) for name in names} | {"change": self.change}
+        plain: dict[str, Any] = json.loads(canonical(facts))
+        return plain
 
 
 @dataclass(frozen=True)
 class Task:
-    """Cells that share a solution: a method solves a target once, and the phase is shown on each of the displays.
+    """Cells that share a phase: a method solves a target once, and the phase is shown on each of the displays.
 
     conditions: the display of each cell; the method solves on the first. A floor task has no
-    solution and one display, which gives the size of the scored region. preparation: what the method learns first;
-    is_start: whether another task starts from its phase, which is then kept.
+    solution and one display, which gives the size of the scored region. preparation: what the method learns first.
     """
 
     label: str
     cells: tuple[Cell, ...]
     conditions: tuple[Condition, ...]
     preparation: Preparation | None = None
-    is_start: bool = False
 
     @property
     def is_floor(self) -> bool:
@@ -119,9 +122,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Plan:
-    """Every task of a study, in the order in which they are run and reported."""
+    """Every task of a study, in the order in which they are run and reported; metrics: see ``identity.scores_of``."""
 
     tasks: tuple[Task, ...]
+    metrics: Mapping[str, str] = field(default_factory=dict)
 
     def labelled(self) -> Iterator[tuple[str, Cell]]:
         """(label in tables, cell) of every cell; the label of a floor cell is its method."""
@@ -174,7 +178,7 @@ def plan(study: Study) -> Plan:
     """
     targets = [(item, study.dataset.digest(item)) for item in study.items]
     displays_by_source = displays(study)
-    ground = _Ground(study, _metrics(study))
+    ground = _Ground(study)
     first = next(iter(displays_by_source.values()))
     apart = planes_a_scene(ground.planes) if study.measure == "focus" else 1
     tasks = [ground.floor(first, target, targets[(i + apart) % len(targets)]) for i, target in enumerate(targets)]
@@ -183,7 +187,7 @@ def plan(study: Study) -> Plan:
             display for source in entry.profiles for display in changed(study, source, displays_by_source[source])
         ]
         tasks += ground.solutions(entry, entry_displays, targets)
-    grid = Plan(tuple(following(tasks, study.folder)))
+    grid = Plan(tuple(following(tasks, study.folder)), identity.scores_of(study))
     check_unseen(grid.preparations(), targets)
     return grid
 
@@ -193,7 +197,6 @@ class _Ground:
     """What all cells of a study have in common."""
 
     study: Study
-    metrics: tuple[str, ...]
 
     @cached_property
     def planes(self) -> dict[str, tuple[str, float]]:
@@ -201,81 +204,110 @@ class _Ground:
         return planes_of(self.study.dataset, self.study.targets.dataset)
 
     @cached_property
-    def probe_sha256(self) -> str:
-        """The version of the method whose captures are predicted."""
-        return method_version(isolation.find(self.study.holograms.name, self.study.folder))
+    def probe(self) -> Any:
+        """The method whose captures are predicted."""
+        return isolation.build(self.study.holograms.name, self.study.holograms.params, self.study.folder)
 
-    def cell(
-        self,
-        target: Target,
-        display: Condition,
-        condition: str,
-        repeat: int,
-        maker: Maker,
-        prepared: tuple[str, ...] = (),
-        captures: int | None = None,
-        exposure: Exposure | None = None,
-        files: Mapping[str, str] | None = None,
-    ) -> Cell:
-        """A cell; ``target``: name and digest; ``maker``: the method that makes the picture; exposure: None for the
-        study's; files: digests of those that the method reads."""
+    @cached_property
+    def source(self) -> dict[str, Any]:
+        """What every target's pixels depend on besides its source: the dataset, wherever its images lie."""
+        dataset, chosen = self.study.dataset, self.study.targets
+        params = {name: value for name, value in chosen.params.items() if name not in PATHS}
+        own = {} if plugins.is_shipped("datasets", chosen.dataset) else {"code": method_version(type(dataset))}
+        return {"dataset": chosen.dataset.rpartition(":")[2], "params": params, **own}
+
+    def cell(self, phase: Mapping[str, Any], shown_on: Condition | None, display: Condition, **further: Any) -> Cell:
+        """A cell; ``display``: gives the size of the scored region, also of a floor image that needs no display."""
         study = self.study
-        method, version, params = maker
-        is_real = display.real is not None and condition != REFERENCE
-        holograms = study.holograms
-        probe = {"name": holograms.name, "params": holograms.params, "sha256": self.probe_sha256}
-        return Cell(
-            method=method,
-            method_sha256=version,
-            params=params,
-            dataset=study.targets.dataset,
-            dataset_params=study.targets.params,
-            target=target[0],
-            target_sha256=target[1],
-            profile=display.name,
-            profile_version=display.version,
-            profile_sha256=display.digest,
-            panel=display.spec.shape,
-            condition=condition,
-            repeat=repeat,
-            seed=study.seed,
-            protocol=study.protocol.version,
-            harness_sha256=f"{HARNESS}; {PHOTOGRAPHS}" if is_real else HARNESS,
-            metrics=self.metrics,
-            exposure=exposure or study.display.exposure,
-            measure=study.measure,
-            holograms=probe if study.predicts else {},
-            prepared=prepared,
-            captures=captures,
-            files=files or {},
-            change=dict([display.change]) if display.change and condition != REFERENCE else {},
-            session=display.real.session if display.real and condition != REFERENCE else "",
-        )
+        given: dict[str, Any] = {
+            "dataset": study.targets.dataset,
+            "dataset_params": study.targets.params,
+            "profile": display.name,
+            "profile_version": display.version,
+            "panel": display.spec.shape,
+            "seed": study.seed,
+            "protocol": study.protocol.version,
+            "exposure": study.display.exposure,
+            "measure": study.measure,
+        }
+        return Cell(phase, shown_on, **(given | further))
 
     def solutions(self, entry: MethodEntry, entry_displays: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
-        cls = isolation.find(entry.name, self.study.folder)
-        maker = (entry.name, method_version(cls), entry.params)
-        read = read_files.of(entry, self.study.folder, cls, (name for name, _ in targets))
+        study, cls = self.study, isolation.find(entry.name, self.study.folder)
+        read = read_files.of(entry, study.folder, cls, (name for name, _ in targets))
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
-            own = preparation(self.study, entry.name, entry.params, conditions[0].nominal)
-            for repeat in range(self.study.repeats):
+            own = preparation(study, entry.name, entry.params, conditions[0].nominal)
+            for repeat in range(study.repeats):
                 cells = (
                     self.cell(
-                        target,
+                        self._phase(cls, entry, showing, target, repeat, own, read[target[0]]),
                         display,
-                        self._condition(display),
-                        repeat,
-                        maker,
-                        _ids(own, display.learned),
-                        entry.captures,
-                        entry.exposure,
-                        read[target[0]],
+                        display,
+                        method=entry.name,
+                        code=method_version(cls),
+                        params=entry.params,
+                        target=target[0],
+                        target_sha256=target[1],
+                        condition=self._condition(display),
+                        repeat=repeat,
+                        prepared=_ids(own, display.learned),
+                        captures=entry.captures,
+                        exposure=entry.exposure or study.display.exposure,
+                        holograms=self._holograms(display, target, repeat),
+                        files=read[target[0]],
                     )
                     for target, display in showing
                 )
                 yield Task(entry.label, tuple(cells), conditions, own)
+
+    def _phase(
+        self,
+        cls: type[Any],
+        entry: MethodEntry,
+        showing: Showing,
+        target: Target,
+        repeat: int,
+        own: Preparation | None,
+        files: Mapping[str, str],
+    ) -> dict[str, Any]:
+        """The description of the phase of a solution: that of its first target and display, or of a whole stack."""
+        first = showing[0][1] if self.study.measure != "focus" else showing[0][1].nominal
+        traits = traits_of(cls)
+        many = self.study.measure == "focus" and traits.planes
+        named, sha256 = showing[0][0] if many else target
+        changes = {sha256: dict([at.change] if at.change else []) for (_, sha256), at in showing if many}
+        return identity.phase(
+            method_version(cls),
+            entry.params,
+            self.source | {"sha256": sha256},
+            first.spec,
+            (self.study.seed, named, repeat),
+            learned=own.id if own else "",
+            files=files,
+            planes=[[sha256, offset(first, change)] for sha256, change in changes.items()],
+            display=identity.seen(first) if traits.sees else {},
+            captures=entry.captures,
+            predicts=self._holograms(first, target, repeat).get("phase"),
+        )
+
+    def _holograms(self, display: Condition, target: Target, repeat: int) -> dict[str, Any]:
+        """The method whose captures are predicted, and the description of its phase; empty for pictures."""
+        study, probe = self.study, self.study.holograms
+        if not study.predicts:
+            return {}
+        cls, files = type(self.probe), read_files.digests(self.probe, target[0])
+        phase = identity.phase(
+            method_version(cls),
+            probe.params,
+            self.source | {"sha256": target[1]},
+            display.spec,
+            (study.seed, target[0], repeat),
+            files=files,
+            display=identity.seen(display) if traits_of(cls).sees else {},
+        )
+        return {"name": probe.name, "params": probe.params, "code": method_version(cls), "files": files, "phase": phase}
 
     def _showings(self, cls: type[Any], entry_displays: list[Condition], targets: list[Target]) -> Iterator[Showing]:
         """The targets and displays of each solution."""
@@ -294,36 +326,36 @@ class _Ground:
 
     def floor(self, display: Condition, target: Target, wrong: Target) -> Task:
         """The references of a target; ``wrong``: the target whose picture is scored as the wrong one."""
+        study = self.study
         wrong_target = {"target": wrong[0], "target_sha256": wrong[1]}
         params = {name: wrong_target if name == "floor_wrong_target" else {} for name in FLOORS}
         if wrong == target:
             del params["floor_wrong_target"]
+        holograms = self._holograms(display, target, 0)
+        source = self.source | {"sha256": target[1]}
+        made_of = {"target": source, "size": list(display.spec.region.shape), "draw": [study.seed, target[0]]}
         cells = tuple(
-            self.cell(target, display, REFERENCE, 0, (name, "", cell_params), _ids(display.learned))
-            for name, cell_params in params.items()
+            self.cell(
+                {"floor": name, **made_of, **({"wrong": wrong[1]} if own else {})},
+                display if study.predicts else None,  # whose captures the images are compared with
+                display,
+                method=name,
+                code="",
+                params=own,
+                target=target[0],
+                target_sha256=target[1],
+                condition=REFERENCE,
+                repeat=0,
+                prepared=_ids(display.learned),
+                holograms=holograms | ({"wrong": self._holograms(display, wrong, 0)} if own and holograms else {}),
+            )
+            for name, own in params.items()
         )
         return Task("floor", cells, (display,) * len(cells))
 
 
 def _ids(*trainings: Preparation | None) -> tuple[str, ...]:
     return tuple(training.id for training in trainings if training is not None)
-
-
-def _metrics(study: Study) -> tuple[str, ...]:
-    """Name and version of the study's metrics.
-
-    A study that names none gets all that can be computed here, and the headline's: weights of LPIPS may come later.
-    """
-    weights, wanted = study.protocol.lpips_weights, study.protocol.metrics
-    metrics = catalogue(None if weights is None else Path(weights))
-    if wanted is None:
-        wanted = tuple(
-            metric.name for metric in metrics if metric.available() is None or study.headline in metric.columns
-        )
-    computed = [metric for metric in metrics if metric.name in wanted]
-    names = [f"{metric.name} {metric.version}" for metric in computed]
-    names += ["speckle_contrast"] if "speckle_contrast" in wanted else []
-    return (*names, IN_FOCUS) if study.measure == "focus" else tuple(names)
 
 
 def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[tuple[Condition, ...]]:
@@ -333,11 +365,12 @@ def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[tuple[Cond
     nominal optics get the same phase. A trained method knows the display before any change. A method that captures or
     is privileged solves on each display as it is.
     """
-    if any(getattr(cls, property, False) for property in ("camera", "privileged")):
+    traits = traits_of(cls)
+    if traits.camera or traits.privileged:
         return [(display,) for display in entry_displays]
-    trains, groups = getattr(cls, "trains", False), dict[Any, list[Condition]]()
+    groups = dict[Any, list[Condition]]()
     for display in entry_displays:
-        groups.setdefault((display.name, display.spec) if trains else replace(display.spec, name=""), []).append(
+        groups.setdefault((display.name, display.spec) if traits.trains else replace(display.spec, name=""), []).append(
             display
         )
     return [tuple(group) for group in groups.values()]
@@ -351,31 +384,29 @@ def following(tasks: Sequence[Task], folder: Path) -> Iterator[Task]:
     """
 
     def follows(task: Task) -> bool:
-        return not task.is_floor and bool(getattr(isolation.find(task.cells[0].method, folder), "follows", False))
+        return not task.is_floor and isolation.traits(task.cells[0].method, folder).follows
 
     followers = [follows(task) for task in tasks]
     if not any(followers):
         yield from tasks
         return
-    others: dict[tuple[str, str, int], list[str]] = {}
+    others: dict[tuple[str, str, int], list[Cell]] = {}
     for task, late in zip(tasks, followers, strict=True):
         for cell in () if late or task.is_floor else task.cells:
-            others.setdefault((cell.target, cell.condition, cell.repeat), []).append(cell.id)
+            others.setdefault((cell.target, cell.condition, cell.repeat), []).append(cell)
 
-    def starts(cell: Cell) -> tuple[str, ...]:
-        return tuple(sorted(others.get((cell.target, cell.condition, cell.repeat), ())))
+    def started(cell: Cell) -> Cell:
+        starts = others.get((cell.target, cell.condition, cell.repeat), ())
+        phase = {**cell.phase, "starts": sorted({start.phase_id for start in starts})}
+        return replace(cell, phase=phase, starts=tuple(sorted(start.id for start in starts)))
 
     late_tasks = {
-        index: replace(task, cells=tuple(replace(cell, starts=starts(cell)) for cell in task.cells))
+        index: replace(task, cells=tuple(map(started, task.cells)))
         for index, (task, late) in enumerate(zip(tasks, followers, strict=True))
         if late
     }
-    wanted = {identity for task in late_tasks.values() for cell in task.cells for identity in cell.starts}
     for index, task in enumerate(tasks):
-        if index in late_tasks:
-            yield late_tasks[index]
-        else:
-            yield replace(task, is_start=not wanted.isdisjoint(cell.id for cell in task.cells))
+        yield late_tasks.get(index, task)
 
 
 def check_unseen(preparations: Mapping[str, Preparation], targets: list[tuple[str, str]]) -> None:

@@ -40,8 +40,7 @@ def _name(task: Task) -> str:
 
 
 def _failure(record: Record) -> str:
-    cell = record.cell
-    return f"failed: {record.label} · {cell['condition']} · {cell['target']}: {record.reason}"
+    return f"failed: {record.label} · {record.condition} · {record.target}: {record.reason}"
 
 
 def _untrained(name: str, reason: str) -> str:
@@ -115,8 +114,10 @@ class Bar:
         self.missing = missing
         self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
 
-    def training(self, names: list[tuple[str, Path]]) -> None:
+    def training(self, names: list[tuple[str, Path]], notes: Sequence[str] = ()) -> None:
         """Show the number of trainings, and follow their logs."""
+        for note in notes:
+            self.progress.console.print(escape(note), highlight=False, soft_wrap=True)
         self.progress.update(self.bar, total=self.missing + len(names), description="training")
         self.follower.start(names, lambda line: self.progress.update(self.bar, description=escape(line)))
 
@@ -168,8 +169,10 @@ class Lines:
         aside = f" ({floors} of the {cells} are floor images, which no method made)" if floors else ""
         self.write(f"{missing} of {cells} cells to compute{aside}")
 
-    def training(self, names: list[tuple[str, Path]]) -> None:
+    def training(self, names: list[tuple[str, Path]], notes: Sequence[str] = ()) -> None:
         """Name the trainings, and follow their logs."""
+        for note in notes:
+            self.write(note)
         self.write(f"{len(names)} to train: {', '.join(name for name, _ in names)}")
         self.follower.start(names, self.write)
 

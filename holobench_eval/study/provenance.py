@@ -112,10 +112,11 @@ def restate(output: Path, study: Study, plan: Plan) -> dict[str, Any]:
 
 
 def _basis(plan: Plan) -> dict[str, Any]:
-    """What the identities of a plan's cells depend on: the harness, and the displays."""
+    """What the names of a plan's captures and scores depend on: the harness, the displays, and the metrics."""
     displays = {display.name: display for task in plan.tasks for display in task.conditions}
     return {
         "harness": HARNESS,
+        "scores": dict(plan.metrics),
         "profiles": {
             name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
         },

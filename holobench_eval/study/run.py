@@ -13,7 +13,8 @@ from typing import Any, Protocol
 from ..core.device import find, gpu_name
 from ..core.errors import StopError, UserError
 from ..core.errors import reason as one_line
-from ..core.hashing import canonical
+from ..core.hashing import canonical, digest
+from ..display.traits import traits_of
 from ..metrics import catalogue
 from . import cost, isolation, provenance
 from .artifacts import Artifacts
@@ -23,6 +24,7 @@ from .executors import Executor, Serial
 from .executors.clusters import Address
 from .executors.local import Local
 from .executors.remaining import Kind, Remaining
+from .phases import Phases, phases_of
 from .plan import Cell, Plan, Task
 from .scoring import starts
 from .scoring.cell import work
@@ -48,8 +50,9 @@ class Watch(Protocol):
         whether it is that of all cells, and not a lower limit."""
         ...
 
-    def training(self, names: list[tuple[str, Path]]) -> None:
-        """Training begins: label and artifact folder, where ``training.csv`` grows, of everything to be trained."""
+    def training(self, names: list[tuple[str, Path]], notes: Sequence[str] = ()) -> None:
+        """Training begins: label and artifact folder, where ``training.csv`` grows, of everything to be trained; and
+        sentences on what is trained in the place of another artifact."""
         ...
 
     def trained(self, name: str, failure: str) -> None:
@@ -67,11 +70,16 @@ class Watch(Protocol):
 
 @dataclass(frozen=True)
 class Outcome:
-    """A record for every planned cell (``Store.load``), the run's provenance, and the number of computed cells."""
+    """A record for every planned cell (``Store.load``), the run's provenance, and the numbers of cells that were
+    computed, of those whose phase was solved in this run, of those that were captured before and scored now, and of
+    those that lack a score which nothing kept can give."""
 
     records: list[dict[str, Any]]
     provenance: dict[str, Any]
     computed: int
+    solved: int = 0
+    rescored: int = 0
+    unscored: int = 0
 
     @property
     def failed(self) -> int:
@@ -89,8 +97,10 @@ def run(
     artifacts: Path,
     retry_failed: bool = False,
     retrain: bool = False,
+    trains: bool = True,
     device: str = "cpu",
     drawings: Sequence[Drawing] = (),
+    rescore: Collection[str] = (),
 ) -> Outcome:
     """Train what is not trained, compute the missing cells of a plan and write their records.
 
@@ -114,10 +124,14 @@ def run(
         Compute failed cells again.
     retrain
         Train again, and compute the dependent cells again.
+    trains
+        Whether what is not trained may be.
     device
         Name of where every worker computes, see ``device.find``.
     drawings
         Called by workers that would otherwise wait for the last cells; a failure is the caller's to see.
+    rescore
+        Only score by these metrics what was captured before and lacks them; solve nothing.
 
     Returns
     -------
@@ -129,32 +143,40 @@ def run(
     UserError
         The folder is in use by another run, or holds a damaged record.
     """
-    store = Store(output)
+    store, phases = Store(output), phases_of(output)
     with store.locked():
         if retrain:
             refuse_unscored(study)
             refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
-            forget(plan, store, Artifacts(artifacts))
+            forget(plan, store, phases, Artifacts(artifacts))
         timed = cost.timed(study, plan)
-        missing = frozenset(cell.id for cell in store.missing(plan.cells, retry_failed, timed))
-        missing, outdated = starts.affected(plan, missing, store)
-        if missing:
+        metrics = {name: plan.metrics[name] for name in rescore or plan.metrics}
+        states = store.states(plan.cells, timed, metrics, study.folder)
+        again = ("missing", "untimed", *(("failed",) if retry_failed else ()))
+        missing = frozenset(name for name, state in states.items() if state in again and not rescore)
+        missing, outdated = starts.affected(plan, missing, states, phases)
+        unscored = {cell.id: cell for cell in plan.cells if states[cell.id] == "unscored" and cell.id not in missing}
+        scorable = frozenset(name for name, cell in unscored.items() if _is_scorable(cell, store, phases, not rescore))
+        if missing or scorable:
             refuse_unscored(study)
         refuse_unavailable(plan, missing, study.folder)
+        if not trains:
+            refuse_untrained(plan, missing, Artifacts(artifacts))
         store.remove(outdated)  # at once, so that a run that is killed does not take them for new
-        starts.clean(plan, store)
-        watch.planned(len(plan.cells), len(missing), plan.floors)
+        watch.planned(len(plan.cells), len(missing | scorable), plan.floors)
         described = provenance.read(output)
         if missing or described.get("config_sha256") != provenance.text_digest(study.text):
             gpu = gpu_name(find(device)) if isinstance(executor, Serial | Local) else ""  # else it is another machine's
             described = provenance.describe(study, plan, output, threads, executor.workers, device, gpu)
             described = provenance.begin(output, described, resumed=len(missing) < len(plan.cells))
+        elif scorable:
+            described = provenance.restate(output, study, plan)
         setting = Setting(
             output=output,
             folder=study.folder,
             artifacts=artifacts,
             save=study.save,
-            metrics=study.protocol.metrics,
+            metrics=metrics,
             lpips_weights=study.protocol.lpips_weights,
             threads=threads,
             workers=executor.workers,
@@ -162,36 +184,67 @@ def run(
             isolation=study.isolation,
             limits=study.limits,
         )
-        if missing:  # else no worker need be started
-            _compute(plan, missing, timed, setting, executor, watch, drawings)
+        solved = 0
+        if missing or scorable:  # else no worker need be started
+            solved = _compute(plan, missing, scorable, timed, setting, executor, watch, drawings)
         if described.get("ended") is None:
             described = provenance.end(output, described)
-        return Outcome(store.load(plan), described, len(missing))
+        left = store.states(tuple(unscored.values()), metrics=metrics, folder=study.folder)
+        rescored = sum(state != "unscored" for state in left.values())
+        return Outcome(store.load(plan), described, len(missing), solved, rescored, len(unscored) - rescored)
+
+
+def _is_scorable(cell: Cell, store: Store, phases: Phases, solves: bool) -> bool:
+    """Whether a captured cell can be scored again: from its kept capture, or on a display that is no real one from its
+    phase, since a real photograph is never taken again for a metric. solves: whether a phase may be solved again."""
+    if store.capture(cell.id).is_file():
+        return True
+    if cell.shown_on is not None and cell.shown_on.real:
+        return False
+    if solves:
+        return True
+    if not cell.code:  # a floor image: of the target alone, or compared with the capture of a hologram
+        return not cell.holograms or phases.read(digest(cell.holograms["phase"])) is not None
+    return phases.read(cell.phase_id, learned=None) is not None
 
 
 def _compute(
     plan: Plan,
     missing: frozenset[str],
+    unscored: frozenset[str],
     timed: frozenset[str],
     setting: Setting,
     executor: Executor,
     watch: Watch,
     drawings: Sequence[Drawing],
-) -> None:
-    """Train what the missing cells still need, then compute them; the cells of ``timed`` run alone."""
+) -> int:
+    """Train what the missing cells still need, then compute and score; the cells of ``timed`` run alone.
+
+    Returns the number of phases that were solved.
+    """
     artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
-    untrained = _untrained(plan, missing, setting)
+    untrained = _untrained(plan, missing, artifacts)
     if untrained:
-        watch.training([(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained])
+        names = [(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained]
+        anew = {preparation.name: artifacts.outdated(preparation) for preparation in untrained}
+        watch.training(names, [f"{name} is trained anew: {reason}" for name, reason in anew.items() if reason])
     unready = {preparation.id for preparation in untrained} | missing
     trainings = [
-        TrainingJob(preparation, setting.artifacts, setting.threads, setting.device, setting.isolation, setting.limits)
+        TrainingJob(
+            preparation,
+            setting.artifacts,
+            phases_of(setting.output),
+            setting.threads,
+            setting.device,
+            setting.isolation,
+            setting.limits,
+        )
         for preparation in untrained
     ]
     at_work: dict[int, float] = {}
     expected = {DRAWING: DRAWING_SECONDS}
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
-    jobs = list(_jobs(plan, missing, missing if single else timed, setting))
+    jobs = list(_jobs(plan, missing, unscored, timed, single, setting))
     if single:  # one of each method first, so that the time left is known soon
         first = {job.task.label: job for job in reversed(jobs)}
         jobs.sort(key=lambda job: first[job.task.label] is not job)
@@ -201,6 +254,7 @@ def _compute(
     steps = queue(trainings, jobs, unready, at_work, expected, drawings)
     watched = _watched(steps, at_work, remaining, watch)
     results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, watched)
+    solved = 0
     for job, result in results:
         taken = time.monotonic() - at_work.pop(id(job))
         if isinstance(result, StopError):
@@ -216,22 +270,33 @@ def _compute(
             _refuse_unseen(records, store)
             if not single:  # of several workers none should begin its longest job at the end
                 expected[job.task.label] = taken
+            solved += any(
+                not record.reused and record.seconds is not None for record in records if record.id in missing
+            )
             watch.finished(records)
+    return solved
 
 
-def forget(plan: Plan, store: Store, artifacts: Artifacts) -> None:
-    """Remove what was learned for a plan, and the records that depend on it."""
+def forget(plan: Plan, store: Store, phases: Phases, artifacts: Artifacts) -> None:
+    """Remove what was learned for a plan, and the phases and records that depend on it."""
     for preparation in plan.preparations().values():
         artifacts.remove(preparation)
-    for cell in plan.cells:
-        if cell.prepared:
-            store.remove((cell.id,))
+    learned = [cell for cell in plan.cells if cell.prepared]
+    phases.remove(cell.phase_id for cell in learned)
+    store.remove(cell.id for cell in learned)
 
 
-def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Preparation]:
+def refuse_untrained(plan: Plan, missing: frozenset[str], artifacts: Artifacts) -> None:
+    """UserError, in one line, if a missing cell needs something that is not trained."""
+    for preparation in _untrained(plan, missing, artifacts):
+        reason = artifacts.outdated(preparation) or f"{artifacts.folder} has nothing that it has learned"
+        raise UserError(f"--no-train: {preparation.method} on {preparation.display.name} would be trained: {reason}")
+
+
+def _untrained(plan: Plan, missing: frozenset[str], artifacts: Artifacts) -> list[Preparation]:
     """The missing artifacts that missing cells need; existing artifacts are checked before any computation."""
     wanted = {identity for cell in plan.cells if cell.id in missing for identity in cell.prepared}
-    artifacts, waiting = Artifacts(setting.artifacts), []
+    waiting = []
     for preparation in plan.preparations().values():
         if preparation.id in wanted:
             if artifacts.has(preparation):
@@ -241,17 +306,20 @@ def _untrained(plan: Plan, missing: frozenset[str], setting: Setting) -> list[Pr
     return waiting
 
 
-def _jobs(plan: Plan, missing: frozenset[str], alone: frozenset[str], setting: Setting) -> Iterator[Job]:
-    """The tasks with missing cells. alone: cells whose task runs without concurrent workers."""
+def _jobs(
+    plan: Plan, missing: frozenset[str], unscored: frozenset[str], timed: frozenset[str], single: bool, setting: Setting
+) -> Iterator[Job]:
+    """The tasks with cells to compute or to score; those of ``timed``, and of a ``single`` worker all, run alone."""
     for task in plan.tasks:
-        wanted = missing.intersection(cell.id for cell in task.cells)
-        if wanted:
-            yield Job(task, wanted, setting, alone=not wanted.isdisjoint(alone))
+        ids = frozenset(cell.id for cell in task.cells)
+        if wanted := ids & (missing | unscored):
+            is_timed = not timed.isdisjoint(ids & missing)
+            yield Job(task, wanted, setting, single or is_timed, is_timed, ids & unscored)
 
 
 def _known(jobs: Iterable[Job]) -> dict[Kind, float]:
     """Seconds of the first solution of each kind, where it has been measured before."""
-    first = {job.kind: job for job in reversed(list(jobs)) if not job.task.is_floor}
+    first = {job.kind: job for job in reversed(list(jobs)) if not job.task.is_floor and job.wanted != job.unscored}
     measured = {kind: cost.recorded(job.timing) for kind, job in first.items()}
     return {kind: earlier.seconds for kind, earlier in measured.items() if earlier is not None}
 
@@ -383,11 +451,10 @@ def _used(cell: Cell) -> list[tuple[str, dict[str, Any]]]:
 
 def _reason(name: str, params: dict[str, Any], folder: Path) -> str | None:
     method: Any = isolation.build(name, params, folder)
-    ask = getattr(method, "available", None)
-    if not callable(ask):
+    if "available" not in traits_of(method, name).functions:
         return None
     try:
-        reason: str | None = ask()
+        reason: str | None = method.available()
     except Exception as error:  # a stranger's code
         return one_line(error)
     return reason

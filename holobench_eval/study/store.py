@@ -5,27 +5,30 @@ from __future__ import annotations
 import fcntl
 import json
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Interval
 from pydantic import FiniteFloat, StringConstraints, TypeAdapter, ValidationError
+from typing_extensions import TypedDict  # pydantic takes that of Python from 3.12 on alone
 
 from ..core.errors import UserError
-from ..core.hashing import digest
+from ..core.hashing import canonical, digest
 from ..core.io import TEMPORARY, file_name, write_atomically
+from . import identity, isolation
 from .plan import Cell, Plan
 
-# ``missing``: a planned cell without a record; ``Store.load`` gives this state, and no file holds it.
-State = Literal["done", "failed", "skipped", "unavailable", "missing"]
+# No file holds the last three: ``missing`` is a planned cell without a record, ``untimed`` one that is done and has to
+# be timed alone, ``unscored`` one whose record lacks a metric, or has it of another version.
+State = Literal["done", "failed", "skipped", "unavailable", "missing", "untimed", "unscored"]
+MEASURED = ("done", "untimed", "unscored")
 
 LATE = 10.0  # s after which all machines should see a file on a shared disk
-# Of a record's file. 1: without `schema` and `sha256`, the digest of all other entries.
-SCHEMA = 2
+SCHEMA = 3  # of a record's file
 MOST_BYTES = 1_000_000  # of a record's file, which takes a few thousand
 AGAIN = "delete the file and run the study again"
 
@@ -33,41 +36,65 @@ Column = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_.]{0,99}$")]
 Amount = Annotated[FiniteFloat, Ge(0)]
 
 
+class Scores(TypedDict):
+    """What a metric made of a capture: its version, and its values by column."""
+
+    version: str
+    values: dict[Column, FiniteFloat]
+
+
 @dataclass(frozen=True)
 class Record:
-    """The measurement of a cell.
+    """A capture that was taken, and its scores.
 
-    cell: its description; state: ``done``, or why there is no score in ``reason``; scores: flat metric names
-    to numbers; captures: camera captures the method used; seconds: wall time of the solution; alone: whether it
+    capture: its description (``identity.capture``), which names the record; state: ``done``, or why there is none in
+    ``reason``; label, condition, target: its names in tables; scores: by metric; figures: what else was measured of
+    it, by column; captures: camera captures that the method took, those of failed attempts included; seconds: wall
+    time of the solution; reused: whether that was solved before, for another display, study or run; alone: whether it
     was timed without concurrent workers (None: unknown); memory_mib: peak of resident memory above the level before the
-    solution [MiB]; label: the method's name in tables;
+    solution [MiB];
     registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
     saturated samples; learned: sha256, captures and seconds of the training that the method needed first; stopped: why
-    the display ended the solution, whose best hologram so far was scored (empty: it did not). None: does not apply, as
-    to a floor cell.
+    the display ended the solution, whose best hologram so far was scored (empty: it did not); reads, uncovered: what a
+    user's code was seen to read, see ``isolation.Reads``. None: does not apply, as to a floor cell.
     """
 
-    cell: dict[str, Any]
+    capture: dict[str, Any]
     state: State
     label: str
+    condition: str = ""
+    target: str = ""
     reason: str = ""
-    scores: dict[Column, FiniteFloat] = field(default_factory=dict)
+    scores: dict[str, Scores] = field(default_factory=dict)
+    figures: dict[Column, FiniteFloat] = field(default_factory=dict)
     captures: Annotated[int, Interval(ge=0, le=10**9)] = 0
     seconds: Amount | None = None
+    reused: bool = False
     alone: bool | None = None
     memory_mib: Amount | None = None
     registration_residual_px: Amount | None = None
     saturated: Annotated[float, Interval(ge=0, le=1)] | None = None
     learned: dict[str, Any] | None = None
     stopped: str = ""
+    reads: dict[str, str] = field(default_factory=dict)
+    uncovered: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def id(self) -> str:
-        """The name of the record: the hash of its cell."""
-        return digest(self.cell)
+        """The name of the record: the hash of its description."""
+        return digest(self.capture)
+
+    def values(self) -> dict[str, float]:
+        """Figures and scores by column; a score of another version of its metric is a hole."""
+        return self.figures | identity.flat(self.scores)
+
+    def row(self, facts: Mapping[str, Any]) -> dict[str, Any]:
+        """The record as reports read it. facts: of its cell, see ``Cell.facts``."""
+        fields = {name: getattr(self, name) for name in _FIELDS if name not in ("capture", "figures")}
+        return {**fields, "id": self.id, "cell": dict(facts), "scores": self.values()}
 
 
-_FIELDS = frozenset(entry.name for entry in fields(Record))
+_FIELDS = tuple(entry.name for entry in fields(Record))
 
 
 @dataclass(frozen=True)
@@ -93,6 +120,11 @@ class Store:
         """The matched, rectified capture as a small sRGB picture."""
         return self.folder / f"{identity}.png"
 
+    def capture(self, identity: str) -> Path:
+        """The registered capture, ``(C, h, w)`` float32, exact, for metrics to come; of a prediction ``(2, C, h, w)``,
+        with the picture that it is compared with."""
+        return self.folder / f"{identity}.npy"
+
     def target_thumbnail(self, target: str) -> Path:
         """The target as a small sRGB picture."""
         return self.folder / f"target-{file_name(target)}.png"
@@ -104,7 +136,7 @@ class Store:
         """
         if record.state == "failed" and (earlier := self.read(record.id)) is not None and earlier.state == "done":
             return
-        content = {**vars(record), "schema": SCHEMA}
+        content = {**{name: getattr(record, name) for name in _FIELDS}, "schema": SCHEMA}
         path = self.path(record.id)
         text = json.dumps({**content, "sha256": digest(content)}, indent=1, sort_keys=True, allow_nan=False)
         _checked(path, record.id, json.loads(text) if len(text) < MOST_BYTES else None)
@@ -117,16 +149,17 @@ class Store:
             with path.open("rb") as file:
                 text = file.read(MOST_BYTES + 1)
             content = json.loads(text) if len(text) <= MOST_BYTES else None
+            canonical(content)
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, RecursionError) as error:
+        except (OSError, ValueError, RecursionError, UserError) as error:
             raise UserError(f"{path}: unreadable record ({error}); {AGAIN}") from error
         return _checked(path, identity, content)
 
     def remove(self, identities: Iterable[str]) -> None:
         """Remove the records of these cells, where there are any."""
-        for identity in identities:
-            self.path(identity).unlink(missing_ok=True)
+        for name in identities:
+            self.path(name).unlink(missing_ok=True)
 
     def load(self, plan: Plan) -> list[dict[str, Any]]:
         """A record for every cell of the plan, in its order, under the plan's labels.
@@ -137,28 +170,32 @@ class Store:
         for label, cell in plan.labelled():
             record = self.read(cell.id)
             if record is None:
-                record = Record(cell.description(), "missing", label, "no record: not run")
-            records.append({**vars(record), "label": label})
+                record = Record(cell.description(), "missing", label, reason="no record: not run")
+            records.append({**record.row(cell.facts()), "label": label})
         return records
 
-    def missing(
-        self, cells: tuple[Cell, ...], retry_failed: bool = False, timed: frozenset[str] = frozenset()
-    ) -> list[Cell]:
-        """The cells that a run has to compute: those without a record, failed ones if they are to be retried, and of
-        ``timed`` those whose solution was not timed alone."""
-        states = self.states(cells, timed)
-        return [
-            cell for cell in cells if states[cell.id] == "missing" or (retry_failed and states[cell.id] == "failed")
-        ]
+    def states(
+        self,
+        cells: tuple[Cell, ...],
+        timed: frozenset[str] = frozenset(),
+        metrics: Mapping[str, str] | None = None,
+        folder: Path = Path(),
+    ) -> dict[str, State]:
+        """State of every cell's record, by the cell's id. Missing is also one whose method read a changed file.
 
-    def states(self, cells: tuple[Cell, ...], timed: frozenset[str] = frozenset()) -> dict[str, State]:
-        """State of every cell's record, by the cell's id; those of ``timed`` that were not timed alone are missing."""
+        timed: cells to be timed alone; metrics: versions by name; folder: of the study.
+        """
         recorded = {path.stem for path in self.folder.glob("*.json")}  # faster than trying to open each missing file
 
         def state(cell: Cell) -> State:
             record = self.read(cell.id) if cell.id in recorded else None
-            untimed = cell.id in timed and record is not None and record.state == "done" and not record.alone
-            return "missing" if record is None or untimed else record.state
+            if record is not None and isolation.changed(record.reads, folder):
+                return "missing"
+            if record is None or record.state != "done":
+                return "missing" if record is None else record.state
+            if cell.id in timed and not record.alone:
+                return "untimed"
+            return "unscored" if identity.lacking(record.scores, metrics or {}) else "done"
 
         return {cell.id: state(cell) for cell in cells}
 
@@ -196,13 +233,12 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
     """The record in a file. UserError for one that was edited or damaged, or is of another cell or a later version."""
     if not isinstance(content, dict):
         raise UserError(f"{path}: not a record; {AGAIN}")
-    schema, stated = content.get("schema", 1), content.pop("sha256", None)
-    if type(schema) is not int or schema not in (1, SCHEMA):
-        raise UserError(f"{path}: a record of schema {schema!r}, and this version reads up to {SCHEMA}; {AGAIN}")
-    if schema == SCHEMA and stated != digest(content):
+    schema, stated = content.pop("schema", None), content.pop("sha256", None)
+    if schema != SCHEMA:
+        raise UserError(f"{path}: a record of schema {schema!r}, and this version reads {SCHEMA}; {AGAIN}")
+    if stated != digest({**content, "schema": schema}):
         raise UserError(f"{path}: the record is not as it was written, its digest is another; {AGAIN}")
-    content.pop("schema", None)
-    if unknown := content.keys() - _FIELDS:
+    if unknown := content.keys() - set(_FIELDS):
         raise UserError(f"{path}: a record has no entry {min(unknown)[:100]!r}; {AGAIN}")
     try:
         record = _adapter().validate_json(json.dumps(content), strict=True)
@@ -210,7 +246,7 @@ def _checked(path: Path, identity: str, content: Any) -> Record:
         fault = error.errors()[0]
         where = ".".join(map(str, fault["loc"]))[:100]
         raise UserError(f"{path}: {where}: {fault['msg']}; {AGAIN}") from error
-    if digest(record.cell) != identity:
+    if record.id != identity:
         raise UserError(f"{path}: holds another cell than its name says; {AGAIN}")
     return record
 

@@ -21,14 +21,18 @@ from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
 from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
+from ..display.traits import traits_of
 from ..lab.real import RealBench
 from . import isolation, opening
 from .artifacts import LOG, RECORDS, Artifacts, provenance_of
 from .definition import Isolation, Limits
 from .displays import Preparation
+from .identity import basis
+from .isolation.read_files import external
+from .phases import Phases, Starts
 from .plan import Plan
 from .scoring.reference import guarded
-from .versions import HARNESS, method_version
+from .versions import HARNESS, gate, method_version
 
 WAITS = "waits for photographs"  # in place of the reason of a failure
 
@@ -40,6 +44,7 @@ class TrainingJob:
 
     preparation: Preparation
     folder: Path
+    phases: Phases
     threads: int
     device: str = "cpu"
     isolation: Isolation = "files"
@@ -68,9 +73,18 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     preparation = job.preparation
     limits = replace(job.limits, seconds=math.inf)  # that of time is for cells
     method = isolation.solver(preparation.method, preparation.params, preparation.folder, job.isolation, limits)
+    gate(method, preparation.method, preparation.version, external(method), preparation.external)
     images = _images(preparation, device)
     split = len(images) - preparation.held_out
     display_bench = opening.open_display(preparation.display, preparation.seed, device)
+    source = {"dataset": preparation.dataset, "params": dict(preparation.dataset_params)}
+    draw, spec = ("training", preparation.seed), preparation.display.spec
+    shared = {
+        item: Starts(job.phases, basis({**source, "sha256": sha256}, spec, draw), device)
+        for item, sha256 in preparation.images
+    }
+    # Photographs in the folder of a session are found again by each import, and so are no new captures.
+    journal = None if preparation.display.in_session else artifacts.journal(preparation)
     bench = TrainingBench(
         display_bench,
         preparation.method,
@@ -79,44 +93,49 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         artifacts.memory(preparation),
         preparation.captures,
         preparation.seed,
+        shared,
+        journal,
     )
     with (
         guarded(preparation.method, job.isolation, preparation.display, preparation.seed),
-        isolation.opened(method, device),
+        isolation.opened(method, device) as ready,
     ):
         state = method.prepare(bench)
     if not isinstance(state, Mapping):
         raise CellError(f"{preparation.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
     state = moved(state, CPU)
+    outdated = artifacts.outdated(preparation)
     facts: dict[str, Any] = {
-        "captures": bench.captures,
-        "seconds": round(bench.seconds, 1),
+        **({"in_the_place_of": outdated} if outdated else {}),
+        "captures": bench.captures if journal is None else journal.captures,
+        "seconds": round(bench.seconds + sum(start.seconds for start in shared.values()), 1),
         "threads": job.threads,
         **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),
         "package": __version__,
         "method_sha256": method_version(type(method)),
+        "reads": dict(ready.reads.covered),
         "harness_sha256": HARNESS,
         "made": now(),
     }
     artifacts.write(preparation, state, facts | diagnosis(method, state, display_bench))
 
 
-def diagnosis(method: object, state: Mapping[str, Any], display_bench: CalibratedBench | RealBench) -> dict[str, Any]:
+def diagnosis(method: Any, state: Mapping[str, Any], display_bench: CalibratedBench | RealBench) -> dict[str, Any]:
     """A method's estimates of the display, beside the ground truth; empty without ``estimates`` or ``form``.
 
     estimates: see ``display.estimates.joined``; missing: texts of the bench's effects that the model's ``form`` has no
     term for; diagnosis_failed: the error, if there was one. A real bench has no ground truth.
     """
-    estimates, form = getattr(method, "estimates", None), getattr(method, "form", None)
+    traits = traits_of(method)
     findings: dict[str, Any] = {}
     try:
-        if estimates is not None:
+        if "estimates" in traits.functions:
             true_values = () if isinstance(display_bench, RealBench) else truth(display_bench.bench)
-            findings["estimates"] = joined(estimates(state, display_bench.spec), true_values)
-        if form is not None and not isinstance(display_bench, RealBench):
+            findings["estimates"] = joined(method.estimates(state, display_bench.spec), true_values)
+        if traits.form is not None and not isinstance(display_bench, RealBench):
             findings["missing"] = [
-                effect.text for effect in display_bench.bench.profile.effects() if effect.name not in form
+                effect.text for effect in display_bench.bench.profile.effects() if effect.name not in traits.form
             ]
     except Exception as error:  # must not cost what was learned
         findings["diagnosis_failed"] = reason(error)

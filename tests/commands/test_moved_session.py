@@ -101,14 +101,14 @@ def test_holograms_are_those_of_the_export_even_where_version_metrics_and_folder
     session = moved(tmp_path, monkeypatch, OWN)
     lay_out(tmp_path / "mine", OWN)
     monkeypatch.chdir(tmp_path / "mine")
-    monkeypatch.setattr("holobench_eval.study.plan.HARNESS", "another version")
+    monkeypatch.setattr("holobench_eval.study.identity.HARNESS", "another version")
     said, failure = run("session", "import", session, "--study", "study.yaml")
     assert not failure
     assert "table.csv" in said
     assert read_manifest(session).rounds == 1
 
 
-def test_a_session_without_its_solutions_says_so_and_asks_for_no_new_photographs(
+def test_a_session_without_its_phases_says_so_and_asks_for_no_new_photographs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = moved(tmp_path, monkeypatch, OWN)
@@ -116,6 +116,6 @@ def test_a_session_without_its_solutions_says_so_and_asks_for_no_new_photographs
     monkeypatch.chdir(tmp_path / "mine")
     shutil.rmtree(session / "report")
     _, failure = run("session", "import", session, "--study", "study.yaml")
-    assert "report/solutions lacks those" in failure
+    assert "report/solved lacks those" in failure
     assert "\n" not in failure
     assert read_manifest(session).rounds == 1

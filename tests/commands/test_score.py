@@ -121,7 +121,7 @@ def test_the_records_say_that_they_are_of_given_pictures_and_where(scored):
     assert set(cells["study"]) == {"out"}
     assert set(cells["measure"]) == {"files"}
     assert (cells["display"] == cells["condition"]).all()
-    assert (read_records(text)["profile"] == "").all()  # nobody knows the display
+    assert (read_records(text)["display_version"] == "").all()  # nobody knows the display
 
 
 def test_every_alignment_has_a_picture_in_the_report(scored):
@@ -352,7 +352,7 @@ def test_three_published_captures_keep_their_order_and_their_scores(tmp_path, mo
     found = pd.read_csv(tmp_path / "out" / "table.csv", index_col="label")["psnr_stored_db"][list(PUBLISHED)].to_dict()
     assert found == pytest.approx(PUBLISHED, abs=0.3)
     assert sorted(found, key=found.__getitem__) == list(PUBLISHED)
-    cells = [json.loads(path.read_text())["cell"] for path in records(tmp_path)]
+    cells = [json.loads(path.read_text())["capture"] for path in records(tmp_path)]
     own = [Alignment.from_dict(cell["geometry"]).warp.corners() for cell in cells if cell["geometry"]["kind"] == "own"]
     crop = 1.2 * (np.array([[0, 0], [799, 0], [0, 799], [799, 799]]) + 0.5) - 0.5 + [360, 0]
     assert len(own) == 3

@@ -96,7 +96,7 @@ def wrong(folder: Path, *more: object) -> str:
 @pytest.fixture
 def photographed(exported, tmp_path):
     """A copy of the session with its photographs, none of them read yet."""
-    shutil.copytree(exported[0] / "bench", tmp_path / "bench", ignore=shutil.ignore_patterns("report", "solutions"))
+    shutil.copytree(exported[0] / "bench", tmp_path / "bench", ignore=shutil.ignore_patterns("report"))
     manifest = json.loads((tmp_path / "bench" / "manifest.json").read_text())
     manifest["photographed"] = None
     (tmp_path / "bench" / "manifest.json").write_text(json.dumps(manifest))
@@ -338,4 +338,4 @@ def test_a_method_cannot_go_on_without_its_photograph(tmp_path):
     config.write_text(STUDY.replace("  - double_phase\n", "  - stubborn.py:Stubborn\n").replace("count: 2", "count: 1"))
     said = run("session", "export", config, tmp_path / "bench")
     assert "round 1:" in said
-    assert len(list((tmp_path / "bench" / "report" / "solutions").glob("*.pt"))) == 1  # wirtinger's
+    assert len(list((tmp_path / "bench" / "report" / "solved").glob("*.pt"))) == 1  # wirtinger's

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from multiprocessing import Pipe
 from pathlib import Path
 
@@ -108,18 +108,18 @@ def _tensors() -> list[bytes]:
 
 
 RECORD = Record(
-    {"method": "wirtinger", "params": {"iterations": 5}, "target": "astronaut", "repeat": 0},
+    {"phase": {"code": "Wirtinger 1", "params": {"iterations": 5}}, "noise": [0, "astronaut", 0]},
     "done",
     "wirtinger",
-    scores={"psnr_linear": 19.5},
+    scores={"psnr": {"version": "v1, 1", "values": {"psnr_linear": 19.5}}},
     seconds=1.5,
     captures=3,
 )
 
 
 def _records() -> list[bytes]:
-    content = {**vars(RECORD), "schema": SCHEMA}
-    return [json.dumps({**content, "sha256": digest(content)}).encode(), json.dumps(vars(RECORD)).encode()]
+    content = {**asdict(RECORD), "schema": SCHEMA}
+    return [json.dumps({**content, "sha256": digest(content)}).encode(), json.dumps(asdict(RECORD)).encode()]
 
 
 def _read_record(content: bytes, folder: Path) -> object:

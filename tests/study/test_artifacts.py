@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory
+from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory
 from tests.support.trained_study import (
     artifact_of,
     assert_refused,
@@ -161,6 +161,8 @@ DAMAGES: list[tuple[Callable[[Path], None], str]] = [
     (edited_description, "trained for seed 4, this study needs 3"),
     (lambda place: edit(place, description={}), "trained for method null"),
     (lambda place: edit(place, sha256="0" * 64), "is not the file"),
+    (lambda place: void((place / LOG).write_text("round\n1\n")), "training.csv: is not the file that provenance.json"),
+    (lambda place: edit(place, log_sha256=None), "no valid 'log_sha256'"),
     (lambda place: edit(place, format=None), "of another version"),
     (lambda place: edit(place, format=2), "of another version"),
     (lambda place: edit(place, description=None), "no valid 'description'"),
@@ -234,6 +236,17 @@ def test_values_of_any_name_stay_in_their_folder(tmp_path: Path) -> None:
     ]
     assert len(list((tmp_path / "one" / "unfinished").iterdir())) == 5
     assert [path.name for path in tmp_path.iterdir()] == ["one"]
+
+
+def test_an_artifact_whose_training_read_another_file_is_made_again(tmp_path: Path) -> None:
+    (needed,) = needs(write(tmp_path))
+    artifacts, weights = Artifacts(tmp_path / "artifacts"), tmp_path / "weights.bin"
+    weights.write_bytes(b"1")
+    reads = {"weights.bin": hashlib.sha256(b"1").hexdigest()}
+    artifacts.write(needed, {}, {"captures": 2, "seconds": 0.5, "reads": reads})
+    assert artifacts.has(needed)
+    weights.write_bytes(b"2")
+    assert not artifacts.has(needed)
 
 
 def test_a_logged_row_is_merged_with_an_older_one_of_its_round_and_step(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,6 @@ from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import run
-from holobench_eval.study.store import Store
 from tests.support.fake_study import write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
@@ -126,20 +123,18 @@ def test_a_method_that_kept_nothing_fails_when_its_budget_ends(tmp_path: Path) -
     assert record["reason"] == "Greedy has used its 2 captures"
 
 
-def test_a_budget_makes_another_cell_and_no_budget_leaves_its_name_as_it_was(tmp_path: Path) -> None:
+def test_a_budget_makes_another_phase_and_no_budget_leaves_its_name_as_it_was(tmp_path: Path) -> None:
     free, tight = "Modest", "Modest, label: tight, captures: 2"
     cells = {task.label: task.cells[0] for task in plan(load_study(study_of(tmp_path, free, tight))).tasks}
-    assert "captures" not in cells["Modest"].description()
-    assert cells["tight"].description() == {**cells["Modest"].description(), "captures": 2}
+    assert "captures" not in cells["Modest"].phase
+    assert cells["tight"].phase == {**cells["Modest"].phase, "captures": 2}
     assert cells["tight"].id != cells["Modest"].id
 
 
 def test_a_time_is_kept_for_each_budget(tmp_path: Path) -> None:
-    task = plan(load_study(study_of(tmp_path, "Modest"))).tasks[-1]
-    keys = {
-        cost.key(replace(task, cells=(replace(task.cells[0], captures=captures),)), 1, 1) for captures in (None, 2, 3)
-    }
-    assert len(keys) == 3
+    many = ("Modest", "Modest, label: two, captures: 2", "Modest, label: three, captures: 3")
+    tasks = [task for task in plan(load_study(study_of(tmp_path, *many))).tasks if not task.is_floor]
+    assert len({cost.key(task, 1, 1) for task in tasks}) == 3
 
 
 @pytest.mark.parametrize(
@@ -159,16 +154,3 @@ def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path: Path, met
 def test_one_method_with_the_same_budget_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="remove one"):
         load_study(study_of(tmp_path, "Modest, captures: 2", "Modest, label: again, captures: 2"))
-
-
-def test_a_record_from_before_there_were_budgets_is_read(tmp_path: Path) -> None:
-    (record,) = records(study_of(tmp_path, "Modest"), tmp_path / "out")
-    (cell,) = plan(load_study(tmp_path / "study.yaml")).tasks[-1].cells
-    store = Store(tmp_path / "out")
-    old = json.loads(store.path(cell.id).read_text())
-    for added in ("stopped", "schema", "sha256"):
-        del old[added]
-    store.path(cell.id).write_text(json.dumps(old))
-    found = store.read(cell.id)
-    assert found is not None
-    assert (found.scores, found.stopped) == (record["scores"], "")

@@ -57,8 +57,8 @@ def test_the_nominal_value_is_the_unchanged_cell(tmp_path: Path) -> None:
     assert {cell.id for cell in plain.cells} <= {cell.id for cell in swept.cells}
     changed = [cell for cell in swept.cells if cell.change]
     assert [dict(cell.change) for cell in changed] == [{"drift": 30.0}, {"known_eye": "-2"}]
-    assert all(cell.description()["change"] for cell in changed)
-    assert not any("change" in cell.description() for cell in plain.cells)
+    assert all(cell.description()["display"]["change"] for cell in changed)
+    assert not any("change" in cell.description().get("display", {}) for cell in plain.cells)
 
 
 def test_a_change_of_another_value_is_another_cell(tmp_path: Path) -> None:

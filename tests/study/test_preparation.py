@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.methods.calibrated.parametric import ParametricModel
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
@@ -57,14 +58,21 @@ def test_nothing_else_does(tmp_path: Path, change: tuple[str, str]) -> None:
     assert identity(tmp_path, change) == identity(tmp_path)
 
 
-def test_a_new_version_of_a_method_makes_another_artifact_and_an_edit_alone_does_not(tmp_path: Path) -> None:
+def test_an_edit_of_a_users_method_makes_another_artifact(tmp_path: Path) -> None:
     config = write(tmp_path)
     (before,) = needs(config)
     plugins = tmp_path / "trained.py"
-    text = plugins.read_text()
-    plugins.write_text(text.replace("6 * torch.rand", "3 * torch.rand"))
-    assert needs(config)[0].id == before.id
-    plugins.write_text(text.replace("version: ClassVar[int] = 1", "version: ClassVar[int] = 2"))
+    plugins.write_text(plugins.read_text().replace("6 * torch.rand", "3 * torch.rand"))
+    assert needs(config)[0].id != before.id
+
+
+def test_a_new_version_of_a_shipped_method_makes_another_artifact(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = write(tmp_path, (METHODS, "methods: [parametric_model]"))
+    (before,) = needs(config)
+    assert before.description()["version"] == f"ParametricModel {ParametricModel.version}"
+    monkeypatch.setattr(ParametricModel, "version", 99)
     assert needs(config)[0].id != before.id
 
 

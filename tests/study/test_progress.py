@@ -18,7 +18,10 @@ from tests.support.fake_study import write_config
 
 
 def failed(task: planning.Task) -> list[Record]:
-    return [Record(cell.description(), "failed", task.label, "no [light]") for cell in task.cells]
+    return [
+        Record(cell.description(), "failed", task.label, cell.condition, cell.target, "no [light]")
+        for cell in task.cells
+    ]
 
 
 def test_plain_lines_come_at_most_every_few_seconds(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def test_only_the_missing_cell_is_computed(tmp_path: Path) -> None:
     Store(tmp_path / "out").path(gone.id).unlink()
     again = compute(config, tmp_path / "out")
     assert again.computed == 1
-    assert len(solves(tmp_path)) == 4
+    assert len(solves(tmp_path)) == 3  # the phase was kept
     assert untimed(again.records) == untimed(first.records)
 
 
@@ -134,7 +134,7 @@ def test_failed_cells_run_again_only_when_asked(tmp_path: Path) -> None:
 
 
 def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("holobench_eval.study.scoring.picture.score", lambda *_, **__: {"psnr_linear": float("nan")})
+    monkeypatch.setattr("holobench_eval.study.scoring.scores.score", lambda *_, **__: {"psnr_linear": float("nan")})
     outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"failed"}
     assert outcome.records[0]["reason"] == "the score psnr_linear is nan"

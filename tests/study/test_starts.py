@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from threading import Timer
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import torch
 
 from holobench_eval.core.errors import CellError, UserError
-from holobench_eval.core.io import TEMPORARY
 from holobench_eval.report import build_report
 from holobench_eval.study import cost
 from holobench_eval.study import run as running
 from holobench_eval.study import store as storing
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial
+from holobench_eval.study.phases import phases_of, start_of
 from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.scoring import starts
@@ -61,7 +62,7 @@ def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repea
             (cell.target, cell.condition, cell.repeat)
         }
         assert sorted(one.params["value"] for one in others) == [1, 5]
-    assert [task.is_start for task in grid.tasks if not task.is_floor and task.label != "oracle"] == [True] * 8
+        assert set(cell.phase["starts"]) == {one.phase_id for one in others}
 
 
 def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_knows_nothing_of_it(tmp_path: Path) -> None:
@@ -72,7 +73,6 @@ def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_know
     assert {cell.id for cell in both.cells} == {cell.id for cell in turned.cells}
     assert {cell.id for cell in cells(both, "oracle")}.isdisjoint(cell.id for cell in cells(fewer, "oracle"))
     assert {cell.id for cell in without.cells} < {cell.id for cell in both.cells}
-    assert not any(task.is_start for task in without.tasks)
 
 
 @pytest.mark.usefixtures("no_physics")
@@ -111,17 +111,28 @@ def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_ag
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_start_whose_phase_was_not_kept_is_solved_again_for_a_follower_and_gives_the_same_record(
-    tmp_path: Path,
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_start_is_solved_again_for_a_follower_only_where_its_phase_was_lost_and_gives_the_same_record(
+    tmp_path: Path, lost: bool
 ) -> None:
     config = write_config(tmp_path, (POOR, GOOD))
     config.write_text(f"{config.read_text()}isolation: none\n")  # as with the follower
     alone = compute(config, tmp_path / "out", Serial())
+    if lost:
+        phases_of(tmp_path / "out").remove(cell.phase_id for cell in planned(config).cells)
     together = compute(write_config(tmp_path, (POOR, GOOD, FOLLOWING)), tmp_path / "out", Serial())
-    assert len(solves(tmp_path)) == 6 + 9
+    assert len(solves(tmp_path)) == 6 + 3 + 6 * lost
     assert untimed([one for one in together if one["label"] != "oracle"]) == untimed(alone)
     compute(write_config(tmp_path, (POOR, GOOD, FOLLOWING)), tmp_path / "out", Serial())
-    assert len(solves(tmp_path)) == 6 + 9
+    assert len(solves(tmp_path)) == 6 + 3 + 6 * lost
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_phase_that_was_found_while_a_start_had_failed_is_not_kept(tmp_path: Path) -> None:
+    config = write_config(tmp_path, (FOLLOWING, POOR, FAILING))
+    compute(config, tmp_path / "out", Serial())
+    phases = phases_of(tmp_path / "out")
+    assert [phases.path(cell.phase_id).exists() for cell in cells(planned(config), "oracle")] == [True, False, True]
 
 
 @pytest.mark.usefixtures("no_physics")
@@ -133,34 +144,17 @@ def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_
     grid = planned(config)
     first, follower = cells(grid, "poor")[0], cells(grid, "oracle")[0]
     store.path(first.id).unlink()
-    missing = frozenset(cell.id for cell in store.missing(grid.cells))
-    assert starts.affected(grid, missing, store) == ({first.id, follower.id}, {follower.id})
-    monkeypatch.setattr(running, "_compute", lambda *_: None)  # as if it were killed at once
+    states = store.states(grid.cells)
+    phases = phases_of(store.output)
+    assert starts.affected(grid, absent(states), states, phases) == ({first.id, follower.id}, {follower.id})
+    monkeypatch.setattr(running, "_compute", lambda *_: 0)  # as if it were killed at once
     compute(config, tmp_path / "out", Serial())
     assert not store.path(follower.id).exists()
 
 
-def kept(store: Store) -> set[str]:
-    return {file.name for file in (store.output / starts.FOLDER).iterdir()}
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_phases_that_no_cell_starts_from_any_more_are_removed_unless_another_run_uses_the_folder(
-    tmp_path: Path,
-) -> None:
-    first, store = solved(tmp_path)
-    assert kept(store) == names(first)
-    (store.output / starts.FOLDER / f"{TEMPORARY}half").touch()
-    changed = write_config(tmp_path, (POOR, GOOD.replace("value: 5", "value: 6"), FOLLOWING), count=1)
-    with store.locked(), pytest.raises(UserError, match="another run is using this folder"):
-        compute(changed, store.output, Serial())
-    assert kept(store) > names(first)
-    compute(changed, store.output, Serial())
-    assert kept(store) == names(planned(changed)) != names(first)
-
-
-def names(grid: Plan) -> set[str]:
-    return {f"{identity}.npy" for cell in cells(grid, "oracle") for identity in cell.starts}
+def absent(states: Mapping[str, str]) -> frozenset[str]:
+    """The cells that have to be computed, or timed again."""
+    return frozenset(name for name, state in states.items() if state in ("missing", "untimed"))
 
 
 @pytest.fixture
@@ -175,22 +169,17 @@ def timed_again(tmp_path: Path) -> Path:
     return config
 
 
-def missing(config: Path, store: Store) -> frozenset[str]:
-    """The cells of a study that have to be computed, its timed ones among them."""
-    study, grid = load_study(config), planned(config)
-    return frozenset(cell.id for cell in store.missing(grid.cells, timed=cost.timed(study, grid)))
-
-
 @pytest.mark.usefixtures("no_physics")
 def test_starts_that_are_only_timed_again_leave_the_records_of_their_followers(
     tmp_path: Path, timed_again: Path
 ) -> None:
     store, grid = Store(tmp_path / "out"), planned(timed_again)
-    again = missing(timed_again, store)
+    states, phases = store.states(grid.cells, cost.timed(load_study(timed_again), grid)), phases_of(store.output)
+    again = absent(states)
     assert len(again) == 3  # of each method the last target
-    assert starts.affected(grid, again, store) == (again, frozenset())
+    assert starts.affected(grid, again, states, phases) == (again, frozenset())
     others = again - {cell.id for cell in cells(grid, "oracle")}
-    assert starts.affected(grid, others, store) == (others, frozenset())
+    assert starts.affected(grid, others, states, phases) == (others, frozenset())
 
 
 @pytest.mark.usefixtures("no_physics")
@@ -224,32 +213,53 @@ def test_a_follower_that_fails_while_it_is_timed_again_keeps_its_score(
     assert store.states(grid.cells) == before
 
 
+def record_file(store: Store, cell: Cell) -> Path:
+    return store.path(cell.id)
+
+
+def phase_file(store: Store, cell: Cell) -> Path:
+    return phases_of(store.output).path(cell.phase_id)
+
+
+def job_of(store: Store) -> Any:
+    """What ``starts.of`` needs of a job."""
+    return SimpleNamespace(store=store, phases=phases_of(store.output))
+
+
 @pytest.mark.usefixtures("no_physics")
-@pytest.mark.parametrize("file", [Store.path, starts.path])
+@pytest.mark.parametrize("file", [record_file, phase_file])
 def test_a_start_that_another_machine_has_just_written_is_waited_for(tmp_path: Path, file: Callable[..., Path]) -> None:
     grid, store = solved(tmp_path)
-    (follower,) = cells(grid, "oracle")
-    before = starts.of(store, follower)
-    late = file(store, follower.starts[0])
+    (follower,), late = cells(grid, "oracle"), file(store, cells(grid, "good")[0])
+    before = starts.of(job_of(store), follower)
     hidden = late.rename(tmp_path / "hidden")
     writer = Timer(0.3, hidden.rename, (late,))
     writer.start()
-    after = starts.of(store, follower)
+    after = starts.of(job_of(store), follower)
     writer.join()
     assert torch.equal(torch.stack(after), torch.stack(before))
 
 
 @pytest.mark.usefixtures("no_physics")
-@pytest.mark.parametrize("file", [Store.path, starts.path])
+@pytest.mark.parametrize("file", [record_file, phase_file])
 def test_a_start_that_does_not_appear_is_an_error(
     tmp_path: Path, file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     grid, store = solved(tmp_path)
     (follower,) = cells(grid, "oracle")
     monkeypatch.setattr(storing, "LATE", 0.0)
-    file(store, follower.starts[0]).unlink()
+    file(store, cells(grid, "good")[0]).unlink()
     with pytest.raises(CellError, match="of a method to start from is not there"):
-        starts.of(store, follower)
+        starts.of(job_of(store), follower)
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_start_in_a_damaged_file_is_an_error(tmp_path: Path) -> None:
+    grid, store = solved(tmp_path)
+    file = phase_file(store, cells(grid, "good")[0])
+    file.write_bytes(file.read_bytes()[:-100])
+    with pytest.raises(CellError, match=r"\.pt, from which this method starts, is damaged; delete the file"):
+        starts.of(job_of(store), cells(grid, "oracle")[0])
 
 
 def solved(folder: Path) -> tuple[Plan, Store]:
@@ -259,11 +269,10 @@ def solved(folder: Path) -> tuple[Plan, Store]:
     return planned(config), store
 
 
-def test_a_kept_phase_is_the_one_that_was_shown_to_a_tenth_of_a_milliradian(tmp_path: Path) -> None:
-    store, phase = Store(tmp_path), torch.linspace(-9, 9, 2 * 5 * 7).view(2, 5, 7)
-    starts.keep(store, "cell", phase)
-    kept = starts._read(starts.path(store, "cell"))
-    assert float((torch.exp(1j * kept) - torch.exp(1j * phase)).abs().max()) < 1e-4
+def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian() -> None:
+    phase = torch.linspace(-9, 9, 2 * 5 * 7).view(2, 5, 7)
+    start = start_of(phase)
+    assert float((torch.exp(1j * start) - torch.exp(1j * phase)).abs().max()) < 1e-4
 
 
 @pytest.mark.slow

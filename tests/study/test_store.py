@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ from hypothesis import strategies as st
 from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.core.hashing import digest
 from holobench_eval.core.io import file_name, write_atomically
+from holobench_eval.study import identity
 from holobench_eval.study import store as store_module
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Plan, plan
-from holobench_eval.study.store import Record, Store, appears
+from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.store import SCHEMA, Record, Store, appears
 from tests.support.fake_study import write_config
 
 
@@ -28,9 +30,14 @@ def record_of(grid: Plan, **values: Any) -> Record:
     return Record(grid.cells[-1].description(), "done", "Toy", **values)
 
 
+def psnr(value: float, version: str | None = None) -> dict[str, Any]:
+    """The scores of a record by one metric, of today's version."""
+    return {"psnr": {"version": version or identity.versions()["psnr"], "values": {"psnr_linear": value}}}
+
+
 def test_a_record_is_read_as_it_was_written(tmp_path: Path, grid: Plan) -> None:
     store = Store(tmp_path / "out")
-    record = record_of(grid, scores={"psnr_linear": 20.123456789012345}, captures=3, seconds=0.1, saturated=1e-9)
+    record = record_of(grid, scores=psnr(20.123456789012345), captures=3, seconds=0.1, saturated=1e-9)
     store.write(record)
     assert store.read(record.id) == record
     assert record.id == grid.cells[-1].id
@@ -41,35 +48,37 @@ def test_a_record_that_is_absent_is_none(tmp_path: Path) -> None:
 
 
 def corrupt(text: str) -> dict[str, str]:
-    """Damaged files; those of edited entries have a digest that fits, or are of the schema that had none."""
+    """Damaged files; those of edited entries have a digest that fits."""
     content = json.loads(text)
 
     def edited(**entries: Any) -> str:
         changed = {key: value for key, value in (content | entries).items() if key != "sha256"}
         return json.dumps({**changed, "sha256": digest(changed)})
 
-    earlier = {key: value for key, value in content.items() if key not in ("schema", "sha256")}
     return {
         "truncated": text[: len(text) // 2],
         "empty": "",
         "list": "[]",
         "foreign": '{"a": 1}',
         "nested": "[" * 200_000,
-        "long": json.dumps({**earlier, "reason": "x" * 2_000_000}),
-        "edited": json.dumps({**content, "scores": {"psnr_linear": 99.0}}),
+        "long": edited(reason="x" * 2_000_000),
+        "edited": json.dumps({**content, "scores": psnr(99.0)}),
         "without a digest": json.dumps({key: value for key, value in content.items() if key != "sha256"}),
-        "later": edited(schema=3),
-        "schema": edited(schema="2"),
+        "later": edited(schema=SCHEMA + 1),
+        "earlier": edited(schema=SCHEMA - 1),
+        "schema": edited(schema=str(SCHEMA)),
         "schema of another kind": edited(schema=True),
-        "moved": edited(cell={**content["cell"], "repeat": 9}),
+        "moved": edited(capture={**content["capture"], "noise": [9]}),
         "state": edited(state="fine"),
-        "huge": json.dumps({**earlier, "captures": 10**400}),
+        "huge": edited(captures=10**400),
         "negative": edited(captures=-5),
         "part of a capture": edited(captures=1.5),
         "back in time": edited(seconds=-1.0),
         "more than all": edited(saturated=1.5),
-        "infinite": json.dumps(earlier).replace('"seconds": null', '"seconds": 1e999'),
-        "score": edited(scores={"<script>": 1.0}),
+        "infinite": json.dumps({**content, "captures": 1}).replace('"seconds": null', '"seconds": 1e999'),
+        "score": edited(scores={"psnr": {"version": "v1, 1", "values": {"<script>": 1.0}}}),
+        "figure": edited(figures={"<script>": 1.0}),
+        "score without a version": edited(scores={"psnr": {"values": {"psnr_linear": 1.0}}}),
         "truth": edited(saturated=True),
         "label": edited(label=None),
         "learned": edited(learned=[1]),
@@ -78,10 +87,10 @@ def corrupt(text: str) -> dict[str, str]:
 
 
 FAULTS = [
-    *("truncated", "empty", "list", "foreign", "nested", "long", "edited", "without a digest", "later", "schema"),
-    "schema of another kind",
+    *("truncated", "empty", "list", "foreign", "nested", "long", "edited", "without a digest", "later", "earlier"),
+    *("schema", "schema of another kind"),
     *("moved", "state", "huge", "negative", "part of a capture", "back in time", "more than all", "infinite", "score"),
-    *("truth", "label", "learned", "alone"),
+    *("figure", "score without a version", "truth", "label", "learned", "alone"),
 ]
 
 
@@ -102,19 +111,6 @@ def test_a_damaged_record_is_named(tmp_path: Path, grid: Plan, fault: str) -> No
     assert len(str(error.value)) < 400
 
 
-def test_a_record_of_an_earlier_version_says_not_what_was_at_work_beside_it(tmp_path: Path, grid: Plan) -> None:
-    store, record = Store(tmp_path / "out"), record_of(grid, seconds=0.1, alone=True)
-    store.write(record)
-    content = json.loads(store.path(record.id).read_text())
-    for added in ("alone", "schema", "sha256"):
-        del content[added]
-    store.path(record.id).write_text(json.dumps(content))
-    read = store.read(record.id)
-    assert read is not None
-    assert (read.seconds, read.alone) == (0.1, None)
-    assert [cell.id for cell in store.missing(grid.cells[-1:], timed=frozenset({record.id}))] == [record.id]
-
-
 def test_a_planned_cell_without_a_record_is_shown_as_missing(tmp_path: Path, grid: Plan) -> None:
     store = Store(tmp_path / "out")
     store.write(record_of(grid))
@@ -126,12 +122,12 @@ def test_records_of_other_studies_are_left_alone(tmp_path: Path, grid: Plan) -> 
     store = Store(tmp_path / "out")
     store.folder.mkdir(parents=True)
     (store.folder / "foreign.json").write_text("nothing")
-    assert len(store.missing(grid.cells)) == len(grid.cells)
+    assert set(store.states(grid.cells).values()) == {"missing"}
 
 
 def test_a_score_that_json_cannot_hold_is_not_written(tmp_path: Path, grid: Plan) -> None:
     with pytest.raises(UserError, match="finite numbers"):
-        Store(tmp_path).write(record_of(grid, scores={"psnr_linear": float("inf")}))
+        Store(tmp_path).write(record_of(grid, scores=psnr(float("inf"))))
     assert not list(Store(tmp_path).folder.glob("*.json"))
 
 
@@ -178,8 +174,8 @@ def test_different_names_get_different_files(one: str, other: str) -> None:
 
 def test_a_failure_never_replaces_a_score(tmp_path: Path, grid: Plan) -> None:
     store = Store(tmp_path / "out")
-    done = record_of(grid, scores={"psnr_linear": 20.0})
-    failed = Record(done.cell, "failed", "Toy", "ZeroDivisionError")
+    done = record_of(grid, scores=psnr(20.0))
+    failed = Record(done.capture, "failed", "Toy", "ZeroDivisionError")
     store.write(failed)
     store.write(done)
     store.write(failed)
@@ -192,16 +188,35 @@ def test_a_record_goes_under_the_name_that_its_plan_gives_to_the_method(tmp_path
     assert [record["label"] for record in store.load(grid)] == [label for label, _ in grid.labelled()]
 
 
-def test_failed_cells_are_computed_again_where_that_is_asked_and_others_are_not(tmp_path: Path, grid: Plan) -> None:
-    store, (first, second, third, *rest) = Store(tmp_path / "out"), grid.cells
-    store.write(Record(first.description(), "failed", "Toy", "ZeroDivisionError"))
-    store.write(Record(second.description(), "done", "Toy", alone=False))
-    store.write(Record(third.description(), "skipped", "Toy", "no camera"))
-    assert store.missing(grid.cells) == rest
-    assert store.missing(grid.cells, retry_failed=True) == [first, *rest]
-    assert store.missing(grid.cells, timed=frozenset({second.id, third.id})) == [second, *rest]
-    store.write(Record(second.description(), "done", "Toy", alone=True))
-    assert store.missing(grid.cells, timed=frozenset({second.id, third.id})) == rest
+def test_the_state_of_a_cell_is_that_of_its_record_unless_it_has_to_be_timed_or_scored(
+    tmp_path: Path, grid: Plan
+) -> None:
+    store, (first, second, third, fourth, *rest) = Store(tmp_path / "out"), grid.cells
+    store.write(Record(first.description(), "failed", "Toy", reason="ZeroDivisionError"))
+    store.write(Record(second.description(), "done", "Toy", alone=False, scores=psnr(20.0)))
+    store.write(Record(third.description(), "skipped", "Toy", reason="no camera"))
+    store.write(Record(fourth.description(), "done", "Toy", alone=True, scores=psnr(20.0, "v1, 0")))
+
+    def states(*timed: Cell, metrics: Mapping[str, str] | None = None) -> list[str]:
+        return [*store.states(grid.cells, frozenset(cell.id for cell in timed), metrics).values()]
+
+    missing = ["missing"] * len(rest)
+    assert states() == ["failed", "done", "skipped", "done", *missing]
+    assert states(second, third, fourth) == ["failed", "untimed", "skipped", "done", *missing]
+    today = {"psnr": identity.versions()["psnr"]}
+    assert states(metrics=today) == ["failed", "done", "skipped", "unscored", *missing]
+    assert states(second, metrics=today | {"ssim": "v1, 1"}) == ["failed", "untimed", "skipped", "unscored", *missing]
+
+
+def test_a_score_of_another_version_of_its_metric_is_a_hole(tmp_path: Path, grid: Plan) -> None:
+    old = psnr(20.0, "v1, 0") | {"ssim": {"version": identity.versions()["ssim"], "values": {"ssim_linear": 0.5}}}
+    record = record_of(grid, scores=old, figures={"efficiency": 0.4})
+    assert record.values() == {"ssim_linear": 0.5, "efficiency": 0.4}
+    assert record.row(grid.cells[-1].facts())["scores"] == record.values()
+
+
+def absent(store: Store, grid: Plan) -> list[str]:
+    return [name for name, state in store.states(grid.cells).items() if state == "missing"]
 
 
 def test_only_named_records_are_removed(tmp_path: Path, grid: Plan) -> None:
@@ -209,7 +224,7 @@ def test_only_named_records_are_removed(tmp_path: Path, grid: Plan) -> None:
     for cell in grid.cells:
         store.write(Record(cell.description(), "done", "Toy"))
     store.remove([grid.cells[0].id, "0" * 64])
-    assert store.missing(grid.cells) == [grid.cells[0]]
+    assert absent(store, grid) == [grid.cells[0].id]
 
 
 def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(tmp_path: Path, grid: Plan) -> None:
@@ -233,8 +248,9 @@ def test_a_run_makes_its_folder_and_those_above_it(tmp_path: Path) -> None:
 
 def test_what_belongs_to_a_cell_lies_beside_its_record_in_files_of_their_own(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    files = [store.path("ab"), store.log("ab"), store.thumbnail("ab"), store.target_thumbnail("ab")]
-    assert [file.name for file in files] == ["ab.json", "ab.log", "ab.png", "target-ab.png"]
+    files = [store.path("ab"), store.log("ab"), store.thumbnail("ab"), store.capture("ab")]
+    files.append(store.target_thumbnail("ab"))
+    assert [file.name for file in files] == ["ab.json", "ab.log", "ab.png", "ab.npy", "target-ab.png"]
     assert {file.parent for file in files} == {store.folder}
 
 

@@ -15,7 +15,7 @@ import pytest
 import torch
 
 from holobench_eval.core.io import TEMPORARY
-from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory
+from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory, progress
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
@@ -139,11 +139,11 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
         stderr=subprocess.STDOUT,
         env=os.environ | {"MPLBACKEND": "agg"},
     )
-    wait_for_rounds(tmp_path, 3, killed)
+    place = artifact_of(config)
+    wait_for_captures(place, 3, killed)
     killed.kill()
     killed.communicate(timeout=60)
     assert killed.returncode == -signal.SIGKILL
-    place = artifact_of(config)
     assert not (place / STATE).exists()
     (place / "unfinished" / f"{TEMPORARY}left").write_bytes(b"half")
     (place / f"{TEMPORARY}left").write_bytes(b"half")
@@ -157,7 +157,9 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
     compute(again)
     assert same_state(place, artifact_of(again))
     known = [json.loads((one / PROVENANCE).read_text()) for one in (place, artifact_of(again))]
-    assert [one["captures"] for one in known] == [5, 5]
+    begun = len(rounds(tmp_path))
+    assert known[0]["captures"] in (begun, begun - 1)  # the kill may come before the capture of the round it cuts short
+    assert known[1]["captures"] == 5
     assert known[0]["description"] == known[1]["description"]
     assert known[0]["seconds"] >= 5 * 0.15 - 0.05  # the rounds before the kill count too
     logs = [FolderMemory(one).rows() for one in (place, artifact_of(again))]
@@ -166,9 +168,9 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
     assert list(place.rglob(f"{TEMPORARY}*")) == []
 
 
-def wait_for_rounds(folder: Path, count: int, process: subprocess.Popen[bytes]) -> None:
+def wait_for_captures(artifact: Path, count: int, process: subprocess.Popen[bytes]) -> None:
     deadline = time.monotonic() + 120
-    while len(rounds(folder)) < count:
+    while progress(artifact)[0] != count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
         time.sleep(0.01)

@@ -25,8 +25,8 @@ def change(config: Path, report: Path, method: str, by: float) -> str:
     """Add to the PSNR of the first cell of a method, in records.csv and in table.csv alike; return its target."""
     path, layout = report / "records.csv", layout_of(load_study(config))
     frame = read_records(path.read_text())
-    first = frame.index[frame["method"] == method][0]
-    frame.loc[first, "psnr_linear"] = round(frame.loc[first, "psnr_linear"] + by, 4)
+    first = frame.index[frame["label"] == method][0]
+    frame.loc[first, "psnr_linear_db"] = round(frame.loc[first, "psnr_linear_db"] + by, 4)
     _write(report, recompute_files(csv_text(frame), layout))
     return str(frame.loc[first, "target"])
 

@@ -16,8 +16,10 @@ from torch import Tensor
 
 from holobench_eval.core.seeds import generator
 from holobench_eval.display import CalibratedBench, MeteredDisplay, load_profile
+from holobench_eval.display.account import Journal
+from holobench_eval.display.metered import Known
 from holobench_eval.study import opening
-from holobench_eval.study.scoring import picture, reference
+from holobench_eval.study.scoring import reference, scores
 from holobench_eval.study.scoring.cell import work
 from holobench_eval.study.scoring.job import Job
 from holobench_eval.study.store import Record
@@ -161,11 +163,11 @@ class FakeBench:
         learned: Any = None,
         starts: Any = (),
         sha256: str = "",
+        known: Known | None = None,
+        journal: Journal | None = None,
     ) -> MeteredDisplay:
-        names = (item, repeat)
-        return MeteredDisplay(
-            cast(CalibratedBench, self), label, target, names, method, budget, learned, starts, item, sha256
-        )
+        given = (method, budget, learned, starts, item, sha256, known, journal)
+        return MeteredDisplay(cast(CalibratedBench, self), label, target, (item, repeat), *given)
 
     def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
         shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000
@@ -205,7 +207,7 @@ def fake_score(image: Tensor, target: Tensor, **_: Any) -> dict[str, float]:
 
 FAKES: tuple[tuple[types.ModuleType, str, Any], ...] = (
     (opening, "open_display", fake_display),
-    (picture, "score", fake_score),
+    (scores, "score", fake_score),
     (reference, "digits", lambda display, seed: {}),
 )
 """Where the machinery calls the physics, and what stands there instead."""
@@ -241,7 +243,7 @@ def noted_work(task: Job) -> list[Record]:
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Records without what each run measures itself."""
-    return [{**record, "seconds": None, "memory_mib": None} for record in records]
+    return [{**record, "seconds": None, "memory_mib": None, "reused": False} for record in records]
 
 
 def untimed_table(path: Path) -> str:

@@ -18,18 +18,23 @@ def write_report(folder: Path, scores: Scores, provenance: Mapping[str, Any] | N
     """Write records.csv with the targets ``t0``, ``t1`` ..., and provenance.json unless it is None."""
     rows = [
         {
-            "method": method,
-            "name": method,
+            **dict.fromkeys(("study", "measure", "swept", "swept_unit", "swept_name", "category"), ""),
+            **dict.fromkeys(("capture_limit", "panel_height_px", "panel_width_px", "swept_value"), float("nan")),
+            "display": display,
             "condition": display,
+            "method": method,
+            "label": method,
             "target": f"t{index}",
+            "cluster": f"t{index}",
             "repeat": 0.0,
+            "seed": 0,
             "state": "failed" if value is None else "done",
             "reason": "no light" if value is None else "",
-            "psnr_linear": float("nan") if value is None else value,
+            "psnr_linear_db": float("nan") if value is None else value,
             "flip_srgb": float("nan") if value is None else 1 / value,
-            **dict.fromkeys(("captures", "seconds", "registration_residual_px", "saturated"), 0.0),
+            **dict.fromkeys(("captures", "solving_s", "registration_residual_px", "saturated"), 0.0),
             "cell": f"{method} {display} {index}",
-            **dict.fromkeys(("exposure", "profile", "profile_version", "protocol"), "1"),
+            **dict.fromkeys(("exposure", "display_version", "protocol"), "1"),
         }
         for (method, display), values in scores.items()
         for index, value in enumerate(values)

@@ -12,8 +12,8 @@ from PIL import Image
 from holobench_eval.core.hashing import digest
 from holobench_eval.display import load_profile
 from holobench_eval.report import Results, records_frame
+from holobench_eval.report.data.comparisons import comparison_frame
 from holobench_eval.report.data.tables import csv_text
-from holobench_eval.report.files.tidy import tidy_records, tidy_table, tidy_tests
 from holobench_eval.study.versions import HARNESS
 from tests.support import synthetic_study as synthetic
 
@@ -51,6 +51,7 @@ def write_results(
     known: Mapping[str, Any] | None = None,
 ) -> Path:
     """A folder with the files of these records; an own one (by is None) has a report.md, too."""
+    records = [{**record, "id": digest(record["cell"])} for record in records]
     pairs = tuple(dict.fromkeys((r["label"], r["cell"]["condition"]) for r in records))
     shown = tuple(pair for pair in pairs if pair[1] != "reference")
     panels = {record["cell"]["profile"]: (256, 256) for record in records}
@@ -58,9 +59,9 @@ def write_results(
     layout = synthetic.layout(targets=TARGETS, pairs=shown, panels=panels, study=folder.name, camera=camera)
     results = Results(records_frame([_short(record) for record in records], layout), layout)
     folder.mkdir(parents=True, exist_ok=True)
-    frames = {"records.csv": tidy_records(results.frame, layout), "tests.csv": tidy_tests(results)}
+    frames = {"records.csv": results.frame, "tests.csv": comparison_frame(results)}
     if by is None:
-        frames["table.csv"] = tidy_table(results)
+        frames["table.csv"] = results.table
     for name, frame in frames.items():
         (folder / name).write_text(csv_text(frame), encoding="utf-8")
     told = provenance(**(known or {})) | ({"by": by} if by is not None else {})
@@ -69,7 +70,7 @@ def write_results(
         (folder / "report.md").write_text(REPORT)
     done = [r for r in records if r["state"] == "done" and r["label"] == "HIL"]
     for record in done[:thumbnails]:
-        path = folder / "thumbnails" / f"{digest(record['cell'])}.png"
+        path = folder / "thumbnails" / f"{record['id']}.png"
         path.parent.mkdir(exist_ok=True)
         Image.new("RGB", (32, 24), (200, 40, 40)).save(path)
     return folder

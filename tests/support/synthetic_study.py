@@ -132,6 +132,7 @@ def cell(method: str, target: str, condition: str, **changes: Any) -> dict[str, 
 
 def record(label: str, described: dict[str, Any], values: dict[str, float], **changes: Any) -> Record:
     given = {
+        "id": digest(described),
         "cell": described,
         "state": "done",
         "reason": "",

@@ -64,6 +64,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     """What is different from when the report was made, of which its provenance is ``known``."""
     from ...report import difference, layout_of, read_records, recompute_files
     from ...study.displays import displays
+    from ...study.identity import is_current, versions
     from ...study.plan import plan
     from ...study.provenance import text_digest
 
@@ -72,9 +73,12 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
         then = dict(known["profiles"]).get(display.name)
         if then != now:
             yield f"profile '{display.name}' was {then}, is now {now}; run the study again"
+    for name, version in dict(known["scores"]).items():
+        if not is_current(name, version):
+            yield f"'{name}' was of version {version}, is now of {versions().get(name)}; score its captures again"
     records = (report / "records.csv").read_text(encoding="utf-8")
     if differs := difference(read_records(records), plan(study)):
-        yield f"{differs}: the study, the code or the metrics of this machine have changed; run the study again"
+        yield f"{differs}: the study or the code has changed; run the study again"
         return
     command = f"run: holoeval report {shlex.quote(as_typed(study.file))} --output {shlex.quote(str(report))}"
     if text_digest(study.text) != known["config_sha256"]:

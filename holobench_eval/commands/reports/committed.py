@@ -29,7 +29,7 @@ def read(report: Path) -> tuple[Study, dict[str, Any]]:
     from ...study.config import load_study
 
     known = provenance.read(report)
-    lacking = [key for key in ("config", "config_sha256", "profiles") if key not in known]
+    lacking = [key for key in ("config", "config_sha256", "profiles", "scores") if key not in known]
     if lacking:
         raise UserError(f"{provenance.FILE} lacks {', '.join(lacking)}")
     config = report / str(known["config"])

@@ -41,7 +41,7 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
     records = store.load(grid) if raw else _committed(grid, committed, again)
     missing = sum(record["state"] == "missing" for record in records)
     if missing == len(records):
-        changed = "the study, the code or the metrics that this machine can compute have changed"
+        changed = "the study or the code has changed"
         raise UserError(f"{folder}: no cell of this study has a record here ({changed}); {again} computes them")
     known = provenance.read(folder) if missing else provenance.restate(folder, study, grid)
     results = write_report(console(), study, records, folder, known, keep_pictures=not raw)
@@ -56,6 +56,6 @@ def _committed(grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:
 
     frame = read_records(path.read_text(encoding="utf-8"))
     if differs := difference(frame, grid):
-        changed = "the study, the code or the metrics that this machine can compute have changed"
+        changed = "the study or the code has changed"
         raise UserError(f"{path.parent}: {differs} ({changed}); {again} computes them")
     return committed_records(frame, grid)

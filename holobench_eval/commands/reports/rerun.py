@@ -171,7 +171,6 @@ def _by_key(records: pd.DataFrame) -> dict[Key, dict[Any, Any]]:
 
 def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Path) -> dict[str, str]:
     """Why cells cannot be computed again, by their ids; nothing for those that can."""
-    from ...report.data.tables import SECONDS_COLUMN
     from ...study.artifacts import Artifacts
     from ...study.run import refuse_unscored
 
@@ -189,7 +188,7 @@ def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Pa
         if each.cell.starts:
             return "starts from the phases of all other methods, which records.csv has not"
         if not untrained.isdisjoint(each.cell.prepared):
-            seconds = float(each.row.get(SECONDS_COLUMN, 0))
+            seconds = float(each.row.get("training_s", 0))
             length = f"about {max(1, round(seconds / 60))} min" if 0 < seconds < math.inf else "unknown length"
             return f"needs training of {length}, and {artifacts} has no artifact of it"
         if each.task.label not in unavailable:
@@ -227,13 +226,15 @@ def _computed(study: Study, chosen: Sequence[Planned], artifacts: Path, where: E
     """
     from ...report.data.layout import layout_of
     from ...report.data.tables import records_frame
+    from ...study.identity import scores_of
     from ...study.plan import Plan
     from ...study.progress import Lines
     from ...study.run import run
     from ...study.store import Record, Store
 
     wanted = {each.cell.id for each in chosen}
-    plan = Plan(tuple({each.task.cells[0].id: each.task for each in chosen}.values()))
+    tasks = {each.task.cells[0].id: each.task for each in chosen}
+    plan = Plan(tuple(tasks.values()), scores_of(study))
     with TemporaryDirectory(prefix="holoeval-check-") as folder:
         store = Store(Path(folder))
         for label, cell in plan.labelled():
@@ -248,13 +249,13 @@ def _judge(
     chosen: Sequence[Planned], again: Mapping[Key, Mapping[Any, Any]], scores: Sequence[str], verdict: Verdict
 ) -> None:
     """Count the numbers of the chosen cells that are reproduced, and note the others."""
-    from ...report.data.tables import DONE, LEARNED_COLUMN
+    from ...report.data.tables import DONE
 
     others = sum(each.cell.id != each.row["cell"] for each in chosen)
     if others:
         verdict.notes.append(
-            f"{others} of the cells in records.csv have another identity: the study, a method, a display, the harness "
-            "or the metrics have changed since"
+            f"{others} of the cells in records.csv have another identity: the study, a method, a display or the "
+            "harness have changed since"
         )
     known = {name for row in again.values() for name, value in row.items() if value == value}  # NaN is not itself
     lacking = [
@@ -267,7 +268,7 @@ def _judge(
         if row["state"] != DONE:
             verdict.faults.append(f"{each}: had a score, is {row['state']} now: {row['reason']}")
             continue
-        learned = [str(cells.get(LEARNED_COLUMN, "")) for cells in (each.row, row)]
+        learned = [str(cells.get("learned_sha256", "")) for cells in (each.row, row)]
         if learned[0] != learned[1]:
             was, now = (sha256[:12] or "nothing" for sha256 in learned)
             verdict.faults.append(f"{each}: learned state was {was}, is {now}: another artifact")
@@ -286,14 +287,14 @@ def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Ver
     from ...report.data.scores import parse
     from ...report.data.tables import format_number
 
-    unit = parse(name).unit
+    score = parse(name)
     then, now = float(each.row[name]), float(row.get(name, math.nan))
     if math.isnan(then):
         return
     if format_number(then) == format_number(now):
         verdict.reproduced += 1
-    elif abs(then - now) <= (TOLERANCE_DB if unit == "dB" else TOLERANCE):
+    elif abs(then - now) <= (TOLERANCE_DB if score.unit == "dB" else TOLERANCE):
         verdict.close += 1
     else:
-        shown = f"{name}{f' [{unit}]' if unit else ''}"
+        shown = f"{score.key}{f' [{score.unit}]' if score.unit else ''}"
         verdict.faults.append(f"{each}: {shown} was {format_number(then)}, is {format_number(now) or 'missing'}")

@@ -18,11 +18,11 @@ ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of 
 def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator[str]:
     """Sentences about what the scores of ``records`` do not show. domain: of the PSNR."""
     done = [record for record in records if record.state == "done"]
-    captures = [record for record in done if record.cell["capture_sha256"]]
-    constant = {_target(record): record.scores for record in done if record.label == "floor_constant"}
+    captures = [record for record in done if record.capture["capture_sha256"]]
+    constant = {_target(record): record.values() for record in done if record.label == "floor_constant"}
     psnr = f"psnr_{domain}"
     least = {name: max(NEARLY_ITSELF, scores[psnr] + ABOVE_CONSTANT) for name, scores in constant.items()}
-    near = [_name(record) for record in captures if record.scores[psnr] > least[_target(record)]]
+    near = [_name(record) for record in captures if record.values()[psnr] > least[_target(record)]]
     if near:
         yield f"Nearly the target itself, which a photograph with sensor noise is not: {named(near)}."
     yield from _mirrored(captures, folders)
@@ -30,10 +30,10 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     if clipped:
         shares = named([f"{_name(record)} {record.saturated:.2%}" for record in clipped])
         yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at full scale: {shares}."
-    given = [record for record in captures if record.cell["geometry"]["kind"] == "given"]
-    unlike = [record for record in given if record.cell["geometry"]["correlation"] < ALIKE_IN_POSE]
+    given = [record for record in captures if record.capture["geometry"]["kind"] == "given"]
+    unlike = [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]
     if unlike:
-        correlations = named([f"{_name(record)} {record.cell['geometry']['correlation']:.2f}" for record in unlike])
+        correlations = named([f"{_name(record)} {record.capture['geometry']['correlation']:.2f}" for record in unlike])
         yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
 
 
@@ -41,9 +41,9 @@ def _mirrored(captures: Sequence[Record], folders: Folders) -> Iterator[str]:
     """A sentence for each size of capture of which some are mirrored and most are not, or the reverse."""
     sessions: dict[tuple[int, int], Mapping[bool, list[Record]]] = {}
     for record in captures:
-        height, width = record.cell["panel"]
+        height, width = record.capture["panel"]
         # The sign of the determinant at any point in front of the camera is that of the whole homography.
-        mirrored = bool(np.linalg.det(np.array(record.cell["geometry"]["homography"])) < 0)
+        mirrored = bool(np.linalg.det(np.array(record.capture["geometry"]["homography"])) < 0)
         sessions.setdefault((width, height), {True: [], False: []})[mirrored].append(record)
     for (width, height), sides in sessions.items():
         fewer = sides[len(sides[True]) <= len(sides[False])]
@@ -60,4 +60,4 @@ def _name(record: Record) -> str:
 
 
 def _target(record: Record) -> str:
-    return str(record.cell["target"])
+    return str(record.capture["target"])

@@ -28,10 +28,10 @@ from ...imaging.warp import Warp
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
-from .. import provenance
+from .. import identity, provenance
 from ..plan import FLOORS, REFERENCE
 from ..scoring.pictures import write_thumbnail
-from ..store import Record, Store
+from ..store import Record, Scores, Store
 from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
 from .exposure import burnt
@@ -90,10 +90,11 @@ class Scoring:
         return "stored" if self.values == "stored" else "linear"
 
     @cached_property
-    def metrics(self) -> list[str]:
-        """Name and version of every metric that can be computed here."""
+    def metrics(self) -> dict[str, str]:
+        """The version of every score that can be computed here, by its name."""
         weights = None if self.lpips_weights is None else Path(self.lpips_weights)
-        return [f"{metric.name} {metric.version}" for metric in catalogue(weights) if metric.available() is None]
+        here = [metric.name for metric in catalogue(weights) if metric.available() is None]
+        return identity.versions_of((*here, identity.SPECKLE, identity.MATCH, identity.REFINED), weights)
 
     def records(self, step: Step) -> list[Record]:
         """A record for every method and target, and for the floor of targets that are found in some capture.
@@ -135,8 +136,8 @@ class Scoring:
                 own[key] = pairing.refused or self.given(key)
                 continue
             chosen = [*filter(None, [pairing.channel, "visible" if self.visible else ""])]
-            identity = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT, *chosen])
-            path = self.store.folder / f"alignment-{identity}.json"
+            key_digest = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT, *chosen])
+            path = self.store.folder / f"alignment-{key_digest}.json"
             plain = _read(path)
             if plain is None:
                 plain = self.found(key)
@@ -230,12 +231,14 @@ class Scoring:
         method, name = key
         cell = self.cell(method, name, alignment, kind, part=part)
         if alignment is None:
-            return Record(cell, "missing", method, f"no capture of '{name}' in the folder of {method}")
+            reason = f"no capture of '{name}' in the folder of {method}"
+            return Record(cell, "missing", method, CONDITION, name, reason)
         if isinstance(alignment, str):
             return self.failed(cell, alignment)
         figure = self.store.output / "figures" / alignment_name(*key)
         kept = self.store.read(digest(cell))
-        if kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file():
+        drawn = kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file()
+        if kept is not None and drawn and not identity.lacking(kept.scores, self.metrics):
             return kept
         capture, target = self.loaded(key)
         warp = alignment.warp if part is None else cropped(alignment.warp, part)
@@ -249,12 +252,12 @@ class Scoring:
         full = sampled((capture >= 1).astype(np.float32), warp)
         saturated = float((full > 0.5).mean())
         del capture, full  # of a large picture, read again to be drawn
-        scores = self.scores(image, reference) | second
+        scores, figures = self.scores(image, reference, self.metrics), second
         capture, _ = self.loaded(key)
         if self.visible:
-            scores["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
-            scores["share_scored"] = 1.0 if part is None else share(part, alignment.warp.shape)
-        record = Record(cell, "done", method, scores=scores, saturated=saturated)
+            figures["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
+            figures["share_scored"] = 1.0 if part is None else share(part, alignment.warp.shape)
+        record = Record(cell, "done", method, CONDITION, name, scores=scores, figures=figures, saturated=saturated)
         matched, _ = match(image.float(), reference.float())
         write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
         self.draw(figure, self.viewable(capture), warp, self.encoded(matched), target)
@@ -263,7 +266,7 @@ class Scoring:
 
     def failed(self, cell: dict[str, Any], reason: str) -> Record:
         """The record of a capture that has no score."""
-        record = Record(cell, "failed", cell["method"], reason)
+        record = Record(cell, "failed", cell["method"], CONDITION, cell["target"], reason)
         self.store.write(record)
         return record
 
@@ -303,31 +306,35 @@ class Scoring:
         cells = {row: self.cell(row, name, None, "reference", given[row], part) for row in rows}
         kept = [record for cell in cells.values() if (record := self.store.read(digest(cell))) is not None]
         thumbnail = self.store.target_thumbnail(name)
-        if len(kept) == len(rows) and thumbnail.is_file():
+        large = (
+            math.prod(self.folders.targets[name].shape[1:] if part is None else (part[1] - part[0], part[3] - part[2]))
+            > LARGE
+        )
+        metrics = {k: v for k, v in self.metrics.items() if not (large and k.startswith(SLOW))}
+        lacking = [record for record in kept if identity.lacking(record.scores, metrics)]
+        if len(kept) == len(rows) and not lacking and thumbnail.is_file():
             return kept
         pair = (part_of(targets[target].load()[:channels], part) for target in (name, *wrong))
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
-        pictures = floor_captures(reference, others, name)
-        wide, quick = reference.double(), self.quick if reference[0].numel() > LARGE else None
+        pictures, wide = floor_captures(reference, others, name), reference.double()
         records = [
-            Record(cells[row], "done", row, scores=self.scores(pictures[row]().double(), wide, quick)) for row in rows
+            Record(
+                cells[row], "done", row, REFERENCE, name, scores=self.scores(pictures[row]().double(), wide, metrics)
+            )
+            for row in rows
         ]
         for record in records:
             self.store.write(record)
         return records
 
-    @cached_property
-    def quick(self) -> tuple[str, ...]:
-        """Names of the metrics without the `SLOW` ones."""
-        names = (name.partition(" ")[0] for name in self.metrics)
-        return (*(name for name in names if not name.startswith(SLOW)), "speckle_contrast")
-
-    def scores(self, image: Tensor, reference: Tensor, metrics: tuple[str, ...] | None = None) -> dict[str, float]:
-        """All of the protocol, or some metrics of it, in the domains that the values have."""
-        weights, stored = self.lpips_weights, self.values == "stored"
-        scores = score(image, reference, lpips_weights=weights, stored=stored, metrics=metrics)
-        return scores if len(image) > 1 else {"match_factor" if k == "scale_0" else k: v for k, v in scores.items()}
+    def scores(self, image: Tensor, reference: Tensor, metrics: Mapping[str, str]) -> dict[str, Scores]:
+        """The scores by some metrics, in the domains that the values have."""
+        weights, stored, names = self.lpips_weights, self.values == "stored", identity.named(metrics)
+        columns = score(image, reference, lpips_weights=weights, stored=stored, metrics=names)
+        if len(image) == 1:
+            columns = {"match_factor" if name == "scale_0" else name: value for name, value in columns.items()}
+        return identity.grouped(columns, metrics)
 
     def target_values(self, target: Values) -> Values:
         """A target in the values that are compared."""
@@ -380,9 +387,8 @@ class Scoring:
             **({"part": list(part)} if part else {}),
             **({"visible": True} if self.visible and kind != "reference" else {}),
             "protocol": VERSION,
-            "metrics": self.metrics,
-            "harness_sha256": HARNESS,
-            "code_sha256": ALIGNMENT,
+            "harness": HARNESS,
+            "alignment": ALIGNMENT,
         }
 
 

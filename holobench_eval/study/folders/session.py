@@ -227,8 +227,7 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
     methods = tuple(
         replace(entry, profiles=(source,))
         for entry in study.methods
-        if (bench is not None or source in entry.profiles)
-        and not getattr(isolation.find(entry.name, study.folder), "privileged", False)
+        if (bench is not None or source in entry.profiles) and not isolation.traits(entry.name, study.folder).privileged
     )
     if not methods:
         raise UserError(f"{study.file}: no method of it can be shown on a real display")
@@ -267,7 +266,7 @@ def _advance(study: Study, folder: Path, watch: Watch, threads: int) -> Advance:
     outcome = run(study, plan(study), folder / REPORT, Serial(), watch, threads, folder / ARTIFACTS, retry_failed=True)
     if photographer.wanted and photographer.manifest.rounds and not _takes_rounds(study):
         raise UserError(
-            f"{folder}: other holograms are computed here than were photographed, and {REPORT}/solutions lacks those; "
+            f"{folder}: other holograms are computed here than were photographed, and {REPORT}/solved lacks those; "
             "bring the whole folder of the session from where it was exported, or import it there"
         )
     patterns = photographer.write_round() if photographer.wanted else []
@@ -276,8 +275,6 @@ def _advance(study: Study, folder: Path, watch: Watch, threads: int) -> Advance:
 
 def _takes_rounds(study: Study) -> bool:
     """Whether a hologram of the study may depend on photographs of others."""
-    methods = [isolation.find(entry.name, study.folder) for entry in study.methods]
+    methods = [isolation.traits(entry.name, study.folder) for entry in study.methods]
     exposures = {study.display.exposure, *(entry.exposure for entry in study.methods)}
-    return "matched" in exposures or any(
-        getattr(method, name, False) for method in methods for name in ("trains", "camera", "follows")
-    )
+    return "matched" in exposures or any(method.trains or method.camera or method.follows for method in methods)

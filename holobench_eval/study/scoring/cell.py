@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import traceback
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 
 from ...core.device import repeatable
 from ...core.errors import CellError, Pending, StopError
@@ -33,19 +35,44 @@ FLOORS: Mapping[str, Measure] = {  # the same for floor images
 def work(job: Job) -> list[Record]:
     """Compute and write the wanted records of a task. A failure of a cell becomes a failed record, never an error.
 
-    A cell that waits for a photograph (``Pending``) gets no record.
+    A cell that waits for a photograph (``Pending``) gets no record. One that lacks a score alone is scored from its
+    kept capture; where none is kept, its phase is photographed again.
     """
     with repeatable(job.setting.threads, job.device):
-        try:
-            measured = _measured(job)
-        except StopError:
-            raise
-        except Pending:
-            return []
-        except (Exception, SystemExit) as error:
-            return [_note_failure(job, cell, error) for cell, _ in job.cells]
-        records = [_recorded(job, cell, display, measured) for cell, display in job.cells]
+        kept = {identity for identity in job.unscored if job.store.capture(identity).is_file()}
+        records = [
+            _recorded(job, cell, display, partial(picture.rescored, job))
+            for cell, display in job.cells
+            if cell.id in kept
+        ]
+        rest = [(cell, display) for cell, display in job.cells if cell.id not in kept]
+        records += _captured(job, rest) if rest else []
         return [record for record in records if record is not None]
+
+
+def _captured(job: Job, cells: list[tuple[Cell, Condition]]) -> list[Record | None]:
+    try:
+        measured = _measured(job)
+    except StopError:
+        raise
+    except Pending:
+        return []
+    except (Exception, SystemExit) as error:
+        return [_note_failure(job, cell, error) for cell, _ in cells]
+    return [_recorded(job, cell, display, partial(_added, job, measured)) for cell, display in cells]
+
+
+def _added(job: Job, measured: Measured, cell: Cell, display: Condition) -> Record:
+    """The record of a cell; of one that lacked a score alone, its record with the scores that it lacked."""
+    record = measured(cell, display)
+    before = job.store.read(cell.id) if cell.id in job.unscored else None
+    if before is None or _training(before) != _training(record):
+        return record
+    return replace(before, scores=before.scores | record.scores)
+
+
+def _training(record: Record) -> str:
+    return str((record.learned or {}).get("sha256", ""))
 
 
 def _measured(job: Job) -> Measured:
@@ -60,7 +87,7 @@ def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> R
     """The record; None for a cell that waits for a photograph."""
     try:
         record = measured(cell, display)
-        for name, value in record.scores.items():
+        for name, value in record.values().items():
             if not math.isfinite(value):
                 raise CellError(f"the score {name} is {value}")
         job.store.write(record)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -23,8 +23,10 @@ from .. import cost, isolation, opening
 from ..artifacts import Artifact, Artifacts
 from ..definition import Isolation, Limits, Save
 from ..displays import Condition, Preparation
+from ..phases import Phases, phases_of
 from ..plan import Cell, Task
 from ..store import Record, Store
+from ..versions import gate
 
 TARGETS_KEPT = 16  # targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels
 
@@ -40,16 +42,16 @@ class Setting:
     """The settings of a run that a worker needs besides its task.
 
     output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
-    what trained methods learned; metrics: names of those to compute (None: all); threads: torch threads of a worker;
-    workers: tasks computed side by side; device: name of where a
-    worker computes, see ``device.find``; isolation, limits: see ``definition.Study``.
+    what trained methods learned; metrics: versions of those to compute, by name; threads: torch threads of a worker;
+    workers: tasks computed side by side; device: name of where a worker computes, see ``device.find``; isolation,
+    limits: see ``definition.Study``.
     """
 
     output: Path
     folder: Path
     artifacts: Path
     save: Save
-    metrics: tuple[str, ...] | None
+    metrics: Mapping[str, str]
     lpips_weights: str | None
     threads: int
     workers: int
@@ -62,13 +64,16 @@ class Setting:
 class Job:
     """A task, the cells of it that are wanted, and the setting of the run.
 
-    alone: whether it runs without concurrent workers, so that its time can be compared.
+    alone: whether it runs without concurrent workers; timed: whether it has to, so that its time can be compared;
+    unscored: those of the wanted cells that were captured and lack a score alone.
     """
 
     task: Task
     wanted: frozenset[str]
     setting: Setting
     alone: bool
+    timed: bool = False
+    unscored: frozenset[str] = frozenset()
 
     @property
     def device(self) -> torch.device:
@@ -81,8 +86,15 @@ class Job:
         return Store(self.setting.output)
 
     @property
+    def phases(self) -> Phases:
+        """Where phases are kept."""
+        return phases_of(self.setting.output)
+
+    @property
     def kind(self) -> tuple[str, str]:
-        """Method and display: jobs of a kind take about as long."""
+        """Method and display: jobs of a kind take about as long, and those that only score as any other such."""
+        if self.wanted == self.unscored:
+            return "scores", self.task.cells[0].condition
         return self.task.label, self.task.cells[0].condition
 
     @property
@@ -101,7 +113,10 @@ class Job:
     def failed(self, cell: Cell, error: BaseException) -> Record:
         """The record of a cell that has no score, with the reason in one line."""
         label = cell.method if self.task.is_floor else self.task.label
-        return Record(cell.description(), "failed", label, reason(error))
+        phase_id = self.task.cells[0].phase_id
+        captures = self.phases.captures(phase_id)
+        named = (label, cell.condition, cell.target)
+        return Record(cell.description(), "failed", *named, reason=reason(error), captures=captures)
 
     def method(self, name: str, params: Any) -> Any:
         """An instance of a method, built anew: no cell may depend on those computed before."""
@@ -124,6 +139,7 @@ class Job:
         if preparation is None or learned is None:
             return opening.open_display(display, cell.seed, self.device)
         method = self.method(preparation.method, preparation.params)
+        gate(method, preparation.method, preparation.version)
         return LearnedBench(display.spec, method, moved(learned.state, self.device), cell.seed, self.device)
 
     def source(self, cell: Cell) -> TargetSource:

@@ -16,30 +16,24 @@ from ...display.learned import LearnedBench
 from ...lab.photograph import MOST_SATURATED
 from ...lab.real import RealBench
 from ...metrics import floor_captures, match, score
-from .. import isolation
+from .. import identity, isolation
 from ..artifacts import Artifact
 from ..displays import Condition
+from ..phases import Solution
 from ..plan import Cell
 from ..store import Record
-from . import starts
 from .job import Job, Measured
 from .pictures import write_capture, write_phase, write_thumbnail
-from .solution import Solution, kept, solution
-
-Scored = Callable[[Job, Cell, Tensor, Tensor], dict[str, float]]  # scores of an image ``(C, h, w)`` and its target
+from .scores import keep_capture, kept_capture, scores_of
+from .solution import solution
 
 
 def picture(job: Job) -> Measured:
     """Solve the task's target on its first display; the result shows the phase on any of its displays."""
     display = job.task.conditions[0]
     target = job.target(job.task.cells[0], display)
-
-    def make() -> Solution:
-        own = target[None].to(job.device, copy=True)
-        return solution(job, display, target, lambda method, handle: method.solve(own, handle))
-
-    in_session = display.real is not None and display.real.folder is not None
-    solved = kept(job, make) if in_session else make()
+    own = target[None].to(job.device, copy=True)
+    solved = solution(job, display, target, lambda method, handle: method.solve(own, handle))
     return lambda cell, shown_on: captured(job, solved, cell, shown_on, target)
 
 
@@ -48,14 +42,7 @@ def floor(job: Job) -> Measured:
     return references(job, job.target)
 
 
-def protocol_scores(job: Job, _: Cell, image: Tensor, wanted: Tensor) -> dict[str, float]:
-    """The scores of the metric protocol."""
-    return score(image, wanted, metrics=job.setting.metrics, lpips_weights=job.setting.lpips_weights)
-
-
-def captured(
-    job: Job, solved: Solution, cell: Cell, display: Condition, target: Tensor, scored: Scored = protocol_scores
-) -> Record:
+def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target: Tensor) -> Record:
     """Show a solution on a display, photograph it and score it against ``target`` ``(C, h, w)``."""
     bench = job.display(cell, display)
     capture = bench.photograph(
@@ -63,39 +50,57 @@ def captured(
     )
     refuse_saturated(capture)
     keep_pictures(job, cell, capture.image, target, solved.phase)
-    if job.task.is_start:
-        starts.keep(job.store, cell.id, solved.phase)
-    scores = scored(job, cell, capture.image, target) | _second_scores(bench, capture, target)
-    timed = getattr(isolation.find(cell.method, job.setting.folder), "timed", True)
+    scores = scores_of(job, cell, capture.image, target, job.setting.metrics)
+    if job.setting.save.kept:
+        keep_capture(job.store.capture(cell.id), capture.image, lasting=display.real is not None)
+    timed = isolation.traits(cell.method, job.setting.folder).timed
     return Record(
-        cell=cell.description(),
+        capture=cell.description(),
         state="done",
         label=job.task.label,
-        scores=scores | {"efficiency": capture.efficiency},
+        condition=cell.condition,
+        target=cell.target,
+        scores=scores,
+        figures=_second_scores(bench, capture, target) | {"efficiency": capture.efficiency},
         captures=solved.captures,
         seconds=solved.cost.seconds if timed else None,
-        alone=job.alone,
+        reused=solved.reused,
+        alone=solved.alone,
         memory_mib=solved.cost.memory_mib if timed else None,
         registration_residual_px=capture.residual,
         saturated=capture.saturated,
-        learned=account(solved.learned),
+        learned=account(job.learned(job.task.preparation)),
         stopped=solved.stopped,
+        reads=solved.covered,
+        uncovered=solved.uncovered,
     )
 
 
-def references(job: Job, wanted: Callable[[Cell, Condition], Tensor], scored: Scored = protocol_scores) -> Measured:
+def references(job: Job, wanted: Callable[[Cell, Condition], Tensor]) -> Measured:
     """The scores of the floor images. wanted: gives the picture that a cell's image is compared with."""
     cells, display = job.task.cells, job.task.conditions[0]
-    others = [replace(cell, **cell.params) for cell in cells if cell.params]
+    others = [replace(cell, **cell.params, holograms=cell.holograms.get("wrong", {})) for cell in cells if cell.params]
     target, *wrong = (wanted(cell, display) for cell in (cells[0], *others))
     captures = floor_captures(target, wrong, cells[0].seed, cells[0].target)
     write_thumbnail(job.store.target_thumbnail(cells[0].target), target)
 
     def reference(cell: Cell, _: Condition) -> Record:
-        scores = scored(job, cell, captures[cell.method](), target)
-        return Record(cell.description(), "done", cell.method, scores=scores)
+        image = captures[cell.method]()
+        if cell.shown_on is not None and job.setting.save.kept:  # else it is computed again from the target
+            keep_capture(job.store.capture(cell.id), image, target)
+        scores = scores_of(job, cell, image, target, job.setting.metrics)
+        return Record(cell.description(), "done", cell.method, cell.condition, cell.target, scores=scores)
 
     return reference
+
+
+def rescored(job: Job, cell: Cell, display: Condition) -> Record:
+    """The record of a captured cell, with the scores that it lacked."""
+    record, kept = job.store.read(cell.id), kept_capture(job.store.capture(cell.id))
+    assert record is not None
+    image, wanted = kept if len(kept) > 1 else (kept[0], job.target(cell, display))
+    scores = scores_of(job, cell, image, wanted, identity.lacking(record.scores, job.setting.metrics))
+    return replace(record, scores=record.scores | scores)
 
 
 def _second_scores(

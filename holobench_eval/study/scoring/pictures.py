@@ -23,7 +23,7 @@ def write_thumbnail(path: Path, linear: Tensor) -> None:
     if shrink > 1:
         size = [max(1, round(side / shrink)) for side in linear.shape[-2:]]
         linear = torch.nn.functional.interpolate(linear[None], size=size, mode="bilinear", antialias=True)[0]
-    write_png(path, (srgb_encode(linear) * 255).round(), bits=8)
+    write_png(path, (srgb_encode(linear) * 255).round(), bits=8, lasting=False)
 
 
 def write_capture(path: Path, linear: Tensor) -> None:

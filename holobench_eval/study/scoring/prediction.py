@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-import json
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 
-import torch
 from torch import Tensor
 
 from ...core.device import moved
-from ...core.hashing import canonical
+from ...core.hashing import digest
 from ...display import RectifiedCapture
-from ...display.api import Exposure, from_numpy, is_plain
+from ...display.api import from_numpy, is_plain
 from ...metrics import match
 from .. import cost, isolation, opening
 from ..artifacts import Artifact
-from ..definition import Isolation, Limits
 from ..displays import Condition
+from ..isolation import Reads
+from ..isolation.read_files import digests
+from ..phases import Solution
 from ..plan import Cell
 from ..store import Record
-from .job import Job, Measured, TargetSource, load_target
-from .picture import account, keep_pictures, protocol_scores, references, refuse_saturated
+from ..versions import gate
+from .job import Job, Measured
+from .picture import account, keep_pictures, references, refuse_saturated
+from .scores import keep_capture, scores_of
 from .solution import wrong_output
 
-Apart = tuple[Isolation, Limits]  # whose methods run in processes of their own, and within which limits
+PHOTOGRAPHS_KEPT = 64  # in a process: all methods predict the same ones
 
 
 def prediction(job: Job) -> Measured:
@@ -41,7 +42,7 @@ def prediction(job: Job) -> Measured:
 @dataclass(frozen=True)
 class Foreseen:
     """A hologram ``(C, H, W)`` [rad] of a target ``(C, h, w)``, its capture, and the prediction of that ``(C, h, w)``,
-    in the same unit; what the prediction took, and what was learned before."""
+    in the same unit; what the prediction took, what was learned before, and what was read."""
 
     phase: Tensor
     target: Tensor
@@ -49,6 +50,7 @@ class Foreseen:
     prediction: Tensor
     taken: cost.Cost
     learned: Artifact | None
+    reads: Reads
 
 
 def _foresee(job: Job) -> Foreseen:
@@ -57,6 +59,7 @@ def _foresee(job: Job) -> Foreseen:
     target = job.target(cell, display)
     phase, capture = shown(job, cell, display)
     method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
+    gate(method, cell.method, cell.code, digests(method, cell.target), cell.files)
     refuse_saturated(capture)
     handle = opening.open_display(display, cell.seed, job.device).for_method(
         method,
@@ -68,14 +71,14 @@ def _foresee(job: Job) -> Foreseen:
         learned=moved(learned.state, job.device) if learned else None,
     )
     own = phase[None].to(job.device, copy=True)
-    with isolation.opened(method, job.device) as process:
-        watch = cost.start(job.device, process)
+    with isolation.opened(method, job.device) as ready:
+        watch = cost.start(job.device, ready.pid)
         predicted = method.predict(own, handle)
         taken = watch.stop()
     predicted = from_numpy(predicted)
     if not is_plain(predicted) or tuple(predicted.shape) != (1, *target.shape):
         raise wrong_output(task.label, "predict", predicted, f"an image {(1, *target.shape)}")
-    return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned)
+    return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned, ready.reads)
 
 
 def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
@@ -89,17 +92,24 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
 
     def compare(cell: Cell, _: Condition) -> Record:
         keep_pictures(job, cell, image, wanted, seen.phase)
+        if job.setting.save.kept:
+            keep_capture(job.store.capture(cell.id), image, wanted)
         return Record(
-            cell=cell.description(),
+            capture=cell.description(),
             state="done",
             label=job.task.label,
-            scores=protocol_scores(job, cell, image, wanted) | further,
+            condition=cell.condition,
+            target=cell.target,
+            scores=scores_of(job, cell, image, wanted, job.setting.metrics),
+            figures=further,
             seconds=taken.seconds,
             alone=job.alone,
             memory_mib=taken.memory_mib,
             registration_residual_px=seen.capture.residual,
             saturated=seen.capture.saturated,
             learned=account(seen.learned),
+            reads=dict(seen.reads.covered),
+            uncovered=seen.reads.uncovered,
         )
 
     return compare
@@ -114,50 +124,47 @@ def floor(job: Job) -> Measured:
     return references(job, wanted)
 
 
-@dataclass(frozen=True)
-class _Hologram:
-    """The hologram whose capture is predicted; equal for all methods that predict it. params: as JSON."""
-
-    method: str
-    version: str
-    params: str
-    source: TargetSource
-    repeat: int
-    seed: int
-    exposure: Exposure
-
-
 def shown(job: Job, cell: Cell, display: Condition, again: bool = False) -> tuple[Tensor, RectifiedCapture]:
     """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture; or, ``again``, another
     capture of it, with noise of its own."""
-    name, params = cell.holograms["name"], canonical(dict(cell.holograms["params"]))
-    hologram = _Hologram(
-        name, cell.holograms["sha256"], params, job.source(cell), cell.repeat, cell.seed, cell.exposure
-    )
-    setting = job.setting
-    return _photographed(hologram, display, setting.folder, job.device, again, (setting.isolation, setting.limits))
+    photograph = (digest(cell.holograms["phase"]), display, cell.seed, cell.repeat, cell.exposure, again)
+    if photograph not in _photographs:
+        phase = _solved(job, cell, display)
+        bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
+        item = f"{cell.target}, again" if again else cell.target  # it names the noise
+        capture = bench.photograph(phase, target, item=item, repeat=cell.repeat, exposure=cell.exposure)
+        _photographs[photograph] = phase, capture
+        while len(_photographs) > PHOTOGRAPHS_KEPT:
+            _photographs.popitem(last=False)
+    return _photographs[photograph]
 
 
-@lru_cache(maxsize=64)
-def _solved(hologram: _Hologram, display: Condition, folder: Path, device: torch.device, apart: Apart) -> Tensor:
-    """The phase of a hologram, computed once in a process."""
-    bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
-    item, own = hologram.source[3], target.to(device, copy=True)
-    method = isolation.solver(hologram.method, json.loads(hologram.params), folder, *apart)
-    handle = bench.for_method(method, hologram.method, own, item=item, repeat=hologram.repeat)
-    phase = from_numpy(method.solve(own[None], handle))
+_photographs: OrderedDict[object, tuple[Tensor, RectifiedCapture]] = OrderedDict()
+
+
+def _solved(job: Job, cell: Cell, display: Condition) -> Tensor:
+    """The phase of a hologram: kept from before, or solved."""
+    name, phase_id = cell.holograms["name"], digest(cell.holograms["phase"])
+    if (known := job.phases.read(phase_id, folder=job.setting.folder)) is not None:
+        return known.phase
+    bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
+    method = job.method(name, cell.holograms["params"])
+    gate(method, name, cell.holograms["code"], digests(method, cell.target), cell.holograms["files"])
+    handle = bench.for_method(method, name, target.to(job.device), item=cell.target, repeat=cell.repeat)
+    own = target[None].to(job.device, copy=True)
+    with isolation.opened(method, job.device) as ready:
+        watch = cost.start(job.device, ready.pid)
+        phase = from_numpy(method.solve(own, handle))
+        taken = watch.stop()
     if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
-        raise wrong_output(hologram.method, "solve", phase, f"a phase (1, {len(target)}, H, W)")
-    solved: Tensor = phase.detach().cpu()[0]
-    return solved
-
-
-@lru_cache(maxsize=64)
-def _photographed(
-    hologram: _Hologram, display: Condition, folder: Path, device: torch.device, again: bool, apart: Apart
-) -> tuple[Tensor, RectifiedCapture]:
-    """The phase of a hologram and a capture of it, taken once in a process."""
-    bench, target = opening.open_display(display, hologram.seed, device), load_target(hologram.source, display)
-    item = f"{hologram.source[3]}, again" if again else hologram.source[3]  # it names the noise
-    phase = _solved(hologram, display, folder, device, apart)
-    return phase, bench.photograph(phase, target, item=item, repeat=hologram.repeat, exposure=hologram.exposure)
+        raise wrong_output(name, "solve", phase, f"a phase (1, {len(target)}, H, W)")
+    solved = Solution(
+        phase.detach().cpu()[0],
+        handle.captures,
+        taken,
+        alone=job.alone,
+        covered=dict(ready.reads.covered),
+        uncovered=ready.reads.uncovered,
+    )
+    job.phases.keep(phase_id, solved)
+    return solved.phase

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from pathlib import Path
+from collections import OrderedDict
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,14 +10,15 @@ from holobench_eval.study.scoring import prediction
 
 
 def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[Any] = []
-    monkeypatch.setattr(prediction, "_photographed", lambda hologram, *_: asked.append(hologram))
-    source = ("charts", "{}", Path(), "tv_lines", "digest")
-    job: Any = SimpleNamespace(
-        source=lambda cell: source, setting=SimpleNamespace(folder=Path(), isolation="files", limits=None), device="cpu"
-    )
+    solved: list[Any] = []
+    bench = SimpleNamespace(photograph=lambda phase, *_, **__: None)
+    monkeypatch.setattr(prediction, "_photographs", OrderedDict())
+    monkeypatch.setattr(prediction.opening, "open_display", lambda *_: bench)
+    monkeypatch.setattr(prediction, "_solved", lambda job, cell, _: solved.append(cell.holograms["phase"]["code"]))
+    job: Any = SimpleNamespace(target=lambda cell, display: None, device="cpu")
+    display: Any = "a display"
     for version in ("before", "before", "after"):
-        probe = {"name": "mine.py:Mine", "params": {}, "sha256": version}
-        cell: Any = SimpleNamespace(holograms=probe, repeat=0, seed=1, exposure="equal")
-        prediction.shown(job, cell, SimpleNamespace())  # type: ignore[arg-type]
-    assert asked[0] == asked[1] != asked[2]
+        probe = {"name": "mine.py:Mine", "params": {}, "code": version, "phase": {"code": version}}
+        cell: Any = SimpleNamespace(holograms=probe, repeat=0, seed=1, exposure="equal", target="tv_lines")
+        prediction.shown(job, cell, display)
+    assert solved == ["before", "after"]

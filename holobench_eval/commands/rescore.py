@@ -1,0 +1,42 @@
+"""``holoeval rescore``: fill the columns that a study lacks, from the captures it has kept."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ..core.errors import UserError, suggest
+from ..core.panels import is_small
+from .options import ARTIFACTS, Config, Output, Threads, output_folder, thread_count
+from .output import console as open_console
+from .output import write_report
+
+Metrics = Annotated[list[str] | None, typer.Option("--metric", metavar="NAME", help="Only this one; may be repeated.")]
+
+
+def rescore(config: Config, output: Output = None, metric: Metrics = None, threads: Threads = None) -> None:
+    """Score kept captures by the metrics that their records lack. Nothing is solved, and no photograph is taken."""
+    from ..study import executors, provenance
+    from ..study.changes import recorded
+    from ..study.config import load_study
+    from ..study.plan import plan
+    from ..study.progress import watching
+    from ..study.run import run as compute
+
+    console = open_console()
+    changes = recorded(provenance.read(output)) if output else None
+    study = load_study(config, changes)
+    folder, grid = output_folder(study, output), plan(study)
+    for name in metric or ():
+        if name not in grid.metrics:
+            raise UserError(f"--metric {name}: the study has no such metric; {suggest(name, grid.metrics)}")
+    where = (
+        executors.Serial() if study.display.real else executors.executor("auto", None, is_small(study.display.panel))
+    )
+    many = thread_count(threads, where.workers, study)
+    with watching(console) as watch:
+        outcome = compute(study, grid, folder, where, watch, many, ARTIFACTS, rescore=tuple(metric or grid.metrics))
+    left = f"; {outcome.unscored} have nothing kept to score, and holoeval run computes them" * bool(outcome.unscored)
+    console.print(f"{outcome.rescored} captures scored again, {outcome.solved} solved{left}", highlight=False)
+    write_report(console, study, outcome.records, folder, outcome.provenance)

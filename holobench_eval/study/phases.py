@@ -1,0 +1,159 @@
+"""Solved phases, kept by name: each is solved once for all displays, conditions and studies of a results folder."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..core import plugins
+from ..core.errors import UserError
+from ..core.hashing import canonical, digest
+from ..core.io import write_atomically
+from ..display.account import Journal
+from ..display.metered import Solver
+from ..display.traits import traits_of
+from . import isolation
+from .artifacts import read_tensors
+from .cost import Cost
+from .versions import method_version
+
+RESULTS = "holoeval-results"  # the folder of all studies that are given no other
+# Of a solution, beside its cost.
+KEPT = ("phase", "captures", "stopped", "learned", "alone", "covered", "uncovered")
+LEVELS = 2**16  # of a start, to a turn: steps of 0.1 mrad, a 256th of the finest that a panel of 8 bits shows
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method found.
+
+    phase: ``(C, H, W)`` [rad]; captures: that it took; cost: without the memory where another method began with it;
+    stopped: why the display ended it (empty: it did not); learned: sha256 of what the method had learned (empty:
+    nothing); alone: whether it was timed without concurrent workers; covered, uncovered: what a user's code was seen to
+    read (``isolation.Reads``); reused: whether it is from before.
+    """
+
+    phase: Tensor
+    captures: int
+    cost: Cost
+    stopped: str = ""
+    learned: str = ""
+    alone: bool = True
+    covered: dict[str, str] = field(default_factory=dict)
+    uncovered: tuple[str, ...] = ()
+    reused: bool = False
+
+
+@dataclass(frozen=True)
+class Phases:
+    """The phases of a results folder."""
+
+    folder: Path
+
+    def path(self, identity: str) -> Path:
+        """The file of a phase."""
+        return self.folder / f"{identity}.pt"
+
+    def read(self, identity: str, learned: str | None = "", folder: Path = Path()) -> Solution | None:
+        """The solution of a name; None where there is none that is whole, one by another training of the method, or one
+        whose method read a file that has changed.
+
+        learned: sha256 of what the method has learned, None for any; folder: of the study, where paths of such files
+        start.
+        """
+        path = self.path(identity)
+        if not path.is_file():
+            return None
+        try:
+            content = read_tensors(path)
+            whole = content.pop("sha256", None) == _seal(identity, content)
+        except UserError:
+            return None
+        if not whole or learned not in (None, content["learned"]) or isolation.changed(content["covered"], folder):
+            return None
+        return Solution(**content | {"cost": Cost(**content["cost"])}, reused=True)
+
+    def journal(self, identity: str) -> Journal:
+        """The captures that a phase takes, in all attempts, until it is kept."""
+        return Journal(self.folder / f"{identity}.captures")
+
+    def captures(self, identity: str) -> int:
+        """The captures that a phase took so far, found or not."""
+        known = self.read(identity, None)
+        return self.journal(identity).captures or (known.captures if known else 0)
+
+    def keep(self, identity: str, solution: Solution) -> None:
+        """Keep a solution, in the place of an earlier one, and close its account."""
+        content = {**{name: getattr(solution, name) for name in KEPT}, "cost": asdict(solution.cost)}
+        buffer = io.BytesIO()
+        torch.save({**content, "sha256": _seal(identity, content)}, buffer)
+        write_atomically(self.path(identity), buffer.getvalue(), lasting=solution.captures > 0)
+        self.journal(identity).close()
+
+    def remove(self, identities: Iterable[str]) -> None:
+        """Remove phases with their accounts, where they are."""
+        for identity in identities:
+            self.path(identity).unlink(missing_ok=True)
+            self.journal(identity).close()
+
+
+@dataclass
+class Starts:
+    """The phases of one target that other methods begin with, each by a method that knows the nominal optics alone.
+
+    basis: what such a phase depends on besides its method, see ``identity.phase``; device: where it is needed; seconds:
+    what those from before took, which is part of what a method costs that begins with them.
+    """
+
+    phases: Phases
+    basis: Mapping[str, Any]
+    device: torch.device
+    seconds: float = 0.0
+
+    def __call__(self, method: Solver, solve: Callable[[], Tensor]) -> Tensor:
+        """The phase ``(1, C, H, W)`` of a method: kept from before, or solved now and kept.
+
+        A class that is no registered method by itself has no version of its own, and is always solved.
+        """
+        traits = traits_of(method)
+        if not plugins.is_registered("methods", type(method)) or traits.sees or traits.trains:
+            return solve()
+        identity = digest({**self.basis, "code": method_version(type(method)), "params": plugins.params_of(method)})
+        if (known := self.phases.read(identity)) is not None:
+            self.seconds += known.cost.seconds
+            return known.phase[None].to(self.device)
+        began = time.perf_counter()
+        phase = solve()
+        cost = Cost(time.perf_counter() - began)
+        self.phases.keep(identity, Solution(phase.detach().cpu()[0], 0, cost, alone=False))
+        return phase
+
+
+def _seal(identity: str, content: Mapping[str, Any]) -> str:
+    """The sha256 of a solution and its name: a file of tensors does not tell that a byte in it has changed."""
+    phase = content.get("phase")
+    if not isinstance(phase, Tensor):
+        raise UserError("no phase")
+    rest = canonical([identity, phase.shape, {name: value for name, value in content.items() if name != "phase"}])
+    return hashlib.sha256(phase.contiguous().numpy().tobytes() + rest.encode()).hexdigest()
+
+
+def phases_of(output: Path) -> Phases:
+    """The phases that a study with this output folder shares: with all of ``holoeval-results``, else with none."""
+    beside = output.absolute().parent
+    return Phases((beside if beside.name == RESULTS else output) / "solved")
+
+
+def start_of(phase: Tensor) -> Tensor:
+    """A phase ``(C, H, W)`` [rad] as other methods start from it, in ``LEVELS``."""
+    levels = (phase.double() / math.tau * LEVELS).round().remainder(LEVELS)
+    return levels.float() * (math.tau / LEVELS)

@@ -1,0 +1,79 @@
+"""The scores of a capture, by metric; and what is kept so that metrics to come need no new capture."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ...core import plugins
+from ...core.errors import CellError, UserError
+from ...core.io import write_atomically
+from ...metrics import match, score
+from ...metrics.psnr import psnr
+from ...metrics.ssim import RADIUS, LocalStatistics
+from .. import identity
+from ..focal_stacks import INFOCUS, SCORES
+from ..plan import Cell
+from .job import Job
+
+SEAL = 32  # bytes of the sha256 that ends the file of a kept capture
+
+
+def scores_of(job: Job, cell: Cell, image: Tensor, wanted: Tensor, metrics: Mapping[str, str]) -> dict[str, Any]:
+    """The scores of an image ``(C, h, w)`` against ``wanted``, by metric. metrics: versions of those to compute."""
+    names = identity.named(metrics)
+    columns = score(image, wanted, metrics=names, lpips_weights=job.setting.lpips_weights)
+    if INFOCUS in metrics:
+        dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
+        columns |= in_focus(image, wanted, dataset.mask(cell.target, tuple(wanted.shape[-2:])))
+    return identity.grouped(columns, metrics)
+
+
+def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
+    """PSNR over a mask, and the mean of the SSIM map over it, in linear light (paper 7.1).
+
+    image: ``(C, h, w)``; wanted: ``(C, h, w)`` in [0, 1]; mask: ``(h, w)`` bool. Brightness is matched over the whole
+    picture, as for every other score. CellError for a mask that is empty where SSIM is defined.
+    """
+    inner = mask[RADIUS:-RADIUS, RADIUS:-RADIUS]
+    if not bool(inner.any()):
+        raise CellError("nothing of this picture is in focus")
+    target = wanted.double()
+    matched, _ = match(image.double(), target)
+    luminance, structure = LocalStatistics(target).maps(matched)
+    values = (
+        psnr(matched[:, mask][:, None], target[:, mask][:, None]),
+        (luminance * structure)[:, inner].mean(),
+    )
+    return {name: float(value) for name, value in zip(SCORES, values, strict=True)}
+
+
+def keep_capture(path: Path, *images: Tensor, lasting: bool = False) -> None:
+    """Keep an image ``(C, h, w)``, or one with the picture that it is compared with, as exact as it is scored.
+
+    lasting: of a display that exists, whose exposures cost time.
+    """
+    buffer = io.BytesIO()
+    np.save(buffer, torch.stack(images).squeeze(0).cpu().numpy(), allow_pickle=False)
+    write_atomically(path, buffer.getvalue() + hashlib.sha256(buffer.getvalue()).digest(), lasting)
+
+
+def kept_capture(path: Path) -> list[Tensor]:
+    """What ``keep_capture`` kept: an image, and where it has one of its own the picture that it is compared with; empty
+    where nothing is kept. UserError for a damaged file."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return []
+    array, seal = content[:-SEAL], content[-SEAL:]
+    if hashlib.sha256(array).digest() != seal:
+        raise UserError(f"{path}: the capture is not as it was kept, its digest is another; delete the file")
+    values = torch.from_numpy(np.load(io.BytesIO(array), allow_pickle=False))
+    return list(values) if values.ndim == 4 else [values]

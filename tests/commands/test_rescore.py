@@ -1,0 +1,173 @@
+"""``holoeval rescore`` and ``check`` with a metric that came, or changed, after a study was run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from holobench_eval.commands import app
+from holobench_eval.commands.reports.check import problems_in
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.real import RealBench
+from holobench_eval.lab.session import read_manifest
+from holobench_eval.metrics import catalogue
+from holobench_eval.report import build_report
+from holobench_eval.report.data import scores
+from holobench_eval.study import executors
+from holobench_eval.study.config import load_study
+from holobench_eval.study.phases import phases_of
+from holobench_eval.study.plan import plan
+from holobench_eval.study.store import Store
+from tests.commands import test_moved_session as sessions
+from tests.study.test_rescore import BOTH, ONE, PICTURE, cells, forget
+from tests.support import another_metric
+from tests.support.another_metric import COLUMN, NAME
+from tests.support.trained_study import compute
+
+
+@pytest.fixture(autouse=True)
+def _one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Others would not know the metric."""
+    monkeypatch.setattr(executors, "executor", lambda *_: executors.Serial())
+
+
+def rescored(*arguments: object) -> tuple[str, str]:
+    """What the command says, and its error."""
+    done = CliRunner().invoke(app, ["rescore", *map(str, arguments)])
+    assert done.exit_code == 0 or isinstance(done.exception, UserError), (done.output, done.exception)
+    return done.output, str(done.exception or "")
+
+
+@pytest.fixture
+def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Puts the metric at a version into the catalogue, and into the columns that reports know."""
+
+    def added(version: int) -> None:
+        another_metric.add(tmp_path, monkeypatch, version)
+        monkeypatch.setattr(scores, "METRICS", {metric.name: metric for metric in catalogue()})
+
+    return added
+
+
+@pytest.fixture
+def report(tmp_path: Path, add: Callable[[int], None]) -> Path:
+    """The folder of a finished study, whose config has named a metric more since."""
+    add(1)
+    config = tmp_path / "study.yaml"
+    config.write_text(PICTURE)
+    outcome, folder = compute(config), tmp_path / "out"
+    build_report(load_study(config), outcome.records, folder, outcome.provenance)
+    config.write_text(PICTURE.replace(ONE, BOTH))
+    return folder
+
+
+def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report: Path) -> None:
+    config = report.parent / "study.yaml"
+    before = pd.read_csv(report / "records.csv")
+    said, failure = rescored(config, "--output", report, "--metric", NAME, "--threads", 1)
+    assert not failure
+    assert "14 captures scored again, 0 solved" in said
+    assert "nothing kept" not in said
+    after = pd.read_csv(report / "records.csv")
+    (new,) = set(after) - set(before)
+    assert new.startswith(COLUMN)
+    assert after[new].notna().all()
+    pd.testing.assert_frame_equal(after[list(before)], before)
+    assert problems_in(report) == (1, [])
+
+
+def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report: Path) -> None:
+    config = report.parent / "study.yaml"
+    forget(config)
+    said, failure = rescored(config, "--output", report)
+    assert not failure
+    words = " ".join(said.split())
+    assert "12 captures scored again, 0 solved; 2 have nothing kept to score, and holoeval run computes them" in words
+    assert pd.read_csv(report / "records.csv").filter(like=COLUMN).isna().sum().item() == 2
+
+
+def test_a_metric_that_the_study_does_not_have_is_refused_with_the_nearest(report: Path) -> None:
+    _, failure = rescored(report.parent / "study.yaml", "--output", report, "--metric", "psnt")
+    assert (
+        failure
+        == "--metric psnt: the study has no such metric; did you mean 'psnr'? allowed: match, peak_error, psnr, refine"
+    )
+
+
+def test_a_study_that_was_never_run_is_told_so_and_nothing_is_solved(
+    tmp_path: Path, add: Callable[[int], None]
+) -> None:
+    config = tmp_path / "study.yaml"
+    config.write_text(PICTURE)
+    said, failure = rescored(config, "--output", tmp_path / "never")
+    assert not failure
+    assert "0 captures scored again, 0 solved" in said
+    assert not phases_of(tmp_path / "never").folder.exists()
+
+
+def test_a_metric_more_in_the_package_is_no_problem_of_a_report(
+    tmp_path: Path, add: Callable[[int], None], no_physics: None
+) -> None:
+    config, folder = tmp_path / "study.yaml", tmp_path / "out"
+    config.write_text(PICTURE.replace(f"{ONE}\n", ""))  # scored by every metric that there is
+    outcome = compute(config)
+    build_report(load_study(config), outcome.records, folder, outcome.provenance)
+    assert problems_in(folder) == (1, [])
+    add(1)
+    assert NAME in plan(load_study(config)).metrics
+    assert problems_in(folder) == (1, [])
+
+
+def test_a_report_of_another_version_of_a_metric_is_found_until_it_is_scored_again(
+    report: Path, add: Callable[[int], None]
+) -> None:
+    config = report.parent / "study.yaml"
+    rescored(config, "--output", report)
+    add(2)
+    _, problems = problems_in(report)
+    assert problems == [
+        f"{report}: '{NAME}' was of version v1, 1, is now of v1, 2; score its captures again",
+    ]
+    rescored(config, "--output", report)
+    assert problems_in(report) == (1, [])
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of_a_metric(
+    tmp_path: Path, add: Callable[[int], None], monkeypatch: pytest.MonkeyPatch, kept: bool
+) -> None:
+    add(1)
+    session = sessions.moved(tmp_path, monkeypatch, sessions.STUDY.replace("[psnr]", f"[psnr, {NAME}]"))
+    assert not sessions.run("session", "import", session)[1]
+    photographs, photograph = list[str](), RealBench.photograph
+
+    def photographed(self: RealBench, *args: Any, **named: Any) -> Any:
+        photographs.append(str(named["item"]))
+        return photograph(self, *args, **named)
+
+    monkeypatch.setattr(RealBench, "photograph", photographed)
+    store = Store(session / "report")
+    for file in store.folder.glob("*.npy") if not kept else ():
+        file.unlink()
+    add(2)
+    _, failure = sessions.run("session", "import", session)
+    assert not failure
+    assert photographs == []
+    assert read_manifest(session).rounds == 1
+    table = pd.read_csv(session / "report" / "records.csv").set_index("method")
+    assert table.filter(like="psnr_linear").loc["double_phase"].notna().all()
+    assert table.filter(like=COLUMN).loc["double_phase"].notna().item() == kept
+
+
+def test_what_is_scored_again_has_one_record_and_one_capture_for_each_cell(report: Path) -> None:
+    config = report.parent / "study.yaml"
+    rescored(config, "--output", report)
+    store = Store(report)
+    grid = plan(load_study(config))
+    assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in grid.cells}
+    assert {path.stem for path in store.folder.glob("*.npy")} == {cell.id for cell in cells(config)}

@@ -1,0 +1,242 @@
+"""Phases are solved once, for all displays, runs and studies that cannot be told apart by what a method is given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from holobench_eval.methods.double_phase import DoublePhase
+from holobench_eval.study.artifacts import STATE, Artifacts
+from holobench_eval.study.config import load_study
+from holobench_eval.study.cost import Cost
+from holobench_eval.study.executors import Serial
+from holobench_eval.study.phases import RESULTS, Phases, Solution, phases_of
+from holobench_eval.study.plan import plan
+from holobench_eval.study.run import Outcome
+from holobench_eval.study.store import Store
+from tests.study.test_identity import write_profile
+from tests.study.test_run import TWO, compute
+from tests.support import trained_study
+from tests.support.fake_study import solves, untimed, write_config
+
+SOLUTION = Solution(torch.linspace(-4, 4, 24).view(2, 3, 4), 5, Cost(0.25, 3.5), "has used its 5", "abc", False)
+CONFIG = """\
+title: "Once"
+seed: 3
+display: {profiles: [PROFILES], panel: [128, 128]}
+targets: {dataset: charts, params: {names: [tv_lines, gray_ramp]}}
+methods: [double_phase]
+"""
+
+
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Where double phase was solved: the targets, in order."""
+    names: list[str] = []
+    solve = DoublePhase.solve
+
+    def counted(self: DoublePhase, target: torch.Tensor, bench: Any) -> torch.Tensor:
+        names.append(bench.target_name)
+        return solve(self, target, bench)
+
+    monkeypatch.setattr(DoublePhase, "solve", counted)
+    return names
+
+
+def write_study(folder: Path, displays: int = 1, *changes: tuple[str, str]) -> Path:
+    """A study of double phase on displays of the same optics, with pieces of its config exchanged."""
+    names = [f"display{number}" for number in range(displays)]
+    for name in names:
+        write_profile(folder, f"{name}.yaml", ("name: ideal", f"name: {name}"))
+    text = CONFIG.replace("PROFILES", ", ".join(f"{name}.yaml" for name in names))
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "study.yaml").write_text(text)
+    return folder / "study.yaml"
+
+
+def scores(outcome: Outcome) -> list[dict[str, float]]:
+    assert {record["state"] for record in outcome.records} == {"done"}
+    return [record["scores"] for record in outcome.records]
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_path: Path, found: list[str]) -> None:
+    outcome = compute(write_study(tmp_path, 10), tmp_path / "out")
+    assert found == ["tv_lines", "gray_ramp"]
+    assert outcome.solved == 2
+    assert len([record for record in outcome.records if record["label"] == "double_phase"]) == 20
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_study_beside_uses_the_phases_that_another_has_solved(tmp_path: Path, found: list[str]) -> None:
+    results = tmp_path / RESULTS
+    first = compute(write_study(tmp_path), results / "a")
+    second = compute(write_study(tmp_path, 3), results / "b")
+    assert len(found) == 2
+    assert (first.solved, second.solved) == (2, 0)
+    assert [record["reused"] for record in second.records if record["label"] == "double_phase"] == [True] * 6
+    assert scores(compute(write_study(tmp_path, 3), tmp_path / "alone")) == scores(second)
+    assert len(found) == 4  # a folder that lies elsewhere shares nothing
+
+
+def test_only_studies_of_a_folder_of_results_share_their_phases() -> None:
+    first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
+    assert first == second == Phases(Path("here", RESULTS, "solved").absolute())
+    assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
+
+
+OTHERS = {
+    "dataset": ("[tv_lines, gray_ramp]", "[tv_lines, siemens_star]"),
+    "seed": ("seed: 3", "seed: 4"),
+    "panel": ("panel: [128, 128]", "panel: [128, 160]"),
+}
+
+
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("change", OTHERS.values(), ids=OTHERS)
+def test_a_study_of_other_inputs_solves_its_own(tmp_path: Path, found: list[str], change: tuple[str, str]) -> None:
+    compute(write_study(tmp_path), tmp_path / RESULTS / "a")
+    assert compute(write_study(tmp_path, 1, change), tmp_path / RESULTS / "b").solved == 2
+    assert len(found) == 4
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_repeat_more_is_solved_and_the_first_is_not_again(tmp_path: Path, found: list[str]) -> None:
+    compute(write_study(tmp_path), tmp_path / RESULTS / "a")
+    assert compute(write_study(tmp_path, 1, ("seed: 3", "seed: 3\nrepeats: 2")), tmp_path / RESULTS / "b").solved == 2
+    assert len(found) == 4
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        write_profile(tmp_path, f"{name}.yaml", ("name: ideal", f"name: {name}"))
+    config = write_config(tmp_path, ("plugins.py:Seeing",), count=1, profiles="one.yaml, two.yaml")
+    assert compute(config, tmp_path / RESULTS / "a").solved == 2
+    assert compute(config, tmp_path / RESULTS / "b").solved == 0
+    assert len(solves(tmp_path)) == 2
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_phase_whose_file_is_lost_or_damaged_is_solved_again_to_the_same_scores(
+    tmp_path: Path, found: list[str]
+) -> None:
+    config, output = write_study(tmp_path), tmp_path / "out"
+    before = scores(compute(config, output))
+    cells = [cell for cell in plan(load_study(config)).cells if cell.code]
+    lost, damaged = (phases_of(output).path(cell.phase_id) for cell in cells)
+    lost.unlink()
+    damaged.write_bytes(flipped(damaged.read_bytes()))
+    Store(output).remove(cell.id for cell in cells)
+    assert scores(compute(config, output)) == before
+    assert found == ["tv_lines", "gray_ramp"] * 2
+
+
+def flipped(content: bytes) -> bytes:
+    """The bytes of a file with a bit of a phase changed: the middle of the file."""
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 64]) + content[middle + 1 :]
+
+
+def test_a_solution_is_read_as_it_was_kept(tmp_path: Path) -> None:
+    phases = Phases(tmp_path)
+    phases.keep("ab", SOLUTION)
+    for learned in ("abc", None):
+        read = phases.read("ab", learned)
+        assert read is not None
+        assert torch.equal(read.phase, SOLUTION.phase)
+        assert replace(read, phase=SOLUTION.phase) == replace(SOLUTION, reused=True)
+    assert phases.read("cd", None) is None
+    phases.remove(["ab", "cd"])
+    assert phases.read("ab", None) is None
+
+
+def test_a_solution_by_another_training_is_none(tmp_path: Path) -> None:
+    phases = Phases(tmp_path)
+    phases.keep("ab", SOLUTION)
+    assert phases.read("ab") is None
+    assert phases.read("ab", "abd") is None
+
+
+def test_a_solution_of_another_name_is_none(tmp_path: Path) -> None:
+    phases = Phases(tmp_path)
+    phases.keep("ab", SOLUTION)
+    phases.path("ab").rename(phases.path("cd"))
+    assert phases.read("cd", None) is None
+
+
+def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
+    phases = Phases(tmp_path)
+    phases.keep("ab", SOLUTION)
+    file = phases.path("ab")
+    whole = file.read_bytes()
+    for position in range(0, len(whole), 7):
+        file.write_bytes(whole[:position])
+        assert phases.read("ab", None) is None
+        file.write_bytes(whole[:position] + bytes([whole[position] ^ 1]) + whole[position + 1 :])
+        read = phases.read("ab", None)
+        assert read is None or torch.equal(read.phase, SOLUTION.phase)
+    for content in ({}, {"phase": 3}, {"phase": SOLUTION.phase}, [SOLUTION.phase]):
+        torch.save(content, file)
+        assert phases.read("ab", None) is None
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_run_that_shared_the_machine(
+    tmp_path: Path, found: list[str]
+) -> None:
+    results = tmp_path / RESULTS
+    shared = compute(write_study(tmp_path), results / "a", executor=TWO)
+    config = write_study(tmp_path, 1, ("seed: 3", "seed: 3\ntiming: alone"))
+    alone = compute(config, results / "b", executor=TWO)
+    assert found == ["tv_lines", "gray_ramp", "gray_ramp"]
+    assert [(record["alone"], record["reused"]) for record in alone.records[-2:]] == [(False, True), (True, False)]
+    assert scores(alone) == scores(shared)
+    compute(config, results / "c", executor=TWO)  # what was timed alone once need not be again
+    assert len(found) == 3
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_training_again_forgets_the_phases_of_what_was_trained_and_no_others(tmp_path: Path) -> None:
+    config = trained_study.write(tmp_path, ("methods: [", 'methods: ["trained.py:Even", '))
+    trained_study.compute(config)
+    phases = phases_of(tmp_path / "out")
+    even, gain = (phases.path(cell.phase_id) for cell in plan(load_study(config)).cells if cell.code)
+    before = [file.stat().st_mtime_ns for file in (even, gain)]
+    assert trained_study.compute(config, retrain=True).solved == 1
+    after = [file.stat().st_mtime_ns for file in (even, gain)]
+    assert after[0] == before[0]
+    assert after[1] > before[1]
+
+
+@pytest.mark.usefixtures("no_physics")
+def test_a_phase_of_another_training_is_not_used(tmp_path: Path) -> None:
+    config = trained_study.write(tmp_path)
+    results = tmp_path / RESULTS
+    first = compute(config, results / "a")
+    (needed,) = trained_study.needs(config)
+    artifacts = Artifacts(results / "artifacts")  # where ``compute`` keeps what was learned
+    state = dict(artifacts.load(needed).state)
+    known = artifacts.load(needed).provenance.items()
+    facts = {key: value for key, value in known if key not in ("sha256", "log_sha256")}
+    assert (artifacts.folder_of(needed) / STATE).is_file()
+    artifacts.remove(needed)
+    artifacts.write(needed, {**state, "gain": 3 * state["gain"]}, facts)
+    second = compute(config, results / "b")
+    assert (first.solved, second.solved) == (1, 1)
+    assert scores(second)[-1] != scores(first)[-1]
+    assert second.records[-1]["learned"]["sha256"] != first.records[-1]["learned"]["sha256"]
+
+
+def test_no_records_of_a_serial_run_depend_on_what_was_solved_before(tmp_path: Path, no_physics: None) -> None:
+    results, config = tmp_path / RESULTS, write_study(tmp_path, 2)
+    whole = compute(config, results / "a", executor=Serial())
+    again = compute(config, results / "b", executor=Serial())
+    unused = [{**record, "reused": False} for record in untimed(again.records)]
+    assert unused == [{**record, "reused": False} for record in untimed(whole.records)]
