@@ -293,3 +293,18 @@ def test_a_run_that_was_killed_before_the_followers_gives_the_bytes_of_one_that_
     build_report(study, whole.records, tmp_path / "whole", whole.provenance)
     for name in ("table.csv", "records.csv"):
         assert untimed_table(output / name) == untimed_table(tmp_path / "whole" / name)
+
+
+def test_a_phase_that_began_with_another_phase_of_the_same_name_is_not_used(tmp_path: Path) -> None:
+    config = write_config(tmp_path, (POOR, GOOD, FOLLOWING))
+    compute(config, tmp_path / "out", Serial())
+    (follower, *_), solved = [cell for cell in planned(config).cells if cell.starts], len(solves(tmp_path))
+    store, phases = Store(tmp_path / "out"), phases_of(tmp_path / "out")
+    for other in planned(config).cells:  # as another training leaves them
+        if other.id in follower.starts:
+            known = phases.read(other.phase_id)
+            assert known is not None
+            phases.keep(other.phase_id, replace(known, phase=known.phase + 1))
+    store.remove([follower.id])
+    compute(config, tmp_path / "out", Serial())
+    assert len(solves(tmp_path)) == solved + 1

@@ -32,14 +32,16 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
     """
     task, first = job.task, job.task.cells[0]
     learned = job.learned(task.preparation)
-    state = str(learned.provenance["sha256"]) if learned else ""
+    others = starts.of(job, first)
+    # A start has the same name after another training, so what it is counts too.
+    state = str(learned.provenance["sha256"]) if learned else starts.content(others)
     known = job.phases.read(first.phase_id, state, job.setting.folder)
     if known is not None and (known.alone or not job.timed):
         return known
     shared = Starts(job.phases, {name: first.phase[name] for name in identity.BASIS}, job.device)
     method = job.method(first.method, first.params)
     gate(method, first.method, first.code, digests(method, first.target), first.files)
-    journal, others = job.phases.journal(first.phase_id), starts.of(job, first)
+    journal = job.phases.journal(first.phase_id)
     if display.in_session:  # its photographs are found again by each import, and so are no new captures
         journal.close()
     handle = job.display(first, display).for_method(

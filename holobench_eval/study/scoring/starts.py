@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -28,6 +29,11 @@ def of(job: Job, cell: Cell) -> list[Tensor]:
 def all_there(cell: Cell, found: Sequence[Tensor]) -> bool:
     """Whether a cell has all the starts that its phase is named by: one that has failed may yet be there."""
     return len(found) == len(cell.phase.get("starts", ()))
+
+
+def content(found: Sequence[Tensor]) -> str:
+    """The sha256 of starts, whatever their names; empty for none."""
+    return hashlib.sha256(b"".join(phase.numpy().tobytes() for phase in found)).hexdigest() if found else ""
 
 
 def _phase_id(store: Store, identity: str, until: float) -> str:
