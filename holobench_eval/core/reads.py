@@ -84,12 +84,16 @@ _recorder: Seen | None = None
 
 @contextmanager
 def recorded() -> Iterator[Seen]:
-    """What this process opens within the context."""
+    """What this process opens within the context. It writes no bytecode meanwhile.
+
+    Cached bytecode is valid for a source of the same size and the same second, so a file that is rewritten within a
+    second would run as it was before.
+    """
     global _recorder
     _install()
     before, _recorder = _recorder, Seen()
     try:
-        with _announced():
+        with _announced(), patch.object(sys, "dont_write_bytecode", True):
             yield _recorder
     finally:
         _recorder = before

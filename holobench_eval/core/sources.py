@@ -188,11 +188,7 @@ def _forget(files: Iterable[Path], folder: str) -> None:
 
 
 class _FromSource(SourceFileLoader):
-    """Compiles a file anew for every import. folder: of the user's file.
-
-    Cached bytecode is valid for a source of the same size and the same second, so a file that is rewritten within a
-    second would run as it was before.
-    """
+    """Compiles a file anew for every import. folder: of the user's file."""
 
     def __init__(self, name: str, path: str, folder: str) -> None:
         super().__init__(name, path)
