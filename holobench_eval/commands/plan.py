@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
+from statistics import mean
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -120,7 +121,6 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
 
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
     states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder)
-    timed = cost.names()
     rows = []
     for label in dict.fromkeys(task.label for task in plan.tasks):
         tasks = [task for task in plan.tasks if task.label == label]
@@ -130,8 +130,9 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
         apart = not tasks[0].is_floor and not isolation.runs_inside(
             tasks[0].cells[0].method, study.folder, study.isolation
         )
-        keys = [cost.key(task, threads, workers, gpu, apart) for task in tasks if not task.is_floor]
-        seconds = [earlier.seconds for key in keys if key in timed and (earlier := cost.recorded(key)) is not None]
+        kinds = Counter(cost.key(task, threads, workers, gpu, apart) for task in unsolved if not task.is_floor)
+        known = {kind: seconds for kind in kinds if (seconds := cost.recorded(kind)) is not None}
+        seconds = [known.get(kind, mean(known.values())) * many for kind, many in kinds.items()] if known else []
         limit = limits.get(label)
         rows.append(
             Row(
@@ -143,7 +144,7 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
                 done=count["done"] + count["unscored"],
                 failed=count["failed"],
                 missing=count["missing"] + count["untimed"],
-                seconds=sum(seconds) / len(seconds) * len(unsolved) if seconds else None,
+                seconds=None if label == FLOOR or (kinds and not known) else sum(seconds),
             )
         )
     return rows

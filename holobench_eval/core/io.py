@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import tempfile
@@ -18,6 +19,7 @@ from .errors import StorageError
 from .hashing import digest
 
 TEMPORARY = ".writing-"  # how the name of a file begins that is not whole yet
+SEAL = hashlib.sha256().digest_size  # bytes at the end of a sealed file
 
 
 def now() -> str:
@@ -68,6 +70,17 @@ def write_atomically(path: Path, content: bytes, lasting: bool = True) -> None:
     except OSError as error:
         reason = f"{path} cannot be written: {error.strerror}; mend that, and run the same command again"
         raise StorageError(reason) from error
+
+
+def sealed(content: bytes, name: str = "") -> bytes:
+    """The content, and after it the SHA-256 of a name and of it, for ``unsealed``: most formats do not tell that a byte
+    of theirs has changed."""
+    return content + hashlib.sha256(name.encode() + content).digest()
+
+
+def unsealed(content: bytes, name: str = "") -> bytes | None:
+    """What was ``sealed`` under a name; None where it is not as it was."""
+    return content[:-SEAL] if sealed(content[:-SEAL], name) == content else None
 
 
 def file_name(text: str) -> str:

@@ -10,12 +10,12 @@ import json
 import math
 import shutil
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import torch
 
@@ -32,6 +32,7 @@ UNFINISHED = "unfinished"
 # had to learn. Both are small enough to be committed; a report does not need the tensors.
 RECORDS = "training"
 FORMAT = 1
+ROUND = ("round", "captures", "seconds", "predicted_psnr", "captured_psnr", "fidelity_psnr")  # columns of a log
 OTHER = {"version": "other code", "external": "other files beside the code"}  # by the entry of a description
 
 
@@ -217,10 +218,13 @@ def read_log(folder: Path) -> list[dict[str, str]]:
         return []
 
 
-def read_tensors(path: Path) -> dict[str, Any]:
-    """Tensors and plain values from a file that may be hostile. UserError for one that is damaged or holds code."""
+def read_tensors(path: Path, file: IO[bytes] | None = None) -> dict[str, Any]:
+    """Tensors and plain values from a file that may be hostile. UserError for one that is damaged or holds code.
+
+    file: what the path holds, where it has been read.
+    """
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        content = torch.load(file or path, map_location="cpu", weights_only=True)
     except Exception as error:  # damaged bytes raise whatever they happen to mean
         reason = str(error).partition("\n")[0][:120]
         raise UserError(
@@ -280,7 +284,7 @@ def _short(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Round:
-    """The state at the end of a round; NaN for what was not logged.
+    """The state at the end of a round, in the order of ``ROUND``; NaN for what was not logged.
 
     captures, seconds: taken so far, held-out captures included. predicted, captured: PSNR [dB] of predictions and of
     captures of held-out images against the images; fidelity: PSNR [dB] of the predictions against the captures.
@@ -330,42 +334,19 @@ def training_records(output: Path) -> dict[str, TrainingRecord]:
 
 
 def rounds_of(log: Path) -> tuple[Round, ...]:
-    """The rounds in a log; none where the log lacks these columns."""
+    """The rounds in a log, each with the last finite figure of every column; none where the log lacks these columns."""
+    import pandas as pd  # which workers need not load
+
     try:
-        with log.open(encoding="utf-8", newline="") as file:
-            return rounds_in(csv.DictReader(file))
-    except (OSError, ValueError, csv.Error):
+        logged = pd.read_csv(log, dtype=str).reindex(columns=ROUND)
+    except (OSError, ValueError):
         return ()
-
-
-def rounds_in(rows: Iterable[Mapping[str | Any, Any]]) -> tuple[Round, ...]:
-    """The rounds in the rows of a log, each with the last finite figure of every column."""
-    rounds: dict[int, dict[str, float]] = {}
-    for row in rows:
-        number = _number(row.get("round"))
-        if math.isfinite(number):
-            names = ("captures", "seconds", "predicted_psnr", "captured_psnr", "fidelity_psnr")
-            figures = {name: _number(row.get(name)) for name in names}
-            rounds.setdefault(int(number), {}).update({k: v for k, v in figures.items() if math.isfinite(v)})
-    return tuple(
-        Round(
-            number,
-            *(logged.get(name, math.nan) for name in ("captures", "seconds")),
-            *(logged.get(f"{name}_psnr", math.nan) for name in ("predicted", "captured", "fidelity")),
-        )
-        for number, logged in sorted(rounds.items())
-    )
-
-
-def _number(value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return math.nan
+    figures = logged.apply(pd.to_numeric, errors="coerce").replace([math.inf, -math.inf], math.nan)
+    return tuple(Round(int(row[0]), *row[1:]) for row in figures.groupby("round").last().itertuples())
 
 
 def progress(folder: Path) -> tuple[float, float]:
     """Captures of an unfinished training, and its seconds up to the last round in its log; NaN where unknown."""
-    rows = rounds_in(read_log(folder))
+    rows = rounds_of(folder / LOG)
     captures, seconds = (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)
     return _journal(folder).captures or captures, seconds

@@ -1,8 +1,8 @@
 """The cost of a solution: wall time, and the peak of memory above the level before it.
 
 These are the only numbers of a table that differ from run to run: a study reports what it measured itself. The last
-measurement of every solution is also kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``) ``/holobench_eval/timings/``, for
-estimates of how long a study takes.
+time that a method took is also kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``) ``/holobench_eval/timings/``, from which
+the time is estimated that a study takes.
 
 Linux keeps the largest resident set that a process ever had (``VmHWM`` in ``/proc/self/status``) and sets it back to
 the present one when 5 is written to ``/proc/self/clear_refs`` (proc(5)). Elsewhere memory is not measured.
@@ -12,17 +12,15 @@ On a GPU the memory is that of torch's tensors on it, and the clock waits until 
 from __future__ import annotations
 
 import gc
-import json
 import math
 import os
 import platform
 import time
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import torch
 
@@ -37,6 +35,8 @@ from .plan import Plan, Task
 
 PROCESS = Path("/proc/self")
 _KIB_PER_MIB, _BYTES_PER_MIB = 1024, 1024**2
+KIND = ("code", "params", "optics", "display", "captures")  # entries of a phase that tell how long it takes
+APART = 10.0
 
 
 @dataclass(frozen=True)
@@ -164,30 +164,32 @@ def timed(study: Study, plan: Plan) -> frozenset[str]:
 
 
 def key(task: Task, threads: int, workers: int, gpu: str = "", apart: bool = False) -> str:
-    """Name of a task's timing: its phase and the machine. gpu: its name, empty for none; apart: in a process of its
-    own."""
+    """The name under which the time of a task is kept, which tasks for other targets share.
+
+    It holds the method, its parameters and optics, the display if the method sees it, and the machine. gpu: its name,
+    empty for none; apart: in a process of its own.
+    """
+    phase = task.cells[0].phase
+    kind = {name: phase.get(name) for name in KIND} | {"planes": len(phase.get("planes", ()))}
     machine = [cpu_model(), platform.machine(), threads, workers, *filter(None, (gpu, "apart" * apart))]
-    return digest([task.cells[0].phase_id, machine, _torch(), __version__])
+    return digest([kind, task.cells[0].measure, machine, _torch(), __version__])
 
 
-def names() -> frozenset[str]:
-    """The names of all recorded timings."""
-    return frozenset(path.stem for path in folder().glob("*.json"))
+def recorded(name: str) -> float | None:
+    """The seconds that were kept last under a name, None if there are none."""
+    with suppress(OSError, ValueError):
+        if 0 <= (seconds := float((folder() / name).read_text(encoding="utf-8"))) < math.inf:
+            return seconds
+    return None
 
 
-def recorded(name: str) -> Cost | None:
-    """The last measurement under a name, None if there is none."""
-    try:
-        content: Any = json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
-        seconds, memory = float(content["seconds"]), content.get("memory_mib")
-        effort = Cost(seconds, None if memory is None else float(memory))
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
-    sizes = [effort.seconds, *([] if effort.memory_mib is None else [effort.memory_mib])]
-    return effort if all(math.isfinite(size) and size >= 0 for size in sizes) else None
+def keep(name: str, seconds: float) -> None:
+    """Keep a time for estimates; at most one a name in ``APART`` seconds, since a study may have thousands."""
+    now = time.monotonic()
+    if now - _kept.get(name, -math.inf) >= APART:
+        _kept[name] = now
+        with suppress(StorageError):  # a cache, which a run can do without
+            write_atomically(folder() / name, repr(seconds).encode(), lasting=False)
 
 
-def keep(name: str, effort: Cost) -> None:
-    """Record a measurement for estimates, in the place of an earlier one."""
-    with suppress(StorageError):  # a cache, which a run can do without
-        write_atomically(folder() / f"{name}.json", json.dumps(asdict(effort)).encode(), lasting=False)
+_kept: dict[str, float] = {}  # when [s] this process kept a time last, by its name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import math
 import time
@@ -15,9 +14,8 @@ import torch
 from torch import Tensor
 
 from ..core import plugins
-from ..core.errors import UserError
-from ..core.hashing import canonical, digest
-from ..core.io import write_atomically
+from ..core.hashing import digest
+from ..core.io import sealed, unsealed, write_atomically
 from ..display.account import Journal
 from ..display.metered import Solver
 from ..display.traits import traits_of
@@ -71,14 +69,11 @@ class Phases:
         start.
         """
         path = self.path(identity)
-        if not path.is_file():
+        file = unsealed(path.read_bytes(), identity) if path.is_file() else None
+        if file is None:
             return None
-        try:
-            content = read_tensors(path)
-            whole = content.pop("sha256", None) == _seal(identity, content)
-        except UserError:
-            return None
-        if not whole or learned not in (None, content["learned"]) or isolation.changed(content["covered"], folder):
+        content = read_tensors(path, io.BytesIO(file))
+        if learned not in (None, content["learned"]) or isolation.changed(content["covered"], folder):
             return None
         return Solution(**content | {"cost": Cost(**content["cost"])}, reused=True)
 
@@ -95,8 +90,8 @@ class Phases:
         """Keep a solution, in the place of an earlier one, and close its account."""
         content = {**{name: getattr(solution, name) for name in KEPT}, "cost": asdict(solution.cost)}
         buffer = io.BytesIO()
-        torch.save({**content, "sha256": _seal(identity, content)}, buffer)
-        write_atomically(self.path(identity), buffer.getvalue(), lasting=solution.captures > 0)
+        torch.save(content, buffer)
+        write_atomically(self.path(identity), sealed(buffer.getvalue(), identity), lasting=solution.captures > 0)
         self.journal(identity).close()
 
     def remove(self, identities: Iterable[str]) -> None:
@@ -136,15 +131,6 @@ class Starts:
         cost = Cost(time.perf_counter() - began)
         self.phases.keep(identity, Solution(phase.detach().cpu()[0], 0, cost, alone=False))
         return phase
-
-
-def _seal(identity: str, content: Mapping[str, Any]) -> str:
-    """The sha256 of a solution and its name: a file of tensors does not tell that a byte in it has changed."""
-    phase = content.get("phase")
-    if not isinstance(phase, Tensor):
-        raise UserError("no phase")
-    rest = canonical([identity, phase.shape, {name: value for name, value in content.items() if name != "phase"}])
-    return hashlib.sha256(phase.contiguous().numpy().tobytes() + rest.encode()).hexdigest()
 
 
 def phases_of(output: Path) -> Phases:

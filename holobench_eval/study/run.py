@@ -229,18 +229,7 @@ def _compute(
         anew = {preparation.name: artifacts.outdated(preparation) for preparation in untrained}
         watch.training(names, [f"{name} is trained anew: {reason}" for name, reason in anew.items() if reason])
     unready = {preparation.id for preparation in untrained} | missing
-    trainings = [
-        TrainingJob(
-            preparation,
-            setting.artifacts,
-            phases_of(setting.output),
-            setting.threads,
-            setting.device,
-            setting.isolation,
-            setting.limits,
-        )
-        for preparation in untrained
-    ]
+    trainings = [TrainingJob(preparation, setting) for preparation in untrained]
     at_work: dict[int, float] = {}
     expected = {DRAWING: DRAWING_SECONDS}
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
@@ -321,7 +310,7 @@ def _known(jobs: Iterable[Job]) -> dict[Kind, float]:
     """Seconds of the first solution of each kind, where it has been measured before."""
     first = {job.kind: job for job in reversed(list(jobs)) if not job.task.is_floor and job.wanted != job.unscored}
     measured = {kind: cost.recorded(job.timing) for kind, job in first.items()}
-    return {kind: earlier.seconds for kind, earlier in measured.items() if earlier is not None}
+    return {kind: seconds for kind, seconds in measured.items() if seconds is not None}
 
 
 def _watched(

@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +25,12 @@ from ..display.traits import traits_of
 from ..lab.real import RealBench
 from . import isolation, opening
 from .artifacts import LOG, RECORDS, Artifacts, provenance_of
-from .definition import Isolation, Limits
 from .displays import Preparation
 from .identity import basis
 from .isolation.read_files import external
-from .phases import Phases, Starts
+from .phases import Starts, phases_of
 from .plan import Plan
+from .scoring.job import Setting
 from .scoring.reference import guarded
 from .versions import HARNESS, gate, method_version
 
@@ -39,22 +39,16 @@ WAITS = "waits for photographs"  # in place of the reason of a failure
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """A preparation and what a worker needs to train it. device: name of where it computes, see ``device.find``;
-    isolation, limits: see ``definition.Study``."""
+    """A preparation, and the setting of the run that a worker needs to train it."""
 
     preparation: Preparation
-    folder: Path
-    phases: Phases
-    threads: int
-    device: str = "cpu"
-    isolation: Isolation = "files"
-    limits: Limits = field(default_factory=Limits)
+    setting: Setting
 
 
 def train(job: TrainingJob) -> str:
     """Make an artifact, resuming an earlier attempt. Returns the reason of a failure, empty for success."""
-    artifacts, device = Artifacts(job.folder), find(job.device)
-    with artifacts.locked(job.preparation), repeatable(job.threads, device):
+    artifacts, device = Artifacts(job.setting.artifacts), find(job.setting.device)
+    with artifacts.locked(job.preparation), repeatable(job.setting.threads, device):
         if artifacts.has(job.preparation):
             return ""
         try:
@@ -70,9 +64,9 @@ def train(job: TrainingJob) -> str:
 
 
 def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None:
-    preparation = job.preparation
-    limits = replace(job.limits, seconds=math.inf)  # that of time is for cells
-    method = isolation.solver(preparation.method, preparation.params, preparation.folder, job.isolation, limits)
+    preparation, setting = job.preparation, job.setting
+    limits = replace(setting.limits, seconds=math.inf)  # that of time is for cells
+    method = isolation.solver(preparation.method, preparation.params, preparation.folder, setting.isolation, limits)
     gate(method, preparation.method, preparation.version, external(method), preparation.external)
     images = _images(preparation, device)
     split = len(images) - preparation.held_out
@@ -80,7 +74,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     source = {"dataset": preparation.dataset, "params": dict(preparation.dataset_params)}
     draw, spec = ("training", preparation.seed), preparation.display.spec
     shared = {
-        item: Starts(job.phases, basis({**source, "sha256": sha256}, spec, draw), device)
+        item: Starts(phases_of(setting.output), basis({**source, "sha256": sha256}, spec, draw), device)
         for item, sha256 in preparation.images
     }
     # Photographs in the folder of a session are found again by each import, and so are no new captures.
@@ -97,7 +91,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         journal,
     )
     with (
-        guarded(preparation.method, job.isolation, preparation.display, preparation.seed),
+        guarded(preparation.method, setting.isolation, preparation.display, preparation.seed),
         isolation.opened(method, device) as ready,
     ):
         state = method.prepare(bench)
@@ -109,7 +103,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         **({"in_the_place_of": outdated} if outdated else {}),
         "captures": bench.captures if journal is None else journal.captures,
         "seconds": round(bench.seconds + sum(start.seconds for start in shared.values()), 1),
-        "threads": job.threads,
+        "threads": setting.threads,
         **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),
         "package": __version__,

@@ -7,9 +7,13 @@ import pytest
 
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
-from holobench_eval.study.cost import Cost
 from holobench_eval.study.plan import Task, plan
 from tests.support.fake_study import write_config
+
+
+@pytest.fixture(autouse=True)
+def every_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cost, "APART", 0.0)
 
 
 @pytest.fixture
@@ -18,35 +22,32 @@ def task(tmp_path: Path) -> Task:
 
 
 def test_the_last_measurement_is_the_one_that_estimates_use() -> None:
-    cost.keep("a", Cost(2.5, 40.0))
-    assert cost.recorded("a") == Cost(2.5, 40.0)
-    cost.keep("a", Cost(9.0, 50.0))
-    assert cost.recorded("a") == Cost(9.0, 50.0)
+    cost.keep("a", 2.5)
+    assert cost.recorded("a") == 2.5
+    cost.keep("a", 9.0)
+    assert cost.recorded("a") == 9.0
 
 
-def test_a_time_of_an_earlier_version_has_no_memory() -> None:
-    cost.folder().mkdir(parents=True)
-    (cost.folder() / "a.json").write_text('{"seconds": 2.5}')
-    assert cost.recorded("a") == Cost(2.5)
+def test_many_solutions_write_few_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cost, "APART", 1000.0)
+    for seconds in (2.5, 9.0):
+        cost.keep("b", seconds)
+    assert cost.recorded("b") == 2.5
 
 
-DAMAGED = ["", "[]", "{}", '{"seconds": "x"}', '{"seconds": -1}', '{"seconds": NaN}', "\xff"]
-DAMAGED += ['{"seconds": 1, "memory_mib": -1}', '{"seconds": 1, "memory_mib": [2]}']
-
-
-@pytest.mark.parametrize("content", DAMAGED)
+@pytest.mark.parametrize("content", ["", "[]", "{}", "x", "-1", "NaN", "inf", "\xff"])
 def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
-    cost.keep("a", Cost(2.5))
-    (cost.folder() / "a.json").write_text(content, encoding="latin-1")
+    cost.keep("a", 2.5)
+    (cost.folder() / "a").write_text(content, encoding="latin-1")
     assert cost.recorded("a") is None
-    cost.keep("a", Cost(3.0))
-    assert cost.recorded("a") == Cost(3.0)
+    cost.keep("a", 3.0)
+    assert cost.recorded("a") == 3.0
 
 
 def test_without_a_folder_to_write_to_there_are_no_estimates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    cost.keep("a", Cost(2.5))
+    cost.keep("a", 2.5)
     assert cost.recorded("a") is None
 
 
@@ -69,7 +70,10 @@ def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repe
     assert not cost.timed(replace(study, timing="shared"), grid)
 
 
-def test_threads_workers_and_the_method_make_another_solution(task: Task) -> None:
+def test_targets_share_a_time_and_threads_workers_and_methods_do_not(task: Task, tmp_path: Path) -> None:
+    first, second = plan(load_study(write_config(tmp_path))).tasks[-2:]
+    assert first.cells[0].target != second.cells[0].target
+    assert cost.key(first, 1, 1) == cost.key(second, 1, 1)
     other = replace(task, cells=(replace(task.cells[0], phase={**task.cells[0].phase, "code": "changed"}),))
     keys = {cost.key(task, 1, 1), cost.key(task, 2, 1), cost.key(task, 1, 2), cost.key(other, 1, 1)}
     assert len(keys) == 4

@@ -25,7 +25,7 @@ from ..definition import Isolation, Limits, Save
 from ..displays import Condition, Preparation
 from ..phases import Phases, phases_of
 from ..plan import Cell, Task
-from ..store import Record, Store
+from ..store import Record, State, Store
 from ..versions import gate
 
 TARGETS_KEPT = 16  # targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels
@@ -110,13 +110,15 @@ class Job:
         pairs = zip(self.task.cells, self.task.conditions, strict=True)
         return [(cell, display) for cell, display in pairs if cell.id in self.wanted]
 
+    def record(self, cell: Cell, state: State = "done", **further: Any) -> Record:
+        """The record of a cell, with these further entries."""
+        label = cell.method if self.task.is_floor else self.task.label
+        return Record(cell.description(), state, label, cell.condition, cell.target, **further)
+
     def failed(self, cell: Cell, error: BaseException) -> Record:
         """The record of a cell that has no score, with the reason in one line."""
-        label = cell.method if self.task.is_floor else self.task.label
-        phase_id = self.task.cells[0].phase_id
-        captures = self.phases.captures(phase_id)
-        named = (label, cell.condition, cell.target)
-        return Record(cell.description(), "failed", *named, reason=reason(error), captures=captures)
+        captures = self.phases.captures(self.task.cells[0].phase_id)
+        return self.record(cell, "failed", reason=reason(error), captures=captures)
 
     def method(self, name: str, params: Any) -> Any:
         """An instance of a method, built anew: no cell may depend on those computed before."""

@@ -54,12 +54,8 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
     if job.setting.save.kept:
         keep_capture(job.store.capture(cell.id), capture.image, lasting=display.real is not None)
     timed = isolation.traits(cell.method, job.setting.folder).timed
-    return Record(
-        capture=cell.description(),
-        state="done",
-        label=job.task.label,
-        condition=cell.condition,
-        target=cell.target,
+    return job.record(
+        cell,
         scores=scores,
         figures=_second_scores(bench, capture, target) | {"efficiency": capture.efficiency},
         captures=solved.captures,
@@ -88,8 +84,7 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor]) -> Measure
         image = captures[cell.method]()
         if cell.shown_on is not None and job.setting.save.kept:  # else it is computed again from the target
             keep_capture(job.store.capture(cell.id), image, target)
-        scores = scores_of(job, cell, image, target, job.setting.metrics)
-        return Record(cell.description(), "done", cell.method, cell.condition, cell.target, scores=scores)
+        return job.record(cell, scores=scores_of(job, cell, image, target, job.setting.metrics))
 
     return reference
 

@@ -18,14 +18,13 @@ from ..artifacts import Artifact
 from ..displays import Condition
 from ..isolation import Reads
 from ..isolation.read_files import digests
-from ..phases import Solution
 from ..plan import Cell
 from ..store import Record
 from ..versions import gate
 from .job import Job, Measured
 from .picture import account, keep_pictures, references, refuse_saturated
 from .scores import keep_capture, scores_of
-from .solution import wrong_output
+from .solution import solved_by, wrong_output
 
 PHOTOGRAPHS_KEPT = 64  # in a process: all methods predict the same ones
 
@@ -87,19 +86,15 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
     wanted, factors = match(seen.capture.image, seen.target)
     image = factors.view(-1, 1, 1) * seen.prediction
     taken = seen.taken
-    cost.keep(job.timing, taken)
+    cost.keep(job.timing, taken.seconds)
     further = more(seen)
 
     def compare(cell: Cell, _: Condition) -> Record:
         keep_pictures(job, cell, image, wanted, seen.phase)
         if job.setting.save.kept:
             keep_capture(job.store.capture(cell.id), image, wanted)
-        return Record(
-            capture=cell.description(),
-            state="done",
-            label=job.task.label,
-            condition=cell.condition,
-            target=cell.target,
+        return job.record(
+            cell,
             scores=scores_of(job, cell, image, wanted, job.setting.metrics),
             figures=further,
             seconds=taken.seconds,
@@ -152,19 +147,6 @@ def _solved(job: Job, cell: Cell, display: Condition) -> Tensor:
     gate(method, name, cell.holograms["code"], digests(method, cell.target), cell.holograms["files"])
     handle = bench.for_method(method, name, target.to(job.device), item=cell.target, repeat=cell.repeat)
     own = target[None].to(job.device, copy=True)
-    with isolation.opened(method, job.device) as ready:
-        watch = cost.start(job.device, ready.pid)
-        phase = from_numpy(method.solve(own, handle))
-        taken = watch.stop()
-    if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
-        raise wrong_output(name, "solve", phase, f"a phase (1, {len(target)}, H, W)")
-    solved = Solution(
-        phase.detach().cpu()[0],
-        handle.captures,
-        taken,
-        alone=job.alone,
-        covered=dict(ready.reads.covered),
-        uncovered=ready.reads.uncovered,
-    )
+    solved = solved_by(job, method, name, handle, lambda method, handle: method.solve(own, handle))
     job.phases.keep(phase_id, solved)
     return solved.phase

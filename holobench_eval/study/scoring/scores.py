@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +13,7 @@ from torch import Tensor
 
 from ...core import plugins
 from ...core.errors import CellError, UserError
-from ...core.io import write_atomically
+from ...core.io import sealed, unsealed, write_atomically
 from ...metrics import match, score
 from ...metrics.psnr import psnr
 from ...metrics.ssim import RADIUS, LocalStatistics
@@ -22,8 +21,6 @@ from .. import identity
 from ..focal_stacks import INFOCUS, SCORES
 from ..plan import Cell
 from .job import Job
-
-SEAL = 32  # bytes of the sha256 that ends the file of a kept capture
 
 
 def scores_of(job: Job, cell: Cell, image: Tensor, wanted: Tensor, metrics: Mapping[str, str]) -> dict[str, Any]:
@@ -62,18 +59,16 @@ def keep_capture(path: Path, *images: Tensor, lasting: bool = False) -> None:
     """
     buffer = io.BytesIO()
     np.save(buffer, torch.stack(images).squeeze(0).cpu().numpy(), allow_pickle=False)
-    write_atomically(path, buffer.getvalue() + hashlib.sha256(buffer.getvalue()).digest(), lasting)
+    write_atomically(path, sealed(buffer.getvalue()), lasting)
 
 
 def kept_capture(path: Path) -> list[Tensor]:
     """What ``keep_capture`` kept: an image, and where it has one of its own the picture that it is compared with; empty
     where nothing is kept. UserError for a damaged file."""
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
+    if not path.is_file():
         return []
-    array, seal = content[:-SEAL], content[-SEAL:]
-    if hashlib.sha256(array).digest() != seal:
+    array = unsealed(path.read_bytes())
+    if array is None:
         raise UserError(f"{path}: the capture is not as it was kept, its digest is another; delete the file")
     values = torch.from_numpy(np.load(io.BytesIO(array), allow_pickle=False))
     return list(values) if values.ndim == 4 else [values]

@@ -57,28 +57,33 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         known=None if job.timed else shared,
         journal=journal,
     )
-    with isolation.opened(method, job.device) as ready:
-        watch = cost.start(job.device, ready.pid)
-        phase, stopped = _within_budget(method, solve, handle)
-        taken = watch.stop()
-    taken = replace(taken, seconds=taken.seconds + shared.seconds)
-    phase = from_numpy(phase)
-    if not is_plain(phase) or tuple(phase.shape[:2]) != (1, len(target)):
-        raise wrong_output(task.label, "solve", phase, f"a phase (1, {len(target)}, H, W)")
-    cost.keep(job.timing, taken)
-    solved = Solution(
-        phase.detach().cpu()[0],
-        journal.captures,
-        taken,
-        stopped,
-        state,
-        job.alone,
-        covered=dict(ready.reads.covered),
-        uncovered=ready.reads.uncovered,
-    )
+    solved = solved_by(job, method, task.label, handle, solve)
+    taken = replace(solved.cost, seconds=solved.cost.seconds + shared.seconds)
+    cost.keep(job.timing, taken.seconds)
+    solved = replace(solved, captures=journal.captures, cost=taken, learned=state)
     if starts.all_there(first, others):
         job.phases.keep(first.phase_id, solved)
     return solved
+
+
+def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: Solve) -> Solution:
+    """What a method finds by ``solve``. CellError for what is no phase; label: how the error calls the method."""
+    with isolation.opened(method, job.device) as ready:
+        watch = cost.start(job.device, ready.pid)
+        output, stopped = _within_budget(method, solve, handle)
+        taken = watch.stop()
+    phase, channels = from_numpy(output), len(handle.spec.wavelengths)
+    if not is_plain(phase) or tuple(phase.shape[:2]) != (1, channels):
+        raise wrong_output(label, "solve", phase, f"a phase (1, {channels}, H, W)")
+    return Solution(
+        phase.detach().cpu()[0],
+        handle.captures,
+        taken,
+        stopped,
+        alone=job.alone,
+        covered=dict(ready.reads.covered),
+        uncovered=ready.reads.uncovered,
+    )
 
 
 def wrong_output(label: str, function: str, output: Any, wanted: str) -> CellError:

@@ -1,4 +1,3 @@
-import csv
 import json
 import math
 import re
@@ -11,7 +10,7 @@ from holobench_eval.report import Results, csv_text, recompute_files, records_fr
 from holobench_eval.report.charts.training import CURVES, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
-from holobench_eval.study.artifacts import Round, rounds_in, rounds_of
+from holobench_eval.study.artifacts import Round, rounds_of
 from tests.support import synthetic_study as synthetic
 from tests.support.reports import whole
 
@@ -152,17 +151,22 @@ def test_logs_of_strangers_show_nothing_and_stop_nothing(found, tmp_path, log):
     assert not list((tmp_path / "figures").glob("training-*.png"))
 
 
+def logged(folder, log):
+    (folder / "training.csv").write_text(log)
+    return rounds_of(folder / "training.csv")
+
+
 def test_a_round_is_the_last_figure_of_every_kind(tmp_path):
-    first, second = rounds_in(csv.DictReader(LOG.splitlines()))
+    first, second = logged(tmp_path, LOG)
     assert first == Round(1, 16, 120.2, 20.5, 12.7, 14.7)
     assert second == Round(2, 24, 200.2, 21.25, 15.5, 18.125)
     assert rounds_of(tmp_path / "absent.csv") == ()
-    (lone,) = rounds_in([{"round": "3", "captures": "7"}])
+    (lone,) = logged(tmp_path, "round,captures\n3,7\n")
     assert (lone.captures, math.isnan(lone.fidelity)) == (7, True)
 
 
 def test_many_trainings_are_one_chart_and_few_have_a_panel_each(tmp_path):
-    rounds = rounds_in(csv.DictReader(LOG.splitlines()))
+    rounds = logged(tmp_path, LOG)
     few = draw_trainings(tmp_path / "few", [(f"m{index}", rounds) for index in range(7)])
     assert [(path.name, curves) for path, curves in few] == [("few-1.png", True), ("few-2.png", True)]
     many = draw_trainings(tmp_path / "many", [(f"m{index}", rounds) for index in range(CURVES + 1)])
