@@ -76,10 +76,11 @@ def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
     """Reset the peak of memory and start the clock. device: where the solution is computed; process: the number of the
     one that computes it, None for this one. What another process takes on a GPU is not measured.
 
-    Trim the allocator first, so that reused memory shows as growth.
+    The allocator of this process is trimmed first, so that reused memory shows as growth.
     """
-    _collect()
-    give_back_freed_memory()
+    if process is None:
+        _collect()
+        give_back_freed_memory()
     if device.type == "cuda" and process is None:
         torch.cuda.synchronize(device)
         torch.cuda.reset_peak_memory_stats(device)

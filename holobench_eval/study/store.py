@@ -129,10 +129,10 @@ class Store:
         """The target as a small sRGB picture."""
         return self.folder / f"target-{file_name(target)}.png"
 
-    def write(self, record: Record) -> None:
+    def write(self, record: Record, lasting: bool = True) -> None:
         """Write a record atomically. A failure never replaces a score: that cell was only to be timed again.
 
-        UserError for what `read` would refuse.
+        lasting: see `write_atomically`. UserError for what `read` would refuse.
         """
         if record.state == "failed" and (earlier := self.read(record.id)) is not None and earlier.state == "done":
             return
@@ -140,7 +140,7 @@ class Store:
         path = self.path(record.id)
         text = json.dumps({**content, "sha256": digest(content)}, indent=1, sort_keys=True, allow_nan=False)
         _checked(path, record.id, json.loads(text) if len(text) < MOST_BYTES else None)
-        write_atomically(path, f"{text}\n".encode())
+        write_atomically(path, f"{text}\n".encode(), lasting)
 
     def read(self, identity: str) -> Record | None:
         """The record of a cell, None if there is none. UserError for a file that is not that record."""

@@ -31,6 +31,8 @@ FLOORS: Mapping[str, Measure] = {  # the same for floor images
     "focus": focus.floor,
 }
 
+QUICK = 0.1  # s of a solution; to wait for the disk, so that a record outlives a loss of power, takes some milliseconds
+
 
 def work(job: Job) -> list[Record]:
     """Compute and write the wanted records of a task. A failure of a cell becomes a failed record, never an error.
@@ -90,7 +92,8 @@ def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> R
         for name, value in record.values().items():
             if not math.isfinite(value):
                 raise CellError(f"the score {name} is {value}")
-        job.store.write(record)
+        is_quick = display.real is None and (record.seconds or 0) < QUICK
+        job.store.write(record, lasting=not is_quick)
     except StopError:
         raise
     except Pending:
