@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from textwrap import shorten
 from typing import IO, Any
 
 import torch
@@ -271,15 +272,11 @@ def check_matches(folder: Path, provenance: Mapping[str, Any], preparation: Prep
     trained, wanted = provenance["description"], preparation.description()
     for key in wanted:
         if trained.get(key) != wanted[key]:
+            own, other = (shorten(json.dumps(value), 80) for value in (wanted[key], trained.get(key)))
+            name = key.replace("_", " ")
             raise UserError(
-                f"{folder}: trained for {key.replace('_', ' ')} {_short(trained.get(key))}, this study needs "
-                f"{_short(wanted[key])}; delete it, or give --retrain"
+                f"{folder}: trained for {name} {other}, this study needs {own}; delete it, or give --retrain"
             )
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 @dataclass(frozen=True)

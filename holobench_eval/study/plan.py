@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -386,27 +387,18 @@ def following(tasks: Sequence[Task], folder: Path) -> Iterator[Task]:
     def follows(task: Task) -> bool:
         return not task.is_floor and isolation.traits(task.cells[0].method, folder).follows
 
-    followers = [follows(task) for task in tasks]
-    if not any(followers):
-        yield from tasks
-        return
-    others: dict[tuple[str, str, int], list[Cell]] = {}
-    for task, late in zip(tasks, followers, strict=True):
-        for cell in () if late or task.is_floor else task.cells:
-            others.setdefault((cell.target, cell.condition, cell.repeat), []).append(cell)
+    others = defaultdict[tuple[str, str, int], list[Cell]](list)
+    for task in tasks:
+        for cell in () if task.is_floor or follows(task) else task.cells:
+            others[cell.target, cell.condition, cell.repeat].append(cell)
 
     def started(cell: Cell) -> Cell:
-        starts = others.get((cell.target, cell.condition, cell.repeat), ())
+        starts = others[cell.target, cell.condition, cell.repeat]
         phase = {**cell.phase, "starts": sorted({start.phase_id for start in starts})}
         return replace(cell, phase=phase, starts=tuple(sorted(start.id for start in starts)))
 
-    late_tasks = {
-        index: replace(task, cells=tuple(map(started, task.cells)))
-        for index, (task, late) in enumerate(zip(tasks, followers, strict=True))
-        if late
-    }
-    for index, task in enumerate(tasks):
-        yield late_tasks.get(index, task)
+    for task in tasks:
+        yield replace(task, cells=tuple(map(started, task.cells))) if follows(task) else task
 
 
 def check_unseen(preparations: Mapping[str, Preparation], targets: list[tuple[str, str]]) -> None:

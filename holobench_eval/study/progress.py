@@ -18,7 +18,6 @@ from rich.text import Text
 
 from .artifacts import read_log
 from .plan import Task
-from .run import Watch
 from .store import Record
 from .training import WAITS
 
@@ -26,25 +25,8 @@ SECONDS_BETWEEN_LINES = 5.0
 SHARE = "share"  # of all steps of a training, in its log
 
 
-def _unknown() -> None:
-    """The time left before a run has begun."""
-
-
-def _whole() -> bool:
-    """That the time left is no lower limit."""
-    return True
-
-
 def _name(task: Task) -> str:
     return f"{task.label} · {task.cells[0].target}"
-
-
-def _failure(record: Record) -> str:
-    return f"failed: {record.label} · {record.condition} · {record.target}: {record.reason}"
-
-
-def _untrained(name: str, reason: str) -> str:
-    return f"training {name}: {reason}" if reason == WAITS else f"failed: training {name}: {reason}"
 
 
 def _newest(rows: Sequence[Mapping[str, str]]) -> str:
@@ -96,110 +78,124 @@ class Follower:
 
 
 @dataclass
-class Bar:
-    """A bar with the task in work, the cells and trainings done, the time left and the number of failures."""
-
-    progress: Progress
-    bar: TaskID
-    failures: int = 0
-    missing: int = 0
-    follower: Follower = field(default_factory=lambda: Follower(0.5))
-
-    def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = _whole) -> None:
-        """Show the time left, where it is known."""
-        self.progress.update(self.bar, left=seconds_left, whole=is_whole)
-
-    def planned(self, cells: int, missing: int, floors: int) -> None:
-        """Set the bar to the number of missing cells."""
-        self.missing = missing
-        self.progress.reset(self.bar, total=missing, description=f"{cells - missing} of {cells} cells done before")
-
-    def training(self, names: list[tuple[str, Path]], notes: Sequence[str] = ()) -> None:
-        """Show the number of trainings, and follow their logs."""
-        for note in notes:
-            self.progress.console.print(escape(note), highlight=False, soft_wrap=True)
-        self.progress.update(self.bar, total=self.missing + len(names), description="training")
-        self.follower.start(names, lambda line: self.progress.update(self.bar, description=escape(line)))
-
-    def trained(self, name: str, failure: str) -> None:
-        """Advance, and print a failure above the bar."""
-        if failure:
-            style = None if failure == WAITS else "red"
-            self.progress.console.print(escape(_untrained(name, failure)), style=style, highlight=False, soft_wrap=True)
-        self.progress.update(self.bar, advance=1)
-        self.follower.ended(name)
-
-    def started(self, task: Task) -> None:
-        """Name the task in work."""
-        self.progress.update(self.bar, description=escape(_name(task)))
-
-    def finished(self, records: list[Record]) -> None:
-        """Advance, and print what failed above the bar."""
-        for record in records:
-            if record.state == "failed":
-                self.failures += 1
-                self.progress.console.print(escape(_failure(record)), style="red", highlight=False, soft_wrap=True)
-        self.progress.update(self.bar, advance=len(records), failures=f"{self.failures} failed" * bool(self.failures))
-
-
-@dataclass
 class Lines:
-    """Plain lines: at most one every few seconds, and one for every failure."""
+    """Sees a run's progress, and writes plain lines: at most one every few seconds, and one for every failure.
 
-    write: Callable[[str], None]
+    write: takes a line; clock: seconds. A lower limit of the time left has ``is_whole`` False.
+    """
+
+    write: Callable[[str], object]
     clock: Callable[[], float] = time.monotonic
     total: int = 0
     done: int = 0
     failures: int = 0
     follower: Follower = field(default_factory=lambda: Follower(15.0))
-    seconds_left: Callable[[], float | None] = field(default_factory=lambda: _unknown, init=False)
-    is_whole: Callable[[], bool] = field(default_factory=lambda: _whole, init=False)
     last: float = field(init=False)
 
     def __post_init__(self) -> None:
         self.last = self.clock()
-
-    def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = _whole) -> None:
-        """Write the time left in every line."""
-        self.seconds_left, self.is_whole = seconds_left, is_whole
+        self.expects(lambda: None)
 
     def planned(self, cells: int, missing: int, floors: int) -> None:
-        """Write the number of cells to compute, and how many of the study's are of no method."""
+        """The run begins: cells of the study, those that have to be computed, and those of floor images."""
         self.total = missing
         aside = f" ({floors} of the {cells} are floor images, which no method made)" if floors else ""
         self.write(f"{missing} of {cells} cells to compute{aside}")
 
+    def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = lambda: True) -> None:
+        """What gives the time [s] that the cells still take, at any moment; None where it is not known. is_whole:
+        whether it is that of all cells, and not a lower limit."""
+        self.seconds_left, self.is_whole = seconds_left, is_whole
+
     def training(self, names: list[tuple[str, Path]], notes: Sequence[str] = ()) -> None:
-        """Name the trainings, and follow their logs."""
+        """Training begins: label and artifact folder, where ``training.csv`` grows, of everything to be trained; and
+        sentences on what is trained in the place of another artifact."""
         for note in notes:
             self.write(note)
-        self.write(f"{len(names)} to train: {', '.join(name for name, _ in names)}")
-        self.follower.start(names, self.write)
+        self.announce(f"{len(names)} to train: {', '.join(name for name, _ in names)}")
+        self.follower.start(names, self.announce)
 
     def trained(self, name: str, failure: str) -> None:
-        """A line for every training that ended."""
-        self.write(_untrained(name, failure) if failure else f"trained: {name}")
+        """A training ended; failure: why it failed, empty if it did not."""
+        if failure:
+            self.say(f"{'failed: ' * (failure != WAITS)}training {name}: {failure}", failure != WAITS)
+        else:
+            self.announce(f"trained: {name}")
         self.follower.ended(name)
 
     def started(self, task: Task) -> None:
-        """Name the task in work, if the last line is old enough."""
+        """A task is taken up."""
         now = self.clock()
         if now - self.last >= SECONDS_BETWEEN_LINES:
             self.last = now
-            self.write(f"{self.done}/{self.total} cells, {self.failures} failed{self._left()}; now {_name(task)}")
+            training = len(self.follower.folders)
+            left = f", {self.time_left()} left" if self.time_left() else ""
+            left += f" besides the {training} in training" * bool(left and training)
+            self.write(f"{self.done}/{self.total} cells, {self.failures} failed{left}; now {_name(task)}")
 
     def finished(self, records: list[Record]) -> None:
-        """Count, and write a line for every failure."""
+        """A task's cells have their records."""
         self.done += len(records)
         for record in records:
             if record.state == "failed":
                 self.failures += 1
-                self.write(_failure(record))
+                self.say(f"failed: {record.label} · {record.condition} · {record.target}: {record.reason}", True)
 
-    def _left(self) -> str:
-        seconds, training = self.seconds_left(), len(self.follower.folders)
-        beside = f" besides the {training} in training" * bool(training)
-        return f", {words} left{beside}" if (words := _expected(seconds, self.is_whole())) else ""
+    def time_left(self) -> str:
+        """The time left in words; empty where nothing is known, also where less than a second is a lower limit."""
+        seconds, is_whole = self.seconds_left(), self.is_whole()
+        if seconds is None or (seconds < 1 and not is_whole):
+            return ""
+        return f"{'about' if is_whole else 'at least'} {duration(round(seconds))}"
+
+    def say(self, line: str, is_failure: bool) -> None:
+        """Write a line that people should see."""
+        self.write(line)
+
+    def announce(self, line: str) -> None:
+        """Write what goes on now."""
+        self.write(line)
+
+
+@dataclass
+class Bar(Lines):
+    """A bar with the task in work, the cells and trainings done, the time left and the number of failures."""
+
+    progress: Progress = field(kw_only=True)
+    bar: TaskID = field(default=TaskID(0), kw_only=True)
+
+    def planned(self, cells: int, missing: int, floors: int) -> None:
+        """Set the bar to the number of missing cells."""
+        self.total, self.follower.seconds = missing, 0.5
+        self.bar = self.progress.add_task(f"{cells - missing} of {cells} cells done before", total=missing, watch=self)
+
+    def training(self, names: list[tuple[str, Path]], notes: Sequence[str] = ()) -> None:
+        """Add the trainings to the bar."""
+        self.progress.update(self.bar, total=self.total + len(names))
+        super().training(names, notes)
+
+    def trained(self, name: str, failure: str) -> None:
+        """Advance."""
+        super().trained(name, failure)
+        self.progress.update(self.bar, advance=1)
+
+    def started(self, task: Task) -> None:
+        """Name the task in work."""
+        self.announce(_name(task))
+
+    def finished(self, records: list[Record]) -> None:
+        """Advance, and print what failed above the bar."""
+        super().finished(records)
+        self.progress.update(self.bar, advance=len(records))
+
+    def say(self, line: str, is_failure: bool) -> None:
+        """Print above the bar."""
+        style = "red" if is_failure else None
+        self.progress.console.print(escape(line), style=style, highlight=False, soft_wrap=True)
+
+    def announce(self, line: str) -> None:
+        """Show beside the bar."""
+        self.progress.update(self.bar, description=escape(line))
 
 
 def duration(seconds: float) -> str:
@@ -209,32 +205,33 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 99.5 * 60 else f"{seconds / 3600:.1f} h"
 
 
-def _expected(seconds: float | None, is_whole: bool) -> str:
-    """The time left in words; empty where nothing is known of it, also where less than a second is a lower limit."""
-    if seconds is None or (seconds < 1 and not is_whole):
-        return ""
-    return f"{'about' if is_whole else 'at least'} {duration(round(seconds))}"
+class _OfWatch(ProgressColumn):
+    """What the watch of a bar says, of the time left or of failures."""
 
-
-class _TimeLeft(ProgressColumn):
-    """The time left, by what the rows have cost so far."""
+    def __init__(self, text: Callable[[Lines], Text]) -> None:
+        super().__init__()
+        self.text = text
 
     def render(self, task: RichTask) -> Text:
-        return Text(_expected(task.fields["left"](), task.fields["whole"]()), style="progress.remaining")
+        return self.text(task.fields["watch"])
 
 
 @contextmanager
-def watching(console: Console) -> Iterator[Watch]:
+def watching(console: Console) -> Iterator[Lines]:
     """The watch that suits a console."""
+
+    def write(line: str) -> None:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
     if not console.is_terminal:
-        yield Lines(lambda line: console.print(line, markup=False, highlight=False, soft_wrap=True))
+        yield Lines(write)
         return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        _TimeLeft(),
-        TextColumn("[red]{task.fields[failures]}"),
+        _OfWatch(lambda watch: Text(watch.time_left(), style="progress.remaining")),
+        _OfWatch(lambda watch: Text(f"{watch.failures} failed" * bool(watch.failures), style="red")),
     )
     with Progress(*columns, console=console) as progress:
-        yield Bar(progress, progress.add_task("planning", total=None, failures="", left=_unknown, whole=_whole))
+        yield Bar(write, progress=progress)

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from ..core.device import find, gpu_name
 from ..core.errors import StopError, UserError
@@ -25,7 +25,8 @@ from .executors.clusters import Address
 from .executors.local import Local
 from .executors.remaining import Kind, Remaining
 from .phases import Phases, phases_of
-from .plan import Cell, Plan, Task
+from .plan import Cell, Plan
+from .progress import Lines
 from .scoring import starts
 from .scoring.cell import work
 from .scoring.job import Job, Setting
@@ -36,36 +37,6 @@ DRAWING, DRAWING_SECONDS = "", 3.0  # the label of drawings in the queue, and ab
 Drawing = Callable[[], None]  # of a picture that the report needs and that needs no cell
 Step = TrainingJob | Job | Drawing
 Result = str | list[Record] | None  # of a training the reason of its failure, empty for success; of a task its records
-
-
-class Watch(Protocol):
-    """Sees a run's progress."""
-
-    def planned(self, cells: int, missing: int, floors: int) -> None:
-        """The run begins: cells of the study, those that have to be computed, and those of floor images."""
-        ...
-
-    def expects(self, seconds_left: Callable[[], float | None], is_whole: Callable[[], bool] = lambda: True) -> None:
-        """What gives the time [s] that the cells still take, at any moment; None where it is not known. is_whole:
-        whether it is that of all cells, and not a lower limit."""
-        ...
-
-    def training(self, names: list[tuple[str, Path]], notes: Sequence[str] = ()) -> None:
-        """Training begins: label and artifact folder, where ``training.csv`` grows, of everything to be trained; and
-        sentences on what is trained in the place of another artifact."""
-        ...
-
-    def trained(self, name: str, failure: str) -> None:
-        """A training ended; failure: why it failed, empty if it did not."""
-        ...
-
-    def started(self, task: Task) -> None:
-        """A task is taken up."""
-        ...
-
-    def finished(self, records: list[Record]) -> None:
-        """A task's cells have their records."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -92,7 +63,7 @@ def run(
     plan: Plan,
     output: Path,
     executor: Executor,
-    watch: Watch,
+    watch: Lines,
     threads: int,
     artifacts: Path,
     retry_failed: bool = False,
@@ -215,7 +186,7 @@ def _compute(
     timed: frozenset[str],
     setting: Setting,
     executor: Executor,
-    watch: Watch,
+    watch: Lines,
     drawings: Sequence[Drawing],
 ) -> int:
     """Train what the missing cells still need, then compute and score; the cells of ``timed`` run alone.
@@ -314,7 +285,7 @@ def _known(jobs: Iterable[Job]) -> dict[Kind, float]:
 
 
 def _watched(
-    steps: Iterator[Step | None], at_work: dict[int, float], remaining: Remaining, watch: Watch
+    steps: Iterator[Step | None], at_work: dict[int, float], remaining: Remaining, watch: Lines
 ) -> Iterator[Step | None]:
     """The same steps; of one that an executor takes ``at_work`` gets ``id`` and time [s], and the watch the task."""
     for job in steps:
@@ -411,17 +382,11 @@ def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> Non
 
     Only methods of missing cells are asked: a report of records from elsewhere needs no method of its study.
     """
-    seen: set[str] = set()
-    for task in plan.tasks:
-        if task.is_floor or not missing.intersection(cell.id for cell in task.cells):
-            continue
-        for name, params in _used(task.cells[0]):
-            identity = canonical([name, params])
-            if identity not in seen:
-                seen.add(identity)
-                reason = _reason(name, params, folder)
-                if reason is not None:
-                    raise UserError(f"method '{name}' cannot run here: {reason}")
+    wanted = [task for task in plan.tasks if not (task.is_floor or missing.isdisjoint(cell.id for cell in task.cells))]
+    used = {canonical(list(each)): each for task in wanted for each in _used(task.cells[0])}
+    for name, params in used.values():
+        if reason := _reason(name, params, folder):
+            raise UserError(f"method '{name}' cannot run here: {reason}")
 
 
 def refuse_unscored(study: Study) -> None:

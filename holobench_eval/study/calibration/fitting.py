@@ -28,7 +28,8 @@ from ..config import load_study
 from ..executors import Serial
 from ..opening import open_bench
 from ..plan import plan
-from ..run import Watch, run
+from ..progress import Lines
+from ..run import run
 from . import Calibration
 
 Values = Mapping[str, float]
@@ -58,7 +59,7 @@ class Fitting:
     source: str
     profile: Profile
     calibration: Calibration
-    watch: Watch
+    watch: Lines
     tell: Callable[[str], object]
 
     def fit(self) -> tuple[dict[str, float], float | None]:

@@ -26,7 +26,8 @@ from ..displays import condition, displays, real_condition
 from ..executors import Serial
 from ..opening import forget_sessions, open_display
 from ..plan import plan
-from ..run import Outcome, Watch, run
+from ..progress import Lines
+from ..run import Outcome, run
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
@@ -50,7 +51,7 @@ class Advance:
 def export(
     config: Path,
     folder: Path,
-    watch: Watch,
+    watch: Lines,
     threads: int,
     bench: Path | None = None,
     display: str | None = None,
@@ -103,7 +104,7 @@ def export(
     return _advance(chosen, folder, watch, threads)
 
 
-def go_on(folder: Path, watch: Watch, threads: int, say: Callable[[str], None], config: Path | None = None) -> Advance:
+def go_on(folder: Path, watch: Lines, threads: int, say: Callable[[str], None], config: Path | None = None) -> Advance:
     """Read the photographs of all rounds so far, score what can be scored, and write the next round if one is needed.
 
     config: use this config instead of the copy in the session folder (see ``study_of``); say: gets the findings, line
@@ -258,7 +259,7 @@ def _bench(study: Study) -> RealBench:
     return bench
 
 
-def _advance(study: Study, folder: Path, watch: Watch, threads: int) -> Advance:
+def _advance(study: Study, folder: Path, watch: Lines, threads: int) -> Advance:
     """Compute what can be computed; write the patterns of what waits."""
     study = replace(study, display=replace(study.display, session=folder))
     _bench(study).announce_grid()

@@ -50,13 +50,11 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
     )
     refuse_saturated(capture)
     keep_pictures(job, cell, capture.image, target, solved.phase)
-    scores = scores_of(job, cell, capture.image, target, job.setting.metrics)
-    if job.setting.save.kept:
-        keep_capture(job.store.capture(cell.id), capture.image, lasting=display.real is not None)
+    keep_capture(job, cell, capture.image, lasting=display.real is not None)
     timed = isolation.traits(cell.method, job.setting.folder).timed
     return job.record(
         cell,
-        scores=scores,
+        scores=scores_of(job, cell, capture.image, target, job.setting.metrics),
         figures=_second_scores(bench, capture, target) | {"efficiency": capture.efficiency},
         captures=solved.captures,
         seconds=solved.cost.seconds if timed else None,
@@ -82,8 +80,8 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor]) -> Measure
 
     def reference(cell: Cell, _: Condition) -> Record:
         image = captures[cell.method]()
-        if cell.shown_on is not None and job.setting.save.kept:  # else it is computed again from the target
-            keep_capture(job.store.capture(cell.id), image, target)
+        if cell.shown_on is not None:  # else it is computed again from the target
+            keep_capture(job, cell, image, target)
         return job.record(cell, scores=scores_of(job, cell, image, target, job.setting.metrics))
 
     return reference

@@ -91,8 +91,7 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
 
     def compare(cell: Cell, _: Condition) -> Record:
         keep_pictures(job, cell, image, wanted, seen.phase)
-        if job.setting.save.kept:
-            keep_capture(job.store.capture(cell.id), image, wanted)
+        keep_capture(job, cell, image, wanted)
         return job.record(
             cell,
             scores=scores_of(job, cell, image, wanted, job.setting.metrics),

@@ -52,14 +52,17 @@ def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
     return {name: float(value) for name, value in zip(SCORES, values, strict=True)}
 
 
-def keep_capture(path: Path, *images: Tensor, lasting: bool = False) -> None:
-    """Keep an image ``(C, h, w)``, or one with the picture that it is compared with, as exact as it is scored.
+def keep_capture(job: Job, cell: Cell, *images: Tensor, lasting: bool = False) -> None:
+    """Keep an image ``(C, h, w)``, or one with the picture that it is compared with, as exact as it is scored; unless
+    the study says not to.
 
     lasting: of a display that exists, whose exposures cost time.
     """
+    if not job.setting.save.kept:
+        return
     buffer = io.BytesIO()
     np.save(buffer, torch.stack(images).squeeze(0).cpu().numpy(), allow_pickle=False)
-    write_atomically(path, sealed(buffer.getvalue()), lasting)
+    write_atomically(job.store.capture(cell.id), sealed(buffer.getvalue()), lasting)
 
 
 def kept_capture(path: Path) -> list[Tensor]:
