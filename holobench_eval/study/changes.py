@@ -6,15 +6,13 @@ import copy
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 from annotated_types import Interval
 
 from ..core.errors import UserError, suggest
 from ..core.schema import checked
-from ..core.yaml_source import Document, Keys, Position, parse
-
-T = TypeVar("T")
+from ..core.yaml_source import Document, Position, parse
 
 
 @dataclass(frozen=True)
@@ -54,14 +52,12 @@ def noted(changes: Changes) -> dict[str, Any]:
 
 
 def changed(document: Document, changes: Changes) -> Document:
-    """A config with the values and methods of the changes; a fault in it is then told at its option.
+    """A config with the values of the changes; a fault in one is then told at its option.
 
-    UserError: a key that leads nowhere, a value that is no YAML, or a method that the config does not have.
+    UserError: a key that leads nowhere, or a value that is no YAML.
     """
     for text in changes.values:
         document = _with_value(document, text)
-    if changes.methods:
-        document = _with_methods(document, changes.methods)
     return replace(document, text=f"# changed by {changes}\n{document.text}") if changes else document
 
 
@@ -125,39 +121,3 @@ def _value(text: str, place: str) -> Any:
     if set(data) != {"value"}:
         raise UserError(f"{place}: more than one value")
     return data["value"]
-
-
-def _with_methods(document: Document, texts: Sequence[str]) -> Document:
-    """The config with some of its methods, in its order; what it says of others goes with them."""
-    entries = document.data.get("methods")
-    if not isinstance(entries, list) or not all(isinstance(entry, dict | str) for entry in entries):
-        return document  # its own fault is told
-    mappings = [{"name": entry} if isinstance(entry, str) else entry for entry in entries]
-    names = [str(entry.get("name", "")) for entry in mappings]
-    labels = [str(entry.get("label") or name.rpartition(":")[2]) for entry, name in zip(mappings, names, strict=True)]
-    wanted = chosen("--methods", texts, [*dict.fromkeys([*labels, *names])], "method in the config")
-    whole = set(wanted) - set(labels)  # names, each of every row of a method
-    kept = [index for index, name in enumerate(names) if labels[index] in wanted or name in whole]
-    left = [labels[index] for index in kept]
-    data = {**document.data, "methods": [entries[index] for index in kept]}
-    for key in ("baseline", "second_baseline"):
-        if data.get(key) in labels and data[key] not in left:
-            del data[key]
-    reported = data.get("reported")
-    if isinstance(reported, dict) and isinstance(reported.get("rows"), dict):
-        rows = {label: row for label, row in reported["rows"].items() if label not in labels or label in left}
-        data["reported"] = {**reported, "rows": rows}
-    keys, values = (_moved(places, kept) for places in (document.keys, document.values))
-    return replace(document, data=data, keys=keys, values=values, options=_moved(document.options, kept))
-
-
-def _moved(places: Mapping[Keys, T], kept: Sequence[int]) -> dict[Keys, T]:
-    """The places of a config whose ``methods`` are those with the indices ``kept``."""
-    new = {old: number for number, old in enumerate(kept)}
-    moved = dict[Keys, T]()
-    for where, at in places.items():
-        if where[:1] != ("methods",) or len(where) == 1:
-            moved[where] = at
-        elif where[1] in new:
-            moved["methods", new[int(where[1])], *where[2:]] = at
-    return moved

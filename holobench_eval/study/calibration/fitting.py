@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
@@ -12,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import yaml
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from torch import Tensor
@@ -71,26 +72,25 @@ class Fitting:
         if wanted is None:
             return self._fit_figures({}), None
         low, high = self.calibration.free[wanted.parameter]
-        trials: list[tuple[float, float, dict[str, float]]] = []  # value, error of the prediction, all values
-        off: list[float] = []  # of each trial, the largest error of a figure [dB]
-        value = float(np.clip(self._own(wanted.parameter), low, high))
+        # Of each trial: value, error of the prediction, largest error of a figure [dB], all values.
+        trials: list[tuple[float, float, float, dict[str, float]]] = []
+        value = float(np.clip(attrgetter(wanted.parameter)(self.profile), low, high))
         for _ in range(TRAININGS):
             values = self._fit_figures({wanted.parameter: round(value, 3)})
             error = self.predicted(values) - wanted.psnr
             self.tell(f"{_listed(values)}: network {error + wanted.psnr:.2f} dB")
-            trials.append((value, error, values))
-            off.append(max(abs(miss) for miss in self._missed(values).values()))
+            trials.append((value, error, max(map(abs, self._missed(values).values())), values))
             if abs(error) < NEAR or (value == high if error < 0 else value == low):
                 break
             if len(trials) == 1:
                 value += (high - low) / 10 * (1 if error < 0 else -1)
             else:
-                (a, at_a, _), (b, at_b, _) = sorted(trials, key=lambda trial: abs(trial[1]))[:2]
+                (a, at_a, *_), (b, at_b, *_) = sorted(trials, key=lambda trial: abs(trial[1]))[:2]
                 value = b if at_a == at_b else a - at_a * (b - a) / (at_b - at_a)
             value = float(np.clip(value, low, high))
-        allowed = max(wanted.tolerance, min(off))
-        able = [trial for trial, most in zip(trials, off, strict=True) if most <= allowed]
-        _, error, values = min(able, key=lambda trial: abs(trial[1]))
+        allowed = max(wanted.tolerance, min(off for _, _, off, _ in trials))
+        able = [(error, values) for _, error, off, values in trials if off <= allowed]
+        error, values = min(able, key=lambda trial: abs(trial[0]))
         return values, wanted.psnr + error
 
     def captured(self, values: Values) -> dict[str, float]:
@@ -101,9 +101,7 @@ class Fitting:
             image = bench.photograph(phase, self._targets[item], item, 0).image
             return score(image, self._targets[item], metrics=("psnr",))["psnr_linear"]
 
-        return {
-            name: fmean(psnr(phase, item) for item, phase in phases.items()) for name, phases in self._holograms.items()
-        }
+        return self._means(psnr)
 
     def predicted(self, values: Values) -> float:
         """Mean PSNR [dB] of the network's predictions of captures with these values."""
@@ -124,8 +122,8 @@ class Fitting:
                 "targets": {"dataset": "folder", "params": {"path": str(folder / "targets")}},
                 **wanted.study,
             }
-            _write_yaml(folder / "candidate.yaml", candidate)
-            _write_yaml(folder / "study.yaml", document)
+            for file, content in (("candidate.yaml", candidate), ("study.yaml", document)):
+                (folder / file).write_text(json.dumps(content), encoding="utf-8")  # which YAML takes as well
             study = load_study(folder / "study.yaml")
             one = plan(study)
             threads = torch.get_num_threads()
@@ -153,10 +151,9 @@ class Fitting:
             self.tell(f"{_listed(values(places))}: {', '.join(told)}")
             return list(missed.values())
 
-        own = [np.clip(1 + (self._own(name) - low) / (high - low), 1.05, 1.95) for name, (low, high) in ranges.items()]
-        found = least_squares(
-            errors, own, bounds=(1.0, 2.0), diff_step=[STEP] * len(own), xtol=1e-2, max_nfev=EVALUATIONS
-        )
+        own = [1 + (attrgetter(name)(self.profile) - low) / (high - low) for name, (low, high) in ranges.items()]
+        start, steps = np.clip(own, 1.05, 1.95), [STEP] * len(own)
+        found = least_squares(errors, start, bounds=(1.0, 2.0), diff_step=steps, xtol=1e-2, max_nfev=EVALUATIONS)
         return values(found.x)
 
     def _missed(self, values: Values) -> dict[str, float]:
@@ -164,23 +161,23 @@ class Fitting:
         psnr = self._quick(values)
         return {name: psnr[name] - published for name, published in self.calibration.figures.items()}
 
-    def _own(self, name: str) -> float:
-        stage, _, key = name.partition(".")
-        return float(getattr(getattr(self.profile, stage), key))
-
     def _quick(self, values: Values) -> dict[str, float]:
         """Mean PSNR [dB] of each method without camera and registration, for the search."""
         bench = SimulatedBench(with_values(self.profile, values).scaled(self.calibration.panel))
 
-        def psnr(phase: Tensor, target: Tensor) -> float:
+        def psnr(phase: Tensor, item: str) -> float:
+            target = self._targets[item]
             image = match(bench.spec.region.crop(bench.image(phase)), target)[0]
             return float(-10 * torch.log10((image - target).square().mean()))
 
         with torch.no_grad():
-            return {
-                name: fmean(psnr(phase, self._targets[item]) for item, phase in phases.items())
-                for name, phases in self._holograms.items()
-            }
+            return self._means(psnr)
+
+    def _means(self, psnr: Callable[[Tensor, str], float]) -> dict[str, float]:
+        """The mean over the images of a figure of a phase and its image, by method."""
+        return {
+            name: fmean(psnr(phase, item) for item, phase in phases.items()) for name, phases in self._holograms.items()
+        }
 
     @cached_property
     def _targets(self) -> dict[str, Tensor]:
@@ -206,7 +203,3 @@ def _solved(name: str, bench: CalibratedBench, target: Tensor, item: str) -> Ten
 
 def _listed(values: Values) -> str:
     return ", ".join(f"{name} {value:.3f}" for name, value in values.items())
-
-
-def _write_yaml(path: Path, content: Mapping[str, Any]) -> None:
-    path.write_text(yaml.safe_dump(dict(content), sort_keys=False), encoding="utf-8")

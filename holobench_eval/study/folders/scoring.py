@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,8 +17,7 @@ from torch import Tensor
 from ...core.allocator import return_large_arrays
 from ...core.errors import CellError
 from ...core.hashing import digest
-from ...core.installed import __version__, installed
-from ...core.io import now, write_atomically
+from ...core.io import write_atomically
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared
@@ -54,17 +52,8 @@ def described(folders: Folders, values: str) -> dict[str, Any]:
     """Everything about the present scoring of pictures for their ``provenance.json``."""
     files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
     files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
-    return {
-        "package": __version__,
-        "code_sha256": {"metrics": HARNESS, "alignment": ALIGNMENT},
-        "files": files,
-        "values": values,
-        "python": platform.python_version(),
-        "packages": {name: installed(name) for name in provenance.PACKAGES},
-        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "started": now(),
-        "ended": None,
-    }
+    code = {"metrics": HARNESS, "alignment": ALIGNMENT}
+    return {"code_sha256": code, "files": files, "values": values, **provenance.software()}
 
 
 @dataclass(frozen=True)
