@@ -12,7 +12,7 @@ from annotated_types import Interval
 
 from ..core.errors import UserError, suggest
 from ..core.schema import checked
-from ..core.yaml_source import Document, Position, parse
+from ..core.yaml_source import Document, Keys, Position, parse
 
 
 @dataclass(frozen=True)
@@ -30,15 +30,9 @@ class Changes:
 
     def __str__(self) -> str:
         """As options of the command line."""
-        options = [("--methods", text) for text in self.methods] + [("--targets", text) for text in self.targets]
-        options += [("--limit", str(self.limit))] * (self.limit is not None)
-        options += [("--set", text) for text in self.values]
-        return shlex.join([part for option in options for part in option])
-
-    @property
-    def note(self) -> str:
-        """What a report says of a study that was changed."""
-        return f"This is not the whole study of the config, and not its result: it was run with {self}."
+        limit = () if self.limit is None else (str(self.limit),)
+        given = {"--methods": self.methods, "--targets": self.targets, "--limit": limit, "--set": self.values}
+        return shlex.join([part for option, texts in given.items() for text in texts for part in (option, text)])
 
 
 def recorded(provenance: Mapping[str, Any]) -> Changes:
@@ -78,29 +72,26 @@ def _with_value(document: Document, text: str) -> Document:
     place = f"--set {text}"
     if not equals or not all(key.split(".")):
         raise UserError(f"{place}: expected key=value, such as display.panel=[192, 192] or methods.0.label=mine")
-    data, path = copy.deepcopy(document.data), list[str | int]()
+    path: Keys = ()
+    data = copy.deepcopy(document.data)
     inner: Any = data
-    parts = key.split(".")
-    for depth, part in enumerate(parts):
-        path.append(_key(inner, part, place, path))
-        if depth == len(parts) - 1:
-            inner[path[-1]] = _value(value, place)
-        else:
-            if isinstance(inner, dict):
-                inner.setdefault(path[-1], {})
-            inner = inner[path[-1]]
-    keys, values = (
-        {where: at for where, at in places.items() if where[: len(path)] != tuple(path)}
-        for places in (document.keys, document.values)
-    )
-    new = [tuple(path[:depth]) for depth in range(1, len(path) + 1)]
-    new = [where for where in new if where not in values]
+    *parents, last = key.split(".")
+    for part in parents:
+        path = (*path, _key(inner, part, place, path))
+        if isinstance(inner, dict):
+            inner.setdefault(part, {})
+        inner = inner[path[-1]]
+    path = (*path, _key(inner, last, place, path))
+    inner[path[-1]] = _value(value, place)
+    known = document.values
+    new = [path[:depth] for depth in range(1, len(path) + 1) if path[:depth] not in known]
+    replaced = [where for where in known if where[: len(path)] == path]
     places = dict.fromkeys(new, Position(1, 1))
-    options = document.options | dict.fromkeys(new, place)
-    return replace(document, data=data, keys=keys | places, values=values | places, options=options)
+    options = document.options | dict.fromkeys([*new, *replaced], place)
+    return replace(document, data=data, keys=places | document.keys, values=places | known, options=options)
 
 
-def _key(inner: Any, part: str, place: str, path: Sequence[str | int]) -> str | int:
+def _key(inner: Any, part: str, place: str, path: Keys) -> str | int:
     """A part of a dotted path as the key of a mapping or the index of a list."""
     if isinstance(inner, dict):
         return part

@@ -72,8 +72,8 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     study = replace(study, baseline=study.baseline or study.labels[0])
     if not changes:
         return study
-    note = f"{changes.note} {study.note}".strip()
-    return replace(study, title=f"{study.title} (changed: {changes})", note=note)
+    note = f"This is not the whole study of the config, and not its result: it was run with {changes}. {study.note}"
+    return replace(study, title=f"{study.title} (changed: {changes})", note=note.strip())
 
 
 def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -179,27 +179,22 @@ def _protocol(study: Study, document: Document) -> Protocol:
 
 def _check_profiles(study: Study, document: Document) -> None:
     seen = {REFERENCE: "the floor rows"}
-    learned = study.display.learned
-    bench = study.display.bench
+    learned, bench, panel = study.display.learned, study.display.bench, study.display.panel
     for index, profile in enumerate([learned.profile] if learned else study.display.sources):
-        where: Keys = ("display", "learned", "profile") if learned else ("display", "profiles", index)
-        where = ("display", "bench") if bench else where
+        where: Keys = ("display", "bench") if bench else ("display", "profiles", index)
+        where = ("display", "learned", "profile") if learned else where
         with placed(document, where, where):
-            display = (
-                real_condition(bench, study.folder) if bench else condition(profile, study.display.panel, study.folder)
-            )
+            display = real_condition(bench, study.folder) if bench else condition(profile, panel, study.folder)
+            if display.name in seen:
+                both = f"'{profile}' and '{seen[display.name]}' are both named '{display.name}'"
+                raise UserError(f"{both}; list each display once")
         name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
             message += f"; registration needs at least {SMALLEST_REGION}"
-            if study.display.panel and not bench:
-                rows, columns = _smallest_panel(profile, study.display.panel, study.folder)
-                message += f", which a panel of [{rows}, {columns}] has"
+            if panel and not bench:
+                message += f", which a panel of {list(_smallest_panel(profile, panel, study.folder))} has"
             raise document.error(("display", "panel"), message)
-        if name in seen:
-            raise document.error(
-                where, f"'{profile}' and '{seen[name]}' are both named '{name}'; list each display once"
-            )
         seen[name] = profile
 
 
@@ -220,15 +215,13 @@ def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
             raise UserError(
                 f"method '{entry.name}' predicts no captures; measure: {study.measure} needs methods that do"
             )
-    place: Keys = (*where, "name") if (*where, "name") in document.keys else where
-    apart = isinstance(method, isolation.Apart) and study.isolation != "none"
-    if apart and (traits.privileged or method.refused):
-        what = f"imports {method.refused}" if method.refused else "looks into the simulated bench"
-        message = f"'{entry.name}' {what}, which a process of its own does not hold"
-        raise document.error(place, f"{message}; a study with 'isolation: none' runs it")
-    if study.display.real and traits.privileged:
-        message = f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one"
-        raise document.error(place, message)
+        apart = isinstance(method, isolation.Apart) and study.isolation != "none"
+        if apart and (traits.privileged or method.refused):
+            what = f"imports {method.refused}" if method.refused else "looks into the simulated bench"
+            what += ", which a process of its own does not hold"
+            raise UserError(f"'{entry.name}' {what}; a study with 'isolation: none' runs it")
+        if study.display.real and traits.privileged:
+            raise UserError(f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one")
     if entry.captures is not None and (not traits.camera or study.predicts):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)

@@ -40,11 +40,9 @@ TRAININGS, NEAR = 4, 0.25  # of the network, at most; error of its figure [dB] t
 
 
 def with_values(profile: Profile, values: Values) -> Profile:
-    """A profile with other values of some parameters. UserError: it has no such parameter."""
+    """A profile with other values of some parameters."""
     for name, value in values.items():
         stage, _, key = name.partition(".")
-        if not hasattr(getattr(profile, stage, None), key):
-            raise UserError(f"profile '{profile.name}' has no parameter '{name}'")
         profile = replace(profile, **{stage: replace(getattr(profile, stage), **{key: value})})
     return profile
 
@@ -125,9 +123,8 @@ class Fitting:
             for file, content in (("candidate.yaml", candidate), ("study.yaml", document)):
                 (folder / file).write_text(json.dumps(content), encoding="utf-8")  # which YAML takes as well
             study = load_study(folder / "study.yaml")
-            one = plan(study)
             threads = torch.get_num_threads()
-            outcome = run(study, one, folder / "output", Serial(), self.watch, threads, folder / "artifacts")
+            outcome = run(study, plan(study), folder / "output", Serial(), self.watch, threads, folder / "artifacts")
         records = [record for record in outcome.records if record["label"] == study.labels[0]]
         for record in records:
             if record["state"] != "done":
