@@ -107,8 +107,7 @@ def _value(text: str, place: str) -> Any:
     try:
         data = parse("", f"value: {text}").data
     except UserError as error:
-        reason = str(error).partition(": ")[2]
-        raise UserError(f"{place}: {reason}") from None
+        raise UserError(f"{place}: {str(error).partition(': ')[2]}") from None
     if set(data) != {"value"}:
         raise UserError(f"{place}: more than one value")
     return data["value"]

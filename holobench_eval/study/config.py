@@ -142,27 +142,25 @@ def _holograms(study: Study, document: Document) -> Probe:
 
 
 def _display(study: Study, document: Document) -> DisplayGrid:
-    display = study.display
+    display, learned = study.display, study.display.learned
     named = [name for name in ("profiles", "learned", "bench") if getattr(display, name)]
     if len(named) != 1:
-        where: Keys = ("display", named[-1] if named else "profiles")
         message = "display.profiles, display.learned or display.bench: name displays in one of the three"
-        raise document.error(where, message)
+        raise document.error(("display", named[-1] if named else "profiles"), message)
     if display.bench and display.panel is not None:
         raise document.error(("display", "panel"), "a bench has the panel that its file says; remove 'panel'")
     if display.bench and study.measure == "focus":
         raise document.error(("measure",), "focal stacks need a camera that refocuses; measure pictures or predictions")
-    if display.learned is None:
+    if learned is None:
         return display
     if study.measure != "picture":
         raise document.error(("measure",), "a learned display is a prediction already; measure its pictures")
-    where = ("display", "learned")
-    with placed(document, (*where, "method"), (*where, "params")):
-        method = isolation.build(display.learned.method, display.learned.params, study.folder)
-        traits = traits_of(method, display.learned.method)
+    with placed(document, ("display", "learned", "method"), ("display", "learned", "params")):
+        method = isolation.build(learned.method, learned.params, study.folder)
+        traits = traits_of(method, learned.method)
         if not (traits.trains and "predict" in traits.functions):
-            raise UserError(f"method '{display.learned.method}' learns no display; name one that predicts captures")
-    return replace(display, learned=replace(display.learned, params=isolation.params_of(method)))
+            raise UserError(f"method '{learned.method}' learns no display; name one that predicts captures")
+    return replace(display, learned=replace(learned, params=isolation.params_of(method)))
 
 
 def _protocol(study: Study, document: Document) -> Protocol:
@@ -212,9 +210,8 @@ def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
         method = isolation.build(entry.name, entry.params, study.folder)
         traits = traits_of(method, entry.name)
         if study.predicts and "predict" not in traits.functions:
-            raise UserError(
-                f"method '{entry.name}' predicts no captures; measure: {study.measure} needs methods that do"
-            )
+            needs = f"measure: {study.measure} needs methods that do"
+            raise UserError(f"method '{entry.name}' predicts no captures; {needs}")
         apart = isinstance(method, isolation.Apart) and study.isolation != "none"
         if apart and (traits.privileged or method.refused):
             what = f"imports {method.refused}" if method.refused else "looks into the simulated bench"
@@ -233,19 +230,18 @@ def _check_labels(study: Study, document: Document) -> None:
     """Refuse labels that a table cannot show or that no method has, and two of them for the same cell."""
     # Reports show neither a second space nor, in the names of files on some systems, the case of letters.
     alike = [" ".join(label.split()).casefold() for label in study.labels]
+    measured = [replace(entry, label="", profiles=(), row=0) for entry in study.methods]
     for index, entry in enumerate(study.methods):
         label, where = entry.label, ("methods", entry.row, "label")
         first = study.methods[alike.index(alike[index])]
         if first is not entry:
             but = "" if label == first.label else ", but for spaces and capitals"
-            message = (
-                f"methods[{entry.row}] and methods[{first.row}] share the label '{label}'{but}; give one a 'label'"
-            )
-            raise document.error(where, message)
+            both = f"methods[{entry.row}] and methods[{first.row}] share the label '{label}'"
+            raise document.error(where, f"{both}{but}; give one a 'label'")
         if not label.isprintable() or len(label) > 60 or label in FLOORS:
             raise document.error(where, f"label {label!r} should be printable, at most 60 characters and not a floor's")
-        for other in study.methods[:index]:  # a measurement would be printed twice
-            if _measured(entry) == _measured(other) and set(entry.profiles) & set(other.profiles):
+        for earlier, other in enumerate(study.methods[:index]):  # a measurement would be printed twice
+            if measured[index] == measured[earlier] and set(entry.profiles) & set(other.profiles):
                 message = f"methods[{entry.row}] has the method, parameters and display of '{other.label}'; remove one"
                 raise document.error(where[:2], message)
     named: dict[Keys, str] = {("baseline",): study.baseline, ("second_baseline",): study.second_baseline}
@@ -253,11 +249,6 @@ def _check_labels(study: Study, document: Document) -> None:
     for place, label in named.items():
         if label:
             _refuse_unknown(document, place, label, study.labels, f"no method has the label '{label}'")
-
-
-def _measured(entry: MethodEntry) -> tuple[object, ...]:
-    """What sets the cells of an entry apart from those of others on the same display."""
-    return entry.name, entry.params, entry.captures, entry.exposure
 
 
 def _sweeps(study: Study, document: Document) -> Iterator[Sweep]:

@@ -292,8 +292,7 @@ class Study:
         kept = tuple(methods)
         gone = {*self.labels} - {entry.label for entry in kept}
         baseline, second = ("" if label in gone else label for label in (self.baseline, self.second_baseline))
-        reported = self.reported
-        if reported is not None:
-            rows = {label: row for label, row in reported.rows.items() if label not in gone}
-            reported = replace(reported, rows=rows)
+        rows = self.reported.rows if self.reported else {}
+        rows = {label: row for label, row in rows.items() if label not in gone}
+        reported = self.reported and replace(self.reported, rows=rows)
         return replace(self, methods=kept, baseline=baseline, second_baseline=second, reported=reported)

@@ -163,8 +163,7 @@ def displays(study: Study) -> dict[str, Condition]:
     if grid.bench is not None:
         return {grid.bench: _real(study, real_condition(grid.bench, study.folder))}
     if learned is None:
-        by_source = {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
-        return {source: _real(study, display) for source, display in by_source.items()}
+        return {source: _real(study, condition(source, grid.panel, study.folder)) for source in grid.profiles}
     display = condition(learned.profile, grid.panel, study.folder)
     name = f"{learned.method.rpartition(':')[2]} trained on {display.name}"
     return {LEARNED: replace(display, name=name, learned=preparation(study, learned.method, learned.params, display))}
@@ -178,10 +177,9 @@ def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
 
 def real_condition(source: str, folder: Path) -> Condition:
     """Read the file of a real bench without opening its devices. UserError for an invalid file."""
-    path = folder / source
-    bench = load_bench_file(path)
+    bench, real = load_bench_file(folder / source), RealSource(bench=folder / source)
     spec = bench.panel.spec(bench.name)
-    return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=RealSource(bench=path))
+    return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=real)
 
 
 def _real(study: Study, display: Condition) -> Condition:

@@ -89,9 +89,8 @@ def begin(output: Path, provenance: dict[str, Any], resumed: bool) -> dict[str, 
 
     Written first, so that a killed run leaves its provenance beside its records.
     """
-    earlier = []
-    if resumed and (before := read(output)):
-        earlier = [*before.pop("earlier", []), before]
+    before = read(output) if resumed else {}
+    earlier = [*before.pop("earlier", []), before] if before else []
     return _write(output, {**provenance, "earlier": earlier})
 
 
@@ -110,15 +109,14 @@ def restate(output: Path, study: Study, plan: Plan) -> dict[str, Any]:
 def _basis(study: Study, plan: Plan, output: Path) -> dict[str, Any]:
     """The config, and what the names of its captures and scores depend on: the harness, the displays, the metrics."""
     displays = {display.name: display for task in plan.tasks for display in task.conditions}
+    profiles = {name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()}
     kind = "real" if study.display.real else "learned" if study.display.learned else "simulated"
     return {
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
         "harness": HARNESS,
         "scores": dict(plan.metrics),
-        "profiles": {
-            name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
-        },
+        "profiles": profiles,
         "displays": dict.fromkeys(displays, kind),
     }
 

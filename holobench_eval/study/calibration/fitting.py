@@ -72,8 +72,9 @@ class Fitting:
         low, high = self.calibration.free[wanted.parameter]
         # Of each trial: value, error of the prediction, largest error of a figure [dB], all values.
         trials: list[tuple[float, float, float, dict[str, float]]] = []
-        value = float(np.clip(attrgetter(wanted.parameter)(self.profile), low, high))
+        value = attrgetter(wanted.parameter)(self.profile)
         for _ in range(TRAININGS):
+            value = float(np.clip(value, low, high))
             values = self._fit_figures({wanted.parameter: round(value, 3)})
             error = self.predicted(values) - wanted.psnr
             self.tell(f"{_listed(values)}: network {error + wanted.psnr:.2f} dB")
@@ -85,7 +86,6 @@ class Fitting:
             else:
                 (a, at_a, *_), (b, at_b, *_) = sorted(trials, key=lambda trial: abs(trial[1]))[:2]
                 value = b if at_a == at_b else a - at_a * (b - a) / (at_b - at_a)
-            value = float(np.clip(value, low, high))
         allowed = max(wanted.tolerance, min(off for _, _, off, _ in trials))
         able = [(error, values) for _, error, off, values in trials if off <= allowed]
         error, values = min(able, key=lambda trial: abs(trial[0]))
@@ -134,13 +134,11 @@ class Fitting:
     def _fit_figures(self, fixed: Values) -> dict[str, float]:
         """Values of all free parameters that bring the captures nearest to their figures, some of them fixed."""
         ranges = {name: ends for name, ends in self.calibration.free.items() if name not in fixed}
+        low, high = np.array(list(ranges.values())).T
 
         def values(places: NDArray[np.float64]) -> dict[str, float]:
-            ends = zip(ranges.items(), places, strict=True)
-            return {
-                **{name: round(float(low + (at - 1) * (high - low)), 3) for (name, (low, high)), at in ends},
-                **fixed,
-            }
+            found = (low + (places - 1) * (high - low)).tolist()
+            return {name: round(value, 3) for name, value in zip(ranges, found, strict=True)} | dict(fixed)
 
         def errors(places: NDArray[np.float64]) -> list[float]:
             missed, figures = self._missed(values(places)), self.calibration.figures
@@ -148,8 +146,8 @@ class Fitting:
             self.tell(f"{_listed(values(places))}: {', '.join(told)}")
             return list(missed.values())
 
-        own = [1 + (attrgetter(name)(self.profile) - low) / (high - low) for name, (low, high) in ranges.items()]
-        start, steps = np.clip(own, 1.05, 1.95), [STEP] * len(own)
+        own = [attrgetter(name)(self.profile) for name in ranges]
+        start, steps = np.clip(1 + (own - low) / (high - low), 1.05, 1.95), [STEP] * len(own)
         found = least_squares(errors, start, bounds=(1.0, 2.0), diff_step=steps, xtol=1e-2, max_nfev=EVALUATIONS)
         return values(found.x)
 
@@ -172,9 +170,8 @@ class Fitting:
 
     def _means(self, psnr: Callable[[Tensor, str], float]) -> dict[str, float]:
         """The mean over the images of a figure of a phase and its image, by method."""
-        return {
-            name: fmean(psnr(phase, item) for item, phase in phases.items()) for name, phases in self._holograms.items()
-        }
+        solved = self._holograms.items()
+        return {name: fmean(psnr(phase, item) for item, phase in phases.items()) for name, phases in solved}
 
     @cached_property
     def _targets(self) -> dict[str, Tensor]:

@@ -116,8 +116,7 @@ def _notes(
             f"Compressed with loss, and not linear in light: {named(lossy)}. It removes noise and fine detail, "
             "which scores of holograms consist of."
         )
-    seen = {target for _, target in captures}
-    if unseen := [name for name in targets if name not in seen]:
+    if unseen := sorted(targets.keys() - {target for _, target in captures}):
         yield f"Without any capture: {named(unseen)}."
     first: dict[str, Key] = {}
     for key, picture in captures.items():

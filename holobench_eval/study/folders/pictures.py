@@ -6,7 +6,6 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +13,7 @@ from ...core.errors import UserError, reason
 from ...core.io import decode_levels
 from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
 from ...datasets.images import opened, read, refuse_other_colours, refuse_short_png
+from ...imaging.similarity import reduced
 from ...lab.raw import read_raw
 from .exposure import Levels, levels
 
@@ -90,16 +90,9 @@ def checked(path: Path) -> Picture:
         nearly_gray=not gray and float((np.ptp(values, axis=0) > NEARLY_GRAY + ROUNDING).mean()) <= EXCEPT,
         opaque=alpha,
         is_lossy=path.suffix.lower() in (".jpg", ".jpeg") or (content[8:12] == b"WEBP" and b"VP8L" not in content[:64]),
-        structure=tuple(_structure(plane) for plane in values),
+        structure=tuple(float(np.std(reduced(plane, FACTS_SIDE)[0])) for plane in values),
         levels=tuple(levels(plane) for plane in values),
     )
-
-
-def _structure(plane: Values) -> float:
-    """Standard deviation of a plane ``(h, w)`` reduced to a size at which noise and grains are averaged."""
-    factor = min(1.0, FACTS_SIDE / max(plane.shape))
-    size = (max(1, round(plane.shape[1] * factor)), max(1, round(plane.shape[0] * factor)))
-    return float(np.std(cv2.resize(plane, size, interpolation=cv2.INTER_AREA)))
 
 
 def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:

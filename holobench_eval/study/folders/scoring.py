@@ -141,10 +141,8 @@ class Scoring:
         """Pixel to pixel, how alike a capture is to its target; or why it is refused."""
         picture, target = self.folders.captures[key].shape[1:], self.folders.targets[key[1]].shape[1:]
         if picture != target:
-            return (
-                f"the capture has {picture[1]} x {picture[0]} pixels and the target {target[1]} x {target[0]}; aligned "
-                "captures have the size of their target"
-            )
+            sizes = f"{picture[1]} x {picture[0]} pixels and the target {target[1]} x {target[0]}"
+            return f"the capture has {sizes}; aligned captures have the size of their target"
         warp = Warp(target, np.eye(3), np.zeros((6, 2)))
         frame, reference = (gray(values) for values in self.loaded(key))
         return Alignment(warp, similarity(frame, reference, warp).overall)
@@ -204,10 +202,8 @@ class Scoring:
                 parts[name] = part
                 continue
             seen = ", ".join(f"{key[0]} {mask.mean():.0%}" for key, mask in zip(found, masks, strict=True))
-            reason = (
-                f"the captures of this target have {common:.0%} of it in common ({seen}), and {LEAST:.0%} is needed; "
-                "score those that show least apart"
-            )
+            needed = f"{LEAST:.0%} is needed; score those that show least apart"
+            reason = f"the captures of this target have {common:.0%} of it in common ({seen}), and {needed}"
             placements |= dict.fromkeys(found, reason)
         return parts
 
@@ -243,9 +239,10 @@ class Scoring:
             figures["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
             figures["share_scored"] = 1.0 if part is None else share(part, alignment.warp.shape)
         record = Record(cell, "done", method, CONDITION, name, scores=scores, figures=figures, saturated=saturated)
-        matched = self.as_light(match(image.float(), reference.float())[0])
-        write_thumbnail(self.store.thumbnail(record.id), matched)
-        self.draw(figure, self.viewable(capture), warp, srgb_encode(matched).numpy(), target)
+        matched, _ = match(image.float(), reference.float())
+        write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
+        encoded = matched if self.values == "stored" else srgb_encode(matched)
+        self.draw(figure, self.viewable(capture), warp, encoded.numpy(), target)
         self.store.write(record)
         return record
 
@@ -270,8 +267,7 @@ class Scoring:
         other = replace(first, homography=to_frame @ found.homography @ np.linalg.inv(to_target))
         image, stored = torch.from_numpy(sampled(frame, other)), self.values == "stored"
         scores = score(image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=stored)
-        columns = (f"psnr_{self.domain}", f"ssim_{self.domain}")
-        seconds = {f"{column}_second": scores[column] for column in columns}
+        seconds = {f"{name}_{self.domain}_second": scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return seconds | {"second_aligner_px": disagreement(first, other)}
 
     def floor(self, name: str, part: Part | None) -> list[Record]:

@@ -89,7 +89,6 @@ def export(
     )
     write_manifest(folder, manifest)
     forget_sessions()
-    session_photographer.cache_clear()
     opened = replace(chosen, display=replace(chosen.display, session=folder))
     session_photographer(folder).write_checks(letter(_bench(opened)).phase)
     return _advance(opened, folder, watch)
@@ -105,7 +104,6 @@ def go_on(folder: Path, watch: Watch, say: Callable[[str], None], config: Path |
     manifest = read_manifest(folder)
     study = study_of(folder, manifest, config)
     forget_sessions()
-    session_photographer.cache_clear()
     photographer = session_photographer(folder)
     if not manifest.rounds:  # its export was interrupted
         return _advance(study, folder, watch)

@@ -21,9 +21,8 @@ def shown(warp: Warp, frame: tuple[int, ...]) -> Mask:
     All, where no more lies beyond the border than any capture may lack.
     """
     x, y = warp.coordinates()
-    slack = OVERHANG * warp.scale()
     beyond = max(float(-min(x.min(), y.min())), float(x.max()) - frame[1] + 1, float(y.max()) - frame[0] + 1)
-    if beyond <= slack:
+    if beyond <= OVERHANG * warp.scale():
         return np.ones(warp.shape, dtype=bool)
     return np.asarray((x >= 0) & (y >= 0) & (x <= frame[1] - 1) & (y <= frame[0] - 1))
 
