@@ -88,7 +88,7 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
     """
     image = opened(content, name)
     if image.format == "PNG":
-        _refuse_short_png(image, content, name)
+        refuse_short_png(image, content, name)
     fault = _fault(image, gray)
     bits = _bits(image, content)
     if fault is None and bits == 16 and sixteen_bit == "refuse":
@@ -154,7 +154,7 @@ def opened(content: bytes, name: str) -> Image.Image:
     return image
 
 
-def _refuse_short_png(image: Image.Image, content: bytes, name: str) -> None:
+def refuse_short_png(image: Image.Image, content: bytes, name: str) -> None:
     """UserError for a PNG without its end or with too few rows; Pillow takes the first and fills up the second."""
     if PNG_END not in content:
         raise UserError(f"{name}: truncated or damaged: the end of the PNG is missing; {RIGHT}")

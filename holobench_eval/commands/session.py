@@ -33,7 +33,7 @@ def export(
     from ..study.progress import watching
 
     with watching(console()) as watch:
-        advance = begin(config, folder, watch, 1, bench, display, fixed_exposure=fixed_exposure)
+        advance = begin(config, folder, watch, bench, display, fixed_exposure)
     _finish(advance, folder)
 
 
@@ -47,7 +47,7 @@ def import_(
     from ..study.progress import watching
 
     with watching(console()) as watch:
-        advance = go_on(folder, watch, 1, print, study)
+        advance = go_on(folder, watch, print, study)
     _finish(advance, folder)
 
 

@@ -6,15 +6,13 @@ import copy
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 from annotated_types import Interval
 
 from ..core.errors import UserError, suggest
 from ..core.schema import checked
 from ..core.yaml_source import Document, Keys, Position, parse
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -32,15 +30,9 @@ class Changes:
 
     def __str__(self) -> str:
         """As options of the command line."""
-        options = [("--methods", text) for text in self.methods] + [("--targets", text) for text in self.targets]
-        options += [("--limit", str(self.limit))] * (self.limit is not None)
-        options += [("--set", text) for text in self.values]
-        return shlex.join([part for option in options for part in option])
-
-    @property
-    def note(self) -> str:
-        """What a report says of a study that was changed."""
-        return f"This is not the whole study of the config, and not its result: it was run with {self}."
+        limit = () if self.limit is None else (str(self.limit),)
+        given = {"--methods": self.methods, "--targets": self.targets, "--limit": limit, "--set": self.values}
+        return shlex.join([part for option, texts in given.items() for text in texts for part in (option, text)])
 
 
 def recorded(provenance: Mapping[str, Any]) -> Changes:
@@ -54,14 +46,12 @@ def noted(changes: Changes) -> dict[str, Any]:
 
 
 def changed(document: Document, changes: Changes) -> Document:
-    """A config with the values and methods of the changes; a fault in it is then told at its option.
+    """A config with the values of the changes; a fault in one is then told at its option.
 
-    UserError: a key that leads nowhere, a value that is no YAML, or a method that the config does not have.
+    UserError: a key that leads nowhere, or a value that is no YAML.
     """
     for text in changes.values:
         document = _with_value(document, text)
-    if changes.methods:
-        document = _with_methods(document, changes.methods)
     return replace(document, text=f"# changed by {changes}\n{document.text}") if changes else document
 
 
@@ -82,29 +72,26 @@ def _with_value(document: Document, text: str) -> Document:
     place = f"--set {text}"
     if not equals or not all(key.split(".")):
         raise UserError(f"{place}: expected key=value, such as display.panel=[192, 192] or methods.0.label=mine")
-    data, path = copy.deepcopy(document.data), list[str | int]()
+    path: Keys = ()
+    data = copy.deepcopy(document.data)
     inner: Any = data
-    parts = key.split(".")
-    for depth, part in enumerate(parts):
-        path.append(_key(inner, part, place, path))
-        if depth == len(parts) - 1:
-            inner[path[-1]] = _value(value, place)
-        else:
-            if isinstance(inner, dict):
-                inner.setdefault(path[-1], {})
-            inner = inner[path[-1]]
-    keys, values = (
-        {where: at for where, at in places.items() if where[: len(path)] != tuple(path)}
-        for places in (document.keys, document.values)
-    )
-    new = [tuple(path[:depth]) for depth in range(1, len(path) + 1)]
-    new = [where for where in new if where not in values]
+    *parents, last = key.split(".")
+    for part in parents:
+        path = (*path, _key(inner, part, place, path))
+        if isinstance(inner, dict):
+            inner.setdefault(part, {})
+        inner = inner[path[-1]]
+    path = (*path, _key(inner, last, place, path))
+    inner[path[-1]] = _value(value, place)
+    known = document.values
+    new = [path[:depth] for depth in range(1, len(path) + 1) if path[:depth] not in known]
+    replaced = [where for where in known if where[: len(path)] == path]
     places = dict.fromkeys(new, Position(1, 1))
-    options = document.options | dict.fromkeys(new, place)
-    return replace(document, data=data, keys=keys | places, values=values | places, options=options)
+    options = document.options | dict.fromkeys([*new, *replaced], place)
+    return replace(document, data=data, keys=places | document.keys, values=places | known, options=options)
 
 
-def _key(inner: Any, part: str, place: str, path: Sequence[str | int]) -> str | int:
+def _key(inner: Any, part: str, place: str, path: Keys) -> str | int:
     """A part of a dotted path as the key of a mapping or the index of a list."""
     if isinstance(inner, dict):
         return part
@@ -120,44 +107,7 @@ def _value(text: str, place: str) -> Any:
     try:
         data = parse("", f"value: {text}").data
     except UserError as error:
-        reason = str(error).partition(": ")[2]
-        raise UserError(f"{place}: {reason}") from None
+        raise UserError(f"{place}: {str(error).partition(': ')[2]}") from None
     if set(data) != {"value"}:
         raise UserError(f"{place}: more than one value")
     return data["value"]
-
-
-def _with_methods(document: Document, texts: Sequence[str]) -> Document:
-    """The config with some of its methods, in its order; what it says of others goes with them."""
-    entries = document.data.get("methods")
-    if not isinstance(entries, list) or not all(isinstance(entry, dict | str) for entry in entries):
-        return document  # its own fault is told
-    mappings = [{"name": entry} if isinstance(entry, str) else entry for entry in entries]
-    names = [str(entry.get("name", "")) for entry in mappings]
-    labels = [str(entry.get("label") or name.rpartition(":")[2]) for entry, name in zip(mappings, names, strict=True)]
-    wanted = chosen("--methods", texts, [*dict.fromkeys([*labels, *names])], "method in the config")
-    whole = set(wanted) - set(labels)  # names, each of every row of a method
-    kept = [index for index, name in enumerate(names) if labels[index] in wanted or name in whole]
-    left = [labels[index] for index in kept]
-    data = {**document.data, "methods": [entries[index] for index in kept]}
-    for key in ("baseline", "second_baseline"):
-        if data.get(key) in labels and data[key] not in left:
-            del data[key]
-    reported = data.get("reported")
-    if isinstance(reported, dict) and isinstance(reported.get("rows"), dict):
-        rows = {label: row for label, row in reported["rows"].items() if label not in labels or label in left}
-        data["reported"] = {**reported, "rows": rows}
-    keys, values = (_moved(places, kept) for places in (document.keys, document.values))
-    return replace(document, data=data, keys=keys, values=values, options=_moved(document.options, kept))
-
-
-def _moved(places: Mapping[Keys, T], kept: Sequence[int]) -> dict[Keys, T]:
-    """The places of a config whose ``methods`` are those with the indices ``kept``."""
-    new = {old: number for number, old in enumerate(kept)}
-    moved = dict[Keys, T]()
-    for where, at in places.items():
-        if where[:1] != ("methods",) or len(where) == 1:
-            moved[where] = at
-        elif where[1] in new:
-            moved["methods", new[int(where[1])], *where[2:]] = at
-    return moved

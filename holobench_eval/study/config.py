@@ -5,7 +5,7 @@ Every mistake in a config is reported in one line that starts with its position,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,17 +14,18 @@ from ..core import plugins
 from ..core.errors import UserError, suggest
 from ..core.schema import placed, typed
 from ..core.yaml_source import Document, Keys, load
-from ..display.simulated.changes import KINDS, altered, checked
+from ..display.simulated.changes import KINDS, Value, altered, checked
 from ..display.simulated.profile import load_profile
 from ..display.traits import traits_of
 from ..imaging.grid import SMALLEST_REGION
-from ..metrics import Metric, catalogue
+from ..metrics import catalogue
 from ..metrics.lpips import find_weights
 from . import isolation
 from .changes import Changes, changed, chosen
 from .definition import DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
 from .displays import condition, displays, real_condition
 from .focal_stacks import SCORES, planes_of
+from .identity import SPECKLE
 from .plan import FLOORS, REFERENCE
 
 
@@ -56,31 +57,23 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     """
     document, changes = load(Path(path)), changes or Changes()
     document = changed(replace(document, data=_long_form(document.data)), changes)
-    study = replace(
-        typed(document, Study, _long_form(document.data)), file=Path(path), text=document.text, changes=changes
-    )
+    study = typed(document, Study, _long_form(document.data))
+    study = _with_chosen_methods(replace(study, file=Path(path), text=document.text, changes=changes))
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
     _check_profiles(study, document)
-    study = replace(study, sweeps=tuple(sweep_of(study, document, index) for index in range(len(study.sweeps))))
-    entries = tuple(_entry(study, document, index) for index in range(len(study.methods)))
-    study = replace(study, methods=entries)
+    study = replace(study, methods=tuple(_entry(study, document, entry) for entry in study.methods))
+    study = replace(study, sweeps=tuple(_sweeps(study, document)))
     _check_labels(study, document)
-    _check_twins(study, document)
-    check_metrics(study, document)
-    if study.reported and study.reported.beside not in (None, *study.display.sources):
-        near = suggest(str(study.reported.beside), study.display.sources)
-        message = f"'{study.reported.beside}' is not in display.profiles; {near}"
-        raise document.error(("reported", "beside"), message)
-    for key, label in (("baseline", study.baseline), ("second_baseline", study.second_baseline)):
-        if label and label not in study.labels:
-            raise document.error((key,), f"no method has the label '{label}'; {suggest(label, study.labels)}")
+    _check_metrics(study, document)
+    if study.reported and study.reported.beside:
+        _subset(study, document, (study.reported.beside,), ("reported", "beside"))
     study = replace(study, baseline=study.baseline or study.labels[0])
     if not changes:
         return study
-    note = f"{changes.note} {study.note}".strip()
-    return replace(study, title=f"{study.title} (changed: {changes})", note=note)
+    note = f"This is not the whole study of the config, and not its result: it was run with {changes}. {study.note}"
+    return replace(study, title=f"{study.title} (changed: {changes})", note=note.strip())
 
 
 def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -89,6 +82,23 @@ def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(methods, list):
         return dict(data)
     return {**data, "methods": [{"name": item} if isinstance(item, str) else item for item in methods]}
+
+
+def _with_chosen_methods(study: Study) -> Study:
+    """The study with the methods that the command line left: those of a label, and all of a name that is no label.
+
+    Each has its place in the config, a label and an exposure.
+    """
+    labels, exposure = [entry.label or entry.name.rpartition(":")[2] for entry in study.methods], study.display.exposure
+    entries = [
+        replace(entry, row=row, label=labels[row], exposure=entry.exposure or exposure)
+        for row, entry in enumerate(study.methods)
+    ]
+    allowed = dict.fromkeys([*labels, *(entry.name for entry in entries)])
+    wanted = chosen("--methods", study.changes.methods, [*allowed], "method in the config") or labels
+    whole = {*wanted} - {*labels}
+    left = [entry for entry in entries if entry.label in wanted or entry.name in whole]
+    return replace(study, methods=tuple(entries)).with_methods(left)
 
 
 def _targets(study: Study, document: Document) -> Targets:
@@ -132,33 +142,25 @@ def _holograms(study: Study, document: Document) -> Probe:
 
 
 def _display(study: Study, document: Document) -> DisplayGrid:
-    display = study.display
+    display, learned = study.display, study.display.learned
     named = [name for name in ("profiles", "learned", "bench") if getattr(display, name)]
     if len(named) != 1:
-        where: Keys = ("display", named[-1] if named else "profiles")
         message = "display.profiles, display.learned or display.bench: name displays in one of the three"
-        raise document.error(where, message)
-    if display.bench:
-        return _bench(study, document)
-    if display.learned is None:
+        raise document.error(("display", named[-1] if named else "profiles"), message)
+    if display.bench and display.panel is not None:
+        raise document.error(("display", "panel"), "a bench has the panel that its file says; remove 'panel'")
+    if display.bench and study.measure == "focus":
+        raise document.error(("measure",), "focal stacks need a camera that refocuses; measure pictures or predictions")
+    if learned is None:
         return display
     if study.measure != "picture":
         raise document.error(("measure",), "a learned display is a prediction already; measure its pictures")
-    where = ("display", "learned")
-    with placed(document, (*where, "method"), (*where, "params")):
-        method = isolation.build(display.learned.method, display.learned.params, study.folder)
-        traits = traits_of(method, display.learned.method)
+    with placed(document, ("display", "learned", "method"), ("display", "learned", "params")):
+        method = isolation.build(learned.method, learned.params, study.folder)
+        traits = traits_of(method, learned.method)
         if not (traits.trains and "predict" in traits.functions):
-            raise UserError(f"method '{display.learned.method}' learns no display; name one that predicts captures")
-    return replace(display, learned=replace(display.learned, params=isolation.params_of(method)))
-
-
-def _bench(study: Study, document: Document) -> DisplayGrid:
-    if study.display.panel is not None:
-        raise document.error(("display", "panel"), "a bench has the panel that its file says; remove 'panel'")
-    if study.measure == "focus":
-        raise document.error(("measure",), "focal stacks need a camera that refocuses; measure pictures or predictions")
-    return study.display
+            raise UserError(f"method '{learned.method}' learns no display; name one that predicts captures")
+    return replace(display, learned=replace(learned, params=isolation.params_of(method)))
 
 
 def _protocol(study: Study, document: Document) -> Protocol:
@@ -174,29 +176,23 @@ def _protocol(study: Study, document: Document) -> Protocol:
 
 
 def _check_profiles(study: Study, document: Document) -> None:
-    seen: dict[str, str] = {}
-    learned = study.display.learned
-    bench = study.display.bench
+    seen = {REFERENCE: "the floor rows"}
+    learned, bench, panel = study.display.learned, study.display.bench, study.display.panel
     for index, profile in enumerate([learned.profile] if learned else study.display.sources):
-        where: Keys = ("display", "learned", "profile") if learned else ("display", "profiles", index)
-        where = ("display", "bench") if bench else where
+        where: Keys = ("display", "bench") if bench else ("display", "profiles", index)
+        where = ("display", "learned", "profile") if learned else where
         with placed(document, where, where):
-            read = real_condition(bench, study.folder) if bench else None
-            display = read or condition(profile, study.display.panel, study.folder)
+            display = real_condition(bench, study.folder) if bench else condition(profile, panel, study.folder)
+            if display.name in seen:
+                both = f"'{profile}' and '{seen[display.name]}' are both named '{display.name}'"
+                raise UserError(f"{both}; list each display once")
         name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
             message += f"; registration needs at least {SMALLEST_REGION}"
-            if study.display.panel and not bench:
-                rows, columns = _smallest_panel(profile, study.display.panel, study.folder)
-                message += f", which a panel of [{rows}, {columns}] has"
+            if panel and not bench:
+                message += f", which a panel of {list(_smallest_panel(profile, panel, study.folder))} has"
             raise document.error(("display", "panel"), message)
-        if name in seen:
-            raise document.error(
-                where, f"'{profile}' and '{seen[name]}' are both named '{name}'; list each display once"
-            )
-        if name == REFERENCE:
-            raise document.error(where, f"a profile may not be named '{REFERENCE}': the floor rows have that name")
         seen[name] = profile
 
 
@@ -208,130 +204,118 @@ def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[
     return max(panel[0], side), max(panel[1], side)
 
 
-def _entry(study: Study, document: Document, index: int) -> MethodEntry:
-    entry, where = study.methods[index], ("methods", index)
+def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
+    where = ("methods", entry.row)
     with placed(document, (*where, "name"), (*where, "params")):
         method = isolation.build(entry.name, entry.params, study.folder)
         traits = traits_of(method, entry.name)
         if study.predicts and "predict" not in traits.functions:
-            raise UserError(
-                f"method '{entry.name}' predicts no captures; measure: {study.measure} needs methods that do"
-            )
-    place: Keys = (*where, "name") if (*where, "name") in document.keys else where
-    apart = isinstance(method, isolation.Apart) and study.isolation != "none"
-    if apart and (traits.privileged or method.refused):
-        what = f"imports {method.refused}" if method.refused else "looks into the simulated bench"
-        message = f"'{entry.name}' {what}, which a process of its own does not hold"
-        raise document.error(place, f"{message}; a study with 'isolation: none' runs it")
-    if study.display.real and traits.privileged:
-        message = f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one"
-        raise document.error(place, message)
+            needs = f"measure: {study.measure} needs methods that do"
+            raise UserError(f"method '{entry.name}' predicts no captures; {needs}")
+        apart = isinstance(method, isolation.Apart) and study.isolation != "none"
+        if apart and (traits.privileged or method.refused):
+            what = f"imports {method.refused}" if method.refused else "looks into the simulated bench"
+            what += ", which a process of its own does not hold"
+            raise UserError(f"'{entry.name}' {what}; a study with 'isolation: none' runs it")
+        if study.display.real and traits.privileged:
+            raise UserError(f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one")
     if entry.captures is not None and (not traits.camera or study.predicts):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)
-    profiles = subset(study, document, entry.profiles, (*where, "profiles"))
-    label = entry.label or entry.name.rpartition(":")[2]
-    return replace(entry, label=label, params=isolation.params_of(method), profiles=profiles)
+    profiles = _subset(study, document, entry.profiles, (*where, "profiles"))
+    return replace(entry, params=isolation.params_of(method), profiles=profiles)
 
 
 def _check_labels(study: Study, document: Document) -> None:
+    """Refuse labels that a table cannot show or that no method has, and two of them for the same cell."""
     # Reports show neither a second space nor, in the names of files on some systems, the case of letters.
     alike = [" ".join(label.split()).casefold() for label in study.labels]
-    for index, label in enumerate(study.labels):
-        where: Keys = ("methods", index, "label")
-        if (other := alike.index(alike[index])) < index:
-            but = "" if label == study.labels[other] else ", but for spaces and capitals"
-            message = f"methods[{index}] and methods[{other}] share the label '{label}'{but}; give one a 'label'"
-            raise document.error(where, message)
+    measured = [replace(entry, label="", profiles=(), row=0) for entry in study.methods]
+    for index, entry in enumerate(study.methods):
+        label, where = entry.label, ("methods", entry.row, "label")
+        first = study.methods[alike.index(alike[index])]
+        if first is not entry:
+            but = "" if label == first.label else ", but for spaces and capitals"
+            both = f"methods[{entry.row}] and methods[{first.row}] share the label '{label}'"
+            raise document.error(where, f"{both}{but}; give one a 'label'")
         if not label.isprintable() or len(label) > 60 or label in FLOORS:
             raise document.error(where, f"label {label!r} should be printable, at most 60 characters and not a floor's")
-    for label in study.reported.rows if study.reported else ():
-        if label not in study.labels:
-            message = f"no method has the label '{label}'; {suggest(label, study.labels)}"
-            raise document.error(("reported", "rows", label), message, at_key=True)
+        for earlier, other in enumerate(study.methods[:index]):  # a measurement would be printed twice
+            if measured[index] == measured[earlier] and set(entry.profiles) & set(other.profiles):
+                message = f"methods[{entry.row}] has the method, parameters and display of '{other.label}'; remove one"
+                raise document.error(where[:2], message)
+    named: dict[Keys, str] = {("baseline",): study.baseline, ("second_baseline",): study.second_baseline}
+    named |= {("reported", "rows", label): label for label in (study.reported.rows if study.reported else ())}
+    for place, label in named.items():
+        if label:
+            _refuse_unknown(document, place, label, study.labels, f"no method has the label '{label}'")
 
 
-def _check_twins(study: Study, document: Document) -> None:
-    """Refuse two labels for the same cell: a measurement would be printed twice."""
-    for index, entry in enumerate(study.methods):
-        for other in study.methods[:index]:
-            same = _measured(study, entry) == _measured(study, other)
-            if same and set(entry.profiles) & set(other.profiles):
-                message = f"methods[{index}] has the method, parameters and display of '{other.label}'; remove one"
-                raise document.error(("methods", index), message)
+def _sweeps(study: Study, document: Document) -> Iterator[Sweep]:
+    """The sweeps with their values and displays checked. UserError with ``file:line:column`` of a fault."""
+    seen = set[tuple[str, str, Value]]()
+    for index, sweep in enumerate(study.sweeps):
+        where = ("sweeps", index)
+        if study.display.learned or study.display.real or study.measure != "picture":
+            raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
+        kind = sweep.condition
+        _refuse_unknown(document, (*where, "condition"), kind, KINDS, f"unknown condition '{kind}'")
+        if kind == "laser_power" and "matched" in {entry.exposure for entry in study.methods}:
+            raise document.error(where, "exposure: matched undoes laser_power; leave one of the two out")
+        countable = KINDS[kind].counted
+        if bool(sweep.values) == (sweep.count is not None) or (sweep.count is not None and not countable):
+            raise document.error(where, "a sweep has values; one of siblings or draws may have a count in their place")
+        profiles = _subset(study, document, sweep.profiles, (*where, "profiles"))
+        loaded = [load_profile(profile, folder=study.folder) for profile in profiles]
+        values: list[Value] = []
+        for number, given in enumerate(sweep.values or map(str, range(1, (sweep.count or 0) + 1))):
+            place: Keys = (*where, "values", number) if sweep.values else (*where, "count")
+            with placed(document, place, place):
+                values.append(checked(kind, given))
+                for profile in loaded:
+                    altered(profile, kind, values[-1])
+            shown = {(kind, source, values[-1]) for source in profiles}
+            if seen & shown:
+                raise document.error(place, f"{kind} {given} is listed twice")
+            seen |= shown
+        yield replace(sweep, values=tuple(values), count=None, profiles=profiles)
 
 
-def _measured(study: Study, entry: MethodEntry) -> tuple[object, ...]:
-    """What sets the cells of an entry apart from those of others on the same display."""
-    return entry.name, entry.params, entry.captures, entry.exposure or study.display.exposure
-
-
-def sweep_of(study: Study, document: Document, index: int) -> Sweep:
-    """A sweep of a config, its values and displays checked. UserError with ``file:line:column`` of a fault."""
-    sweep, where = study.sweeps[index], ("sweeps", index)
-    if study.display.learned or study.display.real or study.measure != "picture":
-        raise document.error(where, "a sweep changes simulated displays, and scores pictures (measure: picture)")
-    if sweep.condition not in KINDS:
-        near = suggest(sweep.condition, KINDS)
-        raise document.error((*where, "condition"), f"unknown condition '{sweep.condition}'; {near}")
-    exposures = {entry.exposure or study.display.exposure for entry in study.methods}
-    if sweep.condition == "laser_power" and "matched" in exposures:
-        raise document.error(where, "exposure: matched undoes laser_power; leave one of the two out")
-    countable = KINDS[sweep.condition].counted
-    if bool(sweep.values) == (sweep.count is not None) or (sweep.count is not None and not countable):
-        raise document.error(where, "a sweep has values; one of siblings or draws may have a count in their place")
-    raw_values = sweep.values or tuple(str(number) for number in range(1, (sweep.count or 0) + 1))
-    profiles = subset(study, document, sweep.profiles, (*where, "profiles"))
-    same = [other for other in study.sweeps[:index] if other.condition == sweep.condition]
-    values = [value for other in same if set(other.profiles) & set(profiles) for value in other.values]
-    earlier_count = len(values)
-    loaded = [load_profile(profile, folder=study.folder) for profile in profiles]
-    for number, value in enumerate(raw_values):
-        value_keys: Keys = (*where, "values", number) if sweep.values else (*where, "count")
-        with placed(document, value_keys, value_keys):
-            values.append(checked(sweep.condition, value))
-            for profile in loaded:
-                altered(profile, sweep.condition, values[-1])
-        if values[-1] in values[:-1]:
-            raise document.error(value_keys, f"{sweep.condition} {value} is listed twice")
-    return replace(sweep, values=tuple(values[earlier_count:]), count=None, profiles=profiles)
-
-
-def subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:
+def _subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:
     """The named displays in the study's order; all displays if none is named."""
-    for number, profile in enumerate(named):
-        if profile not in study.display.sources:
-            message = f"'{profile}' is not in display.profiles; {suggest(profile, study.display.sources)}"
-            raise document.error((*where, number), message)
-    return tuple(p for p in study.display.sources if p in named or not named)
+    sources = study.display.sources
+    for number, source in enumerate(named):
+        _refuse_unknown(document, (*where, number), source, sources, f"'{source}' is not in display.profiles")
+    return tuple(source for source in sources if source in named or not named)
 
 
-def check_metrics(study: Study, document: Document) -> None:
+def _check_metrics(study: Study, document: Document) -> None:
     """Refuse unknown metrics, a headline that no metric computes, and a headline that needs a larger window.
 
     Missing weights are no fault of the config; ``run.refuse_unscored`` reports them.
     """
-    wanted, metrics = study.protocol.metrics, {metric.name: metric for metric in catalogue()}
+    wanted, headline, metrics = study.protocol.metrics, study.headline, {metric.name: metric for metric in catalogue()}
     for index, name in enumerate(wanted or ()):
-        if name not in (*metrics, "speckle_contrast"):
-            message = f"unknown metric '{name}'; {suggest(name, [*metrics, 'speckle_contrast'])}"
-            raise document.error(("protocol", "metrics", index), message)
-    if study.measure == "focus" and study.headline in SCORES:
-        return
+        known = [*metrics, SPECKLE]
+        _refuse_unknown(document, ("protocol", "metrics", index), name, known, f"unknown metric '{name}'")
     columns = {column: metric for metric in metrics.values() for column in metric.columns}
-    if study.headline not in columns:
-        choice = [*columns, *(SCORES if study.measure == "focus" else ())]
-        raise document.error(("headline",), f"unknown metric '{study.headline}'; {suggest(study.headline, choice)}")
-    metric = columns[study.headline]
+    further = SCORES if study.measure == "focus" else ()
+    _refuse_unknown(document, ("headline",), headline, [*columns, *further], f"unknown metric '{headline}'")
+    if headline in further:
+        return
+    metric = columns[headline]
     if wanted is not None and metric.name not in wanted:
-        message = f"the headline is '{study.headline}'; add {metric.name} to the metrics, or set another 'headline'"
+        message = f"the headline is '{headline}'; add {metric.name} to the metrics, or set another 'headline'"
         raise document.error(("protocol", "metrics"), message)
-    _check_window(metric, study, document)
-
-
-def _check_window(metric: Metric, study: Study, document: Document) -> None:
     for display in displays(study).values() if metric.smallest > SMALLEST_REGION else ():
         height, width = display.spec.region.shape
         if min(height, width) < metric.smallest:
             message = f"'{display.name}' scores {height} x {width} pixels; {metric.name} needs {metric.smallest} a side"
             raise document.error(("headline",), message)
+
+
+def _refuse_unknown(document: Document, where: Keys, word: str, allowed: Collection[str], fault: str) -> None:
+    """UserError at a place, with what is near, for a word that is not allowed."""
+    if word not in allowed:
+        is_key = where[:2] == ("reported", "rows")
+        raise document.error(where, f"{fault}; {suggest(word, allowed)}", is_key)

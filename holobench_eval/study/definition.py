@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -126,7 +126,7 @@ class MethodEntry:
     name: a registered name or ``path/to/file.py:Name``; label: its name in tables (without one: its name, or that of
     its class); params: parameters of the method, its defaults for others; profiles: the displays it is shown on, a
     subset of the study's; captures: the most that the display allows a method with a camera for one target (None: no
-    limit); exposure: of its scored captures (None: that of the study's displays).
+    limit); exposure: of its scored captures (None: that of the study's displays); row: its place in the config, from 0.
     """
 
     name: Text
@@ -135,6 +135,7 @@ class MethodEntry:
     profiles: tuple[str, ...] = ()
     captures: Annotated[int, Interval(ge=1)] | None = None
     exposure: Exposure | None = None
+    row: int = field(default=0, metadata={"key": False})
 
 
 @dataclass(frozen=True)
@@ -285,3 +286,13 @@ class Study:
     def labels(self) -> tuple[str, ...]:
         """Labels of the methods, in the order of the config."""
         return tuple(entry.label for entry in self.methods)
+
+    def with_methods(self, methods: Iterable[MethodEntry]) -> Study:
+        """The study with some of its methods; what it says of the others goes with them."""
+        kept = tuple(methods)
+        gone = {*self.labels} - {entry.label for entry in kept}
+        baseline, second = ("" if label in gone else label for label in (self.baseline, self.second_baseline))
+        rows = self.reported.rows if self.reported else {}
+        rows = {label: row for label, row in rows.items() if label not in gone}
+        reported = self.reported and replace(self.reported, rows=rows)
+        return replace(self, methods=kept, baseline=baseline, second_baseline=second, reported=reported)

@@ -14,7 +14,7 @@ from ..display.simulated.changes import KINDS, Value, altered
 from ..lab.bench_file import load_bench_file
 from ..lab.session import read_manifest
 from . import isolation
-from .definition import LEARNED, Study
+from .definition import LEARNED, Study, Training
 from .isolation.read_files import external
 from .versions import method_version
 
@@ -80,9 +80,9 @@ class Preparation:
     """What a method has to learn before it can solve: the name of its artifact follows from it.
 
     method, params: as in a cell; version: of the method's code (``versions.method_version``); folder: the config's
-    folder; display: the one it is trained on; dataset, dataset_params: source of the images; images: name and digest
-    of each; held_out: how many of the last only watch the training; captures: the most it may take; seed: the
-    study's; external: digests of files that the method takes where a machine has them (empty: it takes none).
+    folder; display: the one it is trained on; training: the study's, with the source of the images; images: name and
+    digest of each; seed: the study's; external: digests of files that the method takes where a machine has them (empty:
+    it takes none).
     """
 
     method: str
@@ -90,11 +90,8 @@ class Preparation:
     params: Mapping[str, Any]
     folder: Path
     display: Condition
-    dataset: str
-    dataset_params: Mapping[str, Any]
+    training: Training
     images: tuple[tuple[str, str], ...]
-    held_out: int
-    captures: int | None
     seed: int
     external: Mapping[str, str] = field(default_factory=dict)
 
@@ -116,11 +113,11 @@ class Preparation:
             "pitch": spec.pitch,
             "distance": spec.distance,
             "profile_sha256": self.display.digest,
-            "training": self.dataset,
-            "training_params": dict(self.dataset_params),
+            "training": self.training.dataset,
+            "training_params": dict(self.training.params),
             "training_sha256": digest([list(image) for image in self.images]),
-            "held_out": self.held_out,
-            "captures": self.captures,
+            "held_out": self.training.held_out,
+            "captures": self.training.captures,
             "seed": self.seed,
             **({"external": dict(self.external)} if self.external else {}),
             **({"session": self.display.real.session} if self.display.real else {}),
@@ -147,18 +144,14 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], display: C
     traits = isolation.traits(method, study.folder)
     if not traits.trains:
         return None
-    training = study.training
     return Preparation(
         method=method,
         version=method_version(isolation.find(method, study.folder)),
         params=params,
         folder=study.folder,
         display=display.learned.display if display.learned else display,
-        dataset=training.dataset,
-        dataset_params=training.params,
+        training=study.training,
         images=study.training_images,
-        held_out=training.held_out,
-        captures=training.captures,
         seed=study.seed,
         external=external(isolation.build(method, params, study.folder)) if "external" in traits.functions else {},
     )
@@ -170,8 +163,7 @@ def displays(study: Study) -> dict[str, Condition]:
     if grid.bench is not None:
         return {grid.bench: _real(study, real_condition(grid.bench, study.folder))}
     if learned is None:
-        by_source = {source: condition(source, grid.panel, study.folder) for source in grid.profiles}
-        return {source: _real(study, display) for source, display in by_source.items()}
+        return {source: _real(study, condition(source, grid.panel, study.folder)) for source in grid.profiles}
     display = condition(learned.profile, grid.panel, study.folder)
     name = f"{learned.method.rpartition(':')[2]} trained on {display.name}"
     return {LEARNED: replace(display, name=name, learned=preparation(study, learned.method, learned.params, display))}
@@ -185,10 +177,9 @@ def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
 
 def real_condition(source: str, folder: Path) -> Condition:
     """Read the file of a real bench without opening its devices. UserError for an invalid file."""
-    path = folder / source
-    bench = load_bench_file(path)
+    bench, real = load_bench_file(folder / source), RealSource(bench=folder / source)
     spec = bench.panel.spec(bench.name)
-    return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=RealSource(bench=path))
+    return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=real)
 
 
 def _real(study: Study, display: Condition) -> Condition:
@@ -202,16 +193,12 @@ def _real(study: Study, display: Condition) -> Condition:
 
 def changed(study: Study, source: str, display: Condition) -> list[Condition]:
     """A display as methods were prepared for it, and after every change that the study's sweeps make to it."""
-    changes = [
-        (sweep.condition, value)
-        for sweep in study.sweeps
-        if source in sweep.profiles
-        for value in sweep.values
-        if value != KINDS[sweep.condition].nominal
-    ]
-    if not changes:
-        return [display]
-    profile = load_profile(display.source, folder=display.folder)
-    eyes = [altered(profile, *change).spec().eye for change in changes]
-    pairs = zip(changes, eyes, strict=True)
-    return [display, *(replace(display, change=change, spec=replace(display.spec, eye=eye)) for change, eye in pairs)]
+    found = [display]
+    for sweep in study.sweeps:
+        if source in sweep.profiles:
+            profile = load_profile(display.source, folder=display.folder)
+            for value in sweep.values:
+                if value != KINDS[sweep.condition].nominal:
+                    spec = replace(display.spec, eye=altered(profile, sweep.condition, value).spec().eye)
+                    found.append(replace(display, change=(sweep.condition, value), spec=spec))
+    return found

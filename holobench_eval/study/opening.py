@@ -66,6 +66,7 @@ _open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDic
 
 def forget_sessions() -> None:
     """Drop the real benches, so that the next use opens them anew: files of a session folder may have changed."""
+    session_photographer.cache_clear()
     for key in [key for key, bench in _open.items() if not isinstance(bench, CellError) and bench.is_real]:
         del _open[key]
 

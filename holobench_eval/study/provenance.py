@@ -19,7 +19,6 @@ from . import isolation
 from .changes import noted
 from .cost import cpu_model
 from .definition import Study
-from .displays import Condition
 from .plan import Plan
 from .versions import HARNESS
 
@@ -42,16 +41,11 @@ def describe(
     """
     imports = isolation.imports((entry.name for entry in study.methods), study.folder)
     return {
-        "package": __version__,
         **revision(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
-        "config": os.path.relpath(study.file, output),
-        "config_sha256": text_digest(study.text),
         **noted(study.changes),
-        **_basis(plan),
-        "python": platform.python_version(),
-        "packages": {name: installed(name) for name in PACKAGES},
-        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
+        **_basis(study, plan, output),
+        **software(),
         "cpu": cpu_model(),
         "device": device,
         **({"gpu": gpu} if gpu else {}),
@@ -59,16 +53,19 @@ def describe(
         "workers": workers,
         **({"load": round(os.getloadavg()[0], 2)} if hasattr(os, "getloadavg") else {}),  # not on Windows
         **({"imports_s": imports} if imports else {}),
-        "started": now(),
-        "ended": None,
     }
 
 
-def _kind(display: Condition) -> str:
-    """What a display is: one that exists, a trained network in the place of one, or a simulated bench."""
-    if display.real is not None:
-        return "real"
-    return "simulated" if display.learned is None else "learned"
+def software() -> dict[str, Any]:
+    """What runs, and the time at which it starts; ``end`` notes when it ends."""
+    return {
+        "package": __version__,
+        "python": platform.python_version(),
+        "packages": {name: installed(name) for name in PACKAGES},
+        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "started": now(),
+        "ended": None,
+    }
 
 
 def revision() -> dict[str, Any]:
@@ -92,9 +89,8 @@ def begin(output: Path, provenance: dict[str, Any], resumed: bool) -> dict[str, 
 
     Written first, so that a killed run leaves its provenance beside its records.
     """
-    earlier = []
-    if resumed and (before := read(output)):
-        earlier = [*before.pop("earlier", []), before]
+    before = read(output) if resumed else {}
+    earlier = [*before.pop("earlier", []), before] if before else []
     return _write(output, {**provenance, "earlier": earlier})
 
 
@@ -107,20 +103,21 @@ def restate(output: Path, study: Study, plan: Plan) -> dict[str, Any]:
     """Note the text of the config that a report is written from again, and what its cells were computed with, beside
     the provenance of the runs; all cells of the plan have a record."""
     known = read(output)
-    config = {"config": os.path.relpath(study.file, output), "config_sha256": text_digest(study.text)}
-    return _write(output, {**known, **config, **_basis(plan)}) if known else known
+    return _write(output, {**known, **_basis(study, plan, output)}) if known else known
 
 
-def _basis(plan: Plan) -> dict[str, Any]:
-    """What the names of a plan's captures and scores depend on: the harness, the displays, and the metrics."""
+def _basis(study: Study, plan: Plan, output: Path) -> dict[str, Any]:
+    """The config, and what the names of its captures and scores depend on: the harness, the displays, the metrics."""
     displays = {display.name: display for task in plan.tasks for display in task.conditions}
+    profiles = {name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()}
+    kind = "real" if study.display.real else "learned" if study.display.learned else "simulated"
     return {
+        "config": os.path.relpath(study.file, output),
+        "config_sha256": text_digest(study.text),
         "harness": HARNESS,
         "scores": dict(plan.metrics),
-        "profiles": {
-            name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()
-        },
-        "displays": {name: _kind(display) for name, display in displays.items()},
+        "profiles": profiles,
+        "displays": dict.fromkeys(displays, kind),
     }
 
 
@@ -137,9 +134,7 @@ def read(output: Path) -> dict[str, Any]:
         return {}
     except (ValueError, RecursionError) as error:
         raise UserError(f"{output / FILE}: not JSON ({error}); delete the file and run the study again") from error
-    if not isinstance(content, dict):
-        raise UserError(f"{output / FILE}: not a mapping; delete the file and run the study again")
-    earlier = content.get("earlier", [])
+    earlier = content.get("earlier", []) if isinstance(content, dict) else None
     if not isinstance(earlier, list) or not all(isinstance(run, dict) for run in earlier):
-        raise UserError(f"{output / FILE}: 'earlier' is no list of runs; delete the file and run the study again")
+        raise UserError(f"{output / FILE}: not the provenance of a run; delete the file and run the study again")
     return content

@@ -69,9 +69,9 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     method = isolation.solver(preparation.method, preparation.params, preparation.folder, setting.isolation, limits)
     gate(method, preparation.method, preparation.version, external(method), preparation.external)
     images = _images(preparation, device)
-    split = len(images) - preparation.held_out
+    split = len(images) - preparation.training.held_out
     display_bench = opening.open_display(preparation.display, preparation.seed, device)
-    source = {"dataset": preparation.dataset, "params": dict(preparation.dataset_params)}
+    source = {"dataset": preparation.training.dataset, "params": dict(preparation.training.params)}
     draw, spec = ("training", preparation.seed), preparation.display.spec
     shared = {
         item: Starts(phases_of(setting.output), basis({**source, "sha256": sha256}, spec, draw), device)
@@ -85,7 +85,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         images[:split],
         images[split:],
         artifacts.memory(preparation),
-        preparation.captures,
+        preparation.training.captures,
         preparation.seed,
         shared,
         journal,
@@ -138,7 +138,8 @@ def diagnosis(method: Any, state: Mapping[str, Any], display_bench: CalibratedBe
 
 def _images(preparation: Preparation, device: torch.device) -> list[TrainingImage]:
     """The training images at the size of the scored region, on a device."""
-    dataset = plugins.build("datasets", preparation.dataset, dict(preparation.dataset_params), preparation.folder)
+    given = preparation.training
+    dataset = plugins.build("datasets", given.dataset, dict(given.params), preparation.folder)
     spec, images = preparation.display.spec, []
     for item, sha256 in preparation.images:
         if dataset.digest(item) != sha256:

@@ -192,7 +192,7 @@ def test_gray_and_colour_do_not_mix_and_gray_alone_is_scored(pictures, quick):
     for path in [*(pictures / "captures" / "clean").iterdir(), pictures / "targets" / "astronaut.png"]:
         Image.open(path).convert("L").save(path)
     text = run(pictures)
-    assert "the capture is gray and the target in colour" in text
+    assert "the capture is gray and the target is in colour" in text
     assert "the capture is in colour and the target gray" in text
     assert "match factor" in text
     states = pd.read_csv(pictures / "out" / "records.csv").set_index(["label", "target"])["state"]

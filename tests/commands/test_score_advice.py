@@ -76,7 +76,7 @@ def test_a_method_without_any_score_does_not_stand_in_the_way_of_a_ranking_of_th
 @pytest.mark.parametrize(
     "reason",
     [
-        f"CellError: the capture is gray and the target in colour: {UNKNOWN}",
+        f"CellError: the capture is gray and the target is in colour: {UNKNOWN}",
         "CellError: the target has structure in 2 of its 9 parts only, too little to find it by",
         "CellError: the target is found in the capture (correlation 0.80), but it takes 9 capture pixels for each of "
         "its own; 0.2 to 8 are allowed: resize the target",

@@ -12,7 +12,7 @@ from holobench_eval.commands.calibrate import calibrate
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.study.calibration import Calibration, Prediction, load_calibration, names
-from holobench_eval.study.calibration.fitting import NEAR, TRAININGS, Fitting, with_values
+from holobench_eval.study.calibration.fitting import NEAR, TRAININGS, Fitting
 from holobench_eval.study.definition import Targets
 from holobench_eval.study.progress import Lines
 
@@ -134,11 +134,6 @@ def test_a_network_is_trained_on_the_candidate_and_scored_on_its_captures(
     monkeypatch.chdir(tmp_path)  # the file is named from here, and the study lies elsewhere
     own = replace(fitting(calibration), source="mine.yaml", profile=load_profile("mine.yaml"))
     assert own.predicted({"stray_light.share": 0.0}) != clear
-
-
-def test_a_parameter_that_no_profile_has_is_refused() -> None:
-    with pytest.raises(UserError, match=r"has no parameter 'crosstalk.reach'"):
-        with_values(load_profile("ideal"), {"crosstalk.reach": 1.0})
 
 
 def test_a_profile_that_is_fitted_to_nothing_is_refused() -> None:

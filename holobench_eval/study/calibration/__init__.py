@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +15,8 @@ from ...core.yaml_source import load
 from ...display import Profile, load_profile
 from ...display.simulated.stages import Panel
 from ..definition import Targets
+
+FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Calibration:
 
 def names() -> list[str]:
     """Profiles that have a calibration."""
-    return sorted(entry.name.removesuffix(".yaml") for entry in _folder().iterdir() if entry.name.endswith(".yaml"))
+    return sorted(path.stem for path in FOLDER.glob("*.yaml"))
 
 
 def load_calibration(profile: Profile) -> Calibration:
@@ -60,34 +61,26 @@ def load_calibration(profile: Profile) -> Calibration:
     Other profiles like it are other displays, whose parameters mean something else; and so is one of another panel,
     for which nobody published the figures. UserError: it has none.
     """
-    for name in names():
-        if profile.name == name or (profile.like == name and profile.name.startswith(f"{name}-")):
-            _refuse_another_panel(profile, load_profile(name))
-            return typed(load(_folder() / f"{name}.yaml"), Calibration)
-    raise UserError(f"profile '{profile.name}' is not fitted to anything; {_right()}")
+    like = profile.like or ""
+    name = like if profile.name.startswith(f"{like}-") else profile.name
+    if name not in names():
+        raise UserError(f"profile '{profile.name}' is not fitted to anything; {_right()}")
+    shipped = load_profile(name)
+    for entry in fields(Panel):
+        own, wanted = (getattr(panel, entry.name) for panel in (profile.panel, shipped.panel))
+        if own != wanted:
+            raise UserError(
+                f"profile '{profile.name}': panel.{entry.name} is {own}, and the figures that calibrate fits are of "
+                f"'{name}', where it is {wanted}; {_right()}"
+            )
+    return typed(load(FOLDER / f"{name}.yaml"), Calibration)
 
 
 def refuse_bench_file(path: Path) -> None:
     """UserError for the file of a real bench, which is no profile; a file that is no YAML is left to others."""
-    if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
-        return
-    kinds = ("slm", "camera", "phase", "capture", "laser")
-    if any(key in load(path).data for key in kinds):
-        raise UserError(
-            f"{path}: describes a real bench, and calibrate fits profiles of simulated displays; {_right()}"
-        )
-
-
-def _refuse_another_panel(profile: Profile, shipped: Profile) -> None:
-    pairs = (
-        (entry.name, getattr(profile.panel, entry.name), getattr(shipped.panel, entry.name)) for entry in fields(Panel)
-    )
-    for key, own, wanted in pairs:
-        if own != wanted:
-            raise UserError(
-                f"profile '{profile.name}': panel.{key} is {own}, and the figures that calibrate fits are of "
-                f"'{shipped.name}', where it is {wanted}; {_right()}"
-            )
+    is_yaml = path.suffix.lower() in (".yaml", ".yml") and path.is_file()
+    if is_yaml and not load(path).data.keys().isdisjoint(("slm", "camera", "phase", "capture", "laser")):
+        raise UserError(f"{path}: describes a real bench, and calibrate fits simulated displays; {_right()}")
 
 
 def _right() -> str:
@@ -95,7 +88,3 @@ def _right() -> str:
         f"calibrate takes {' or '.join(names())}, or a profile of the same panel that is like one of them and has its "
         "name with a suffix; a study with the method parametric_model estimates what a display of your own does"
     )
-
-
-def _folder() -> Path:
-    return Path(str(files(__package__)))

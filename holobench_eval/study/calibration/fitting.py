@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
@@ -12,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import yaml
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from torch import Tensor
@@ -40,11 +41,9 @@ TRAININGS, NEAR = 4, 0.25  # of the network, at most; error of its figure [dB] t
 
 
 def with_values(profile: Profile, values: Values) -> Profile:
-    """A profile with other values of some parameters. UserError: it has no such parameter."""
+    """A profile with other values of some parameters."""
     for name, value in values.items():
         stage, _, key = name.partition(".")
-        if not hasattr(getattr(profile, stage, None), key):
-            raise UserError(f"profile '{profile.name}' has no parameter '{name}'")
         profile = replace(profile, **{stage: replace(getattr(profile, stage), **{key: value})})
     return profile
 
@@ -72,26 +71,25 @@ class Fitting:
         if wanted is None:
             return self._fit_figures({}), None
         low, high = self.calibration.free[wanted.parameter]
-        trials: list[tuple[float, float, dict[str, float]]] = []  # value, error of the prediction, all values
-        off: list[float] = []  # of each trial, the largest error of a figure [dB]
-        value = float(np.clip(self._own(wanted.parameter), low, high))
+        # Of each trial: value, error of the prediction, largest error of a figure [dB], all values.
+        trials: list[tuple[float, float, float, dict[str, float]]] = []
+        value = attrgetter(wanted.parameter)(self.profile)
         for _ in range(TRAININGS):
+            value = float(np.clip(value, low, high))
             values = self._fit_figures({wanted.parameter: round(value, 3)})
             error = self.predicted(values) - wanted.psnr
             self.tell(f"{_listed(values)}: network {error + wanted.psnr:.2f} dB")
-            trials.append((value, error, values))
-            off.append(max(abs(miss) for miss in self._missed(values).values()))
+            trials.append((value, error, max(map(abs, self._missed(values).values())), values))
             if abs(error) < NEAR or (value == high if error < 0 else value == low):
                 break
             if len(trials) == 1:
                 value += (high - low) / 10 * (1 if error < 0 else -1)
             else:
-                (a, at_a, _), (b, at_b, _) = sorted(trials, key=lambda trial: abs(trial[1]))[:2]
+                (a, at_a, *_), (b, at_b, *_) = sorted(trials, key=lambda trial: abs(trial[1]))[:2]
                 value = b if at_a == at_b else a - at_a * (b - a) / (at_b - at_a)
-            value = float(np.clip(value, low, high))
-        allowed = max(wanted.tolerance, min(off))
-        able = [trial for trial, most in zip(trials, off, strict=True) if most <= allowed]
-        _, error, values = min(able, key=lambda trial: abs(trial[1]))
+        allowed = max(wanted.tolerance, min(off for _, _, off, _ in trials))
+        able = [(error, values) for _, error, off, values in trials if off <= allowed]
+        error, values = min(able, key=lambda trial: abs(trial[0]))
         return values, wanted.psnr + error
 
     def captured(self, values: Values) -> dict[str, float]:
@@ -102,9 +100,7 @@ class Fitting:
             image = bench.photograph(phase, self._targets[item], item, 0).image
             return score(image, self._targets[item], metrics=("psnr",))["psnr_linear"]
 
-        return {
-            name: fmean(psnr(phase, item) for item, phase in phases.items()) for name, phases in self._holograms.items()
-        }
+        return self._means(psnr)
 
     def predicted(self, values: Values) -> float:
         """Mean PSNR [dB] of the network's predictions of captures with these values."""
@@ -125,12 +121,11 @@ class Fitting:
                 "targets": {"dataset": "folder", "params": {"path": str(folder / "targets")}},
                 **wanted.study,
             }
-            _write_yaml(folder / "candidate.yaml", candidate)
-            _write_yaml(folder / "study.yaml", document)
+            for file, content in (("candidate.yaml", candidate), ("study.yaml", document)):
+                (folder / file).write_text(json.dumps(content), encoding="utf-8")  # which YAML takes as well
             study = load_study(folder / "study.yaml")
-            one = plan(study)
             threads = torch.get_num_threads()
-            outcome = run(study, one, folder / "output", Serial(), self.watch, threads, folder / "artifacts")
+            outcome = run(study, plan(study), folder / "output", Serial(), self.watch, threads, folder / "artifacts")
         records = [record for record in outcome.records if record["label"] == study.labels[0]]
         for record in records:
             if record["state"] != "done":
@@ -140,13 +135,11 @@ class Fitting:
     def _fit_figures(self, fixed: Values) -> dict[str, float]:
         """Values of all free parameters that bring the captures nearest to their figures, some of them fixed."""
         ranges = {name: ends for name, ends in self.calibration.free.items() if name not in fixed}
+        low, high = np.array(list(ranges.values())).T
 
         def values(places: NDArray[np.float64]) -> dict[str, float]:
-            ends = zip(ranges.items(), places, strict=True)
-            return {
-                **{name: round(float(low + (at - 1) * (high - low)), 3) for (name, (low, high)), at in ends},
-                **fixed,
-            }
+            found = (low + (places - 1) * (high - low)).tolist()
+            return {name: round(value, 3) for name, value in zip(ranges, found, strict=True)} | dict(fixed)
 
         def errors(places: NDArray[np.float64]) -> list[float]:
             missed, figures = self._missed(values(places)), self.calibration.figures
@@ -154,10 +147,9 @@ class Fitting:
             self.tell(f"{_listed(values(places))}: {', '.join(told)}")
             return list(missed.values())
 
-        own = [np.clip(1 + (self._own(name) - low) / (high - low), 1.05, 1.95) for name, (low, high) in ranges.items()]
-        found = least_squares(
-            errors, own, bounds=(1.0, 2.0), diff_step=[STEP] * len(own), xtol=1e-2, max_nfev=EVALUATIONS
-        )
+        own = [attrgetter(name)(self.profile) for name in ranges]
+        start, steps = np.clip(1 + (own - low) / (high - low), 1.05, 1.95), [STEP] * len(own)
+        found = least_squares(errors, start, bounds=(1.0, 2.0), diff_step=steps, xtol=1e-2, max_nfev=EVALUATIONS)
         return values(found.x)
 
     def _missed(self, values: Values) -> dict[str, float]:
@@ -165,23 +157,22 @@ class Fitting:
         psnr = self._quick(values)
         return {name: psnr[name] - published for name, published in self.calibration.figures.items()}
 
-    def _own(self, name: str) -> float:
-        stage, _, key = name.partition(".")
-        return float(getattr(getattr(self.profile, stage), key))
-
     def _quick(self, values: Values) -> dict[str, float]:
         """Mean PSNR [dB] of each method without camera and registration, for the search."""
         bench = SimulatedBench(with_values(self.profile, values).scaled(self.calibration.panel))
 
-        def psnr(phase: Tensor, target: Tensor) -> float:
+        def psnr(phase: Tensor, item: str) -> float:
+            target = self._targets[item]
             image = match(bench.spec.region.crop(bench.image(phase)), target)[0]
             return float(-10 * torch.log10((image - target).square().mean()))
 
         with torch.no_grad():
-            return {
-                name: fmean(psnr(phase, self._targets[item]) for item, phase in phases.items())
-                for name, phases in self._holograms.items()
-            }
+            return self._means(psnr)
+
+    def _means(self, psnr: Callable[[Tensor, str], float]) -> dict[str, float]:
+        """The mean over the images of a figure of a phase and its image, by method."""
+        solved = self._holograms.items()
+        return {name: fmean(psnr(phase, item) for item, phase in phases.items()) for name, phases in solved}
 
     @cached_property
     def _targets(self) -> dict[str, Tensor]:
@@ -207,7 +198,3 @@ def _solved(name: str, bench: CalibratedBench, target: Tensor, item: str) -> Ten
 
 def _listed(values: Values) -> str:
     return ", ".join(f"{name} {value:.3f}" for name, value in values.items())
-
-
-def _write_yaml(path: Path, content: Mapping[str, Any]) -> None:
-    path.write_text(yaml.safe_dump(dict(content), sort_keys=False), encoding="utf-8")

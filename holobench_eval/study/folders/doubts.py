@@ -19,20 +19,17 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     """Sentences about what the scores of ``records`` do not show. domain: of the PSNR."""
     done = [record for record in records if record.state == "done"]
     captures = [record for record in done if record.capture["capture_sha256"]]
-    constant = {_target(record): record.values() for record in done if record.label == "floor_constant"}
     psnr = f"psnr_{domain}"
-    least = {name: max(NEARLY_ITSELF, scores[psnr] + ABOVE_CONSTANT) for name, scores in constant.items()}
-    near = [_name(record) for record in captures if record.values()[psnr] > least[_target(record)]]
-    if near:
+    constant = {record.target: record.values()[psnr] for record in done if record.label == "floor_constant"}
+    least = {target: max(NEARLY_ITSELF, value + ABOVE_CONSTANT) for target, value in constant.items()}
+    if near := [_name(record) for record in captures if record.values()[psnr] > least[record.target]]:
         yield f"Nearly the target itself, which a photograph with sensor noise is not: {named(near)}."
     yield from _mirrored(captures, folders)
-    clipped = [record for record in captures if (record.saturated or 0) > MOST_SATURATED]
-    if clipped:
+    if clipped := [record for record in captures if (record.saturated or 0) > MOST_SATURATED]:
         shares = named([f"{_name(record)} {record.saturated:.2%}" for record in clipped])
         yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at full scale: {shares}."
     given = [record for record in captures if record.capture["geometry"]["kind"] == "given"]
-    unlike = [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]
-    if unlike:
+    if unlike := [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]:
         correlations = named([f"{_name(record)} {record.capture['geometry']['correlation']:.2f}" for record in unlike])
         yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
 
@@ -47,8 +44,7 @@ def _mirrored(captures: Sequence[Record], folders: Folders) -> Iterator[str]:
         sessions.setdefault((width, height), {True: [], False: []})[mirrored].append(record)
     for (width, height), sides in sessions.items():
         fewer = sides[len(sides[True]) <= len(sides[False])]
-        odd = [record for record in fewer if not is_same_mirrored(folders.targets[_target(record)].load())]
-        if odd:
+        if odd := [record for record in fewer if not is_same_mirrored(folders.targets[record.target].load())]:
             yield (
                 f"Mirrored against the other captures of {width} x {height} pixels, though one camera sees all "
                 f"or none so: {named([_name(record) for record in odd])}."
@@ -56,8 +52,4 @@ def _mirrored(captures: Sequence[Record], folders: Folders) -> Iterator[str]:
 
 
 def _name(record: Record) -> str:
-    return f"{record.label}/{_target(record)}"
-
-
-def _target(record: Record) -> str:
-    return str(record.capture["target"])
+    return f"{record.label}/{record.target}"

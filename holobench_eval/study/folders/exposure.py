@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from ...imaging.warp import Warp
+from ...imaging.similarity import Mask
+from ...imaging.warp import Frame, Warp
 
 NAMES = ("red", "green", "blue")
 ENDS = (1.0, 99.0)  # percentiles between which levels are counted; beyond them pixels may be hot or dead
@@ -18,9 +18,6 @@ SAMPLED = 400  # pixels a side of the sample that is enough where it has more le
 SMALLEST_OBJECT = 16  # connected pixels of a sparse scene; hot pixels stand alone
 DARK = 0.1  # of full scale
 MUCH = 0.1  # of the pixels at full scale
-
-Plane = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -42,27 +39,29 @@ class Levels:
         return max(self.most, self.bright)
 
 
-def levels(plane: Plane, mask: Mask | None = None) -> Levels:
+def levels(plane: Frame, mask: Mask | None = None) -> Levels:
     """The levels of a plane ``(h, w)``, or of those of its pixels that a mask has."""
+    mask = np.ones(plane.shape, dtype=bool) if mask is None else mask
     step = max(1, min(plane.shape) // SAMPLED)
-    full = float((plane >= 1).mean() if mask is None else (plane[mask] >= 1).mean())
-    most, top = _between_ends(_of(plane[::step, ::step], None if mask is None else mask[::step, ::step]))
+    full = float((plane[mask] >= 1).mean())
+    most, top = _between_ends(plane[::step, ::step], mask[::step, ::step])
     if most > FEWEST_LEVELS:
         return Levels(most, 0, top, full)
-    most, top = _between_ends(_of(plane, mask))
-    brighter = plane > top if mask is None else (plane > top) & mask
-    _, labels, facts, _ = cv2.connectedComponentsWithStats(brighter.astype(np.uint8), connectivity=8)
+    most, top = _between_ends(plane, mask)
+    brighter = ((plane > top) & mask).astype(np.uint8)
+    _, labels, facts, _ = cv2.connectedComponentsWithStats(brighter, connectivity=8)
     large = facts[:, cv2.CC_STAT_AREA] >= SMALLEST_OBJECT
     large[0] = False  # what is not brighter
-    bright = plane[large[labels]]
-    return Levels(most, _between_ends(bright)[0] if bright.size else 0, top, full)
+    bright = large[labels]
+    return Levels(most, _between_ends(plane, bright)[0] if bright.any() else 0, top, full)
 
 
-def within(plane: Plane, warp: Warp) -> Levels:
+def within(plane: Frame, warp: Warp) -> Levels:
     """The levels of a capture's channel where it shows the target. A lamp or a date beside it adds none."""
     corners = warp.corners()[[0, 1, 3, 2]]
     mask = cv2.fillConvexPoly(np.zeros(plane.shape, np.uint8), np.round(corners).astype(np.int32), (1,)).astype(bool)
-    rows, columns = (slice(max(0, int(low)), int(high) + 2) for low, high in zip(*_ends(corners), strict=True))
+    lowest, highest = np.floor(corners.min(0)).astype(int), np.ceil(corners.max(0)).astype(int)
+    columns, rows = (slice(max(0, low), high + 2) for low, high in zip(lowest, highest, strict=True))
     return levels(plane[rows, columns], mask[rows, columns])
 
 
@@ -89,21 +88,14 @@ def refusal(pairs: Iterable[tuple[str, Levels, Levels]], aligned: bool) -> str:
     return ""
 
 
-def burnt(frame: Plane) -> str:
+def burnt(frame: Frame) -> str:
     """What to add to the refusal of a capture ``(C, h, w)`` of which much is at full scale."""
     full = float((frame >= 1).mean())
     return f"; {full:.0%} of the capture is at full scale, so it may be over-exposed" if full > MUCH else ""
 
 
-def _ends(corners: NDArray[np.float64]) -> tuple[list[float], list[float]]:
-    """The smallest and the largest row and column of corners ``(4, 2)``, x before y."""
-    return list(np.floor(corners.min(0))[::-1]), list(np.ceil(corners.max(0))[::-1])
-
-
-def _of(plane: Plane, mask: Mask | None) -> Plane:
-    return plane if mask is None or not mask.any() else plane[mask]
-
-
-def _between_ends(values: Plane) -> tuple[int, float]:
+def _between_ends(plane: Frame, mask: Mask) -> tuple[int, float]:
+    """How many levels the pixels of a mask have between the `ENDS`, and the upper end; of all where it has none."""
+    values = plane[mask] if mask.any() else plane
     low, high = np.percentile(values, ENDS)
     return len(np.unique(values[(values >= low) & (values <= high)])), float(high)

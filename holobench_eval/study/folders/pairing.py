@@ -41,35 +41,26 @@ def paired(capture: Picture, target: Picture) -> Pairing:
     if capture.pixels_sha256 == target.pixels_sha256:
         return Pairing(refused="the capture is the target itself, value for value, and no photograph of it")
     laser = _single_laser(capture, target)
-    if too_few := refusal(
-        ((name, capture.levels[own], target.levels[its]) for name, own, its in carrying(capture, target, laser)),
-        aligned=False,
-    ):
+    pairs = ((name, capture.levels[own], target.levels[its]) for name, own, its in carrying(capture, target, laser))
+    if too_few := refusal(pairs, aligned=False):
         return Pairing(refused=too_few)
-    if laser is not None and target.nearly_gray:
-        return Pairing(refused=f"the target is nearly gray, {NEARLY}; {SAVE_TARGET}")
-    if laser is not None and not target.gray:
-        return Pairing(
-            refused=f"the capture has light in its {NAMES[laser]} channel alone and the target is in colour: {UNKNOWN}"
-        )
-    if laser is not None:
-        return Pairing(NAMES[laser])
-    if capture.shape[0] == target.shape[0] and (target.gray or not capture.gray):
+    channel = "gray" if capture.gray else "" if laser is None else NAMES[laser]
+    if laser is None and capture.shape[0] == target.shape[0] and (target.gray or not capture.gray):
         return Pairing()
-    if capture.gray and target.gray:
-        return Pairing("gray")
-    if capture.gray and target.nearly_gray:
-        return Pairing(refused=f"the capture is gray and the target nearly so, {NEARLY}; {SAVE_TARGET}")
-    if capture.gray:
-        return Pairing(refused=f"the capture is gray and the target in colour: {UNKNOWN}")
+    if channel and target.gray:
+        return Pairing(channel)
+    if channel:
+        light = "is gray" if capture.gray else f"has light in its {channel} channel alone"
+        fault = f"nearly gray, {NEARLY}; {SAVE_TARGET}" if target.nearly_gray else f"in colour: {UNKNOWN}"
+        return Pairing(refused=f"the capture {light} and the target is {fault}")
     if capture.nearly_gray:
         return Pairing(refused=f"the target is gray and the capture nearly so, {NEARLY}; save the capture in gray")
-    shares = ", ".join(
-        f"{value / max(capture.structure):.2f} in {name}" for name, value in zip(NAMES, capture.structure, strict=True)
-    )
+    strongest = max(capture.structure)
+    shares = [f"{value / strongest:.2f} in {name}" for name, value in zip(NAMES, capture.structure, strict=True)]
     return Pairing(
-        refused=f"the capture is in colour and the target gray, and no channel has nearly all of the light ({shares} "
-        f"of the strongest; up to {LASER:g} is a single laser); save the channel that saw the display in gray"
+        refused="the capture is in colour and the target gray, and no channel has nearly all of the light "
+        f"({', '.join(shares)} of the strongest; up to {LASER:g} is a single laser); save the channel that saw the "
+        "display in gray"
     )
 
 

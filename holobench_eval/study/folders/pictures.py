@@ -6,30 +6,20 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
-from ...core.errors import UserError
+from ...core.errors import UserError, reason
 from ...core.io import decode_levels
-from ...datasets.images import PNG_END, opened, read, refuse_other_colours
 from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
+from ...datasets.images import opened, read, refuse_other_colours, refuse_short_png
+from ...imaging.similarity import reduced
 from ...lab.raw import read_raw
 from .exposure import Levels, levels
 
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".webp", ".jpg", ".jpeg")
-RAW_SUFFIXES = (
-    ".arw",
-    ".cr2",
-    ".cr3",
-    ".dng",
-    ".nef",
-    ".orf",
-    ".pef",
-    ".rw2",
-    ".srw",
-)  # of cameras with a Bayer mosaic
+# Of cameras with a Bayer mosaic.
+RAW_SUFFIXES = (".arw", ".cr2", ".cr3", ".dng", ".nef", ".orf", ".pef", ".rw2", ".srw")
 FORMATS = ("PNG", "TIFF", "BMP", "WEBP", "JPEG")
 MODES = ("1", "L", "P", "RGB", "LA", "RGBA")  # that are decoded without loss, if an alpha channel is opaque
 RIGHT = "expected an 8-bit or 16-bit PNG or TIFF, gray or RGB, or a BMP, WebP or JPEG"
@@ -100,16 +90,9 @@ def checked(path: Path) -> Picture:
         nearly_gray=not gray and float((np.ptp(values, axis=0) > NEARLY_GRAY + ROUNDING).mean()) <= EXCEPT,
         opaque=alpha,
         is_lossy=path.suffix.lower() in (".jpg", ".jpeg") or (content[8:12] == b"WEBP" and b"VP8L" not in content[:64]),
-        structure=tuple(_structure(plane) for plane in values),
+        structure=tuple(float(np.std(reduced(plane, FACTS_SIDE)[0])) for plane in values),
         levels=tuple(levels(plane) for plane in values),
     )
-
-
-def _structure(plane: Values) -> float:
-    """Standard deviation of a plane ``(h, w)`` reduced to a size at which noise and grains are averaged."""
-    factor = min(1.0, FACTS_SIDE / max(plane.shape))
-    size = (max(1, round(plane.shape[1] * factor)), max(1, round(plane.shape[0] * factor)))
-    return float(np.std(cv2.resize(plane, size, interpolation=cv2.INTER_AREA)))
 
 
 def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:
@@ -132,7 +115,12 @@ def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:
     if image.mode not in MODES and not image.mode.startswith("I;16"):
         raise UserError(f"{path}: an image of mode {image.mode}; {RIGHT}")
     refuse_other_colours(image, str(path))
-    _load(image, content, path)
+    if image.format == "PNG":
+        refuse_short_png(image, content, str(path))
+    try:
+        image.load()  # which reports truncated files that OpenCV would pad
+    except Exception as error:  # whatever a decoder trips over in a damaged file
+        raise UserError(f"{path}: truncated or damaged: {reason(error)}; {RIGHT}") from error
     pixels = decode_levels(content)
     if pixels is None:
         raise UserError(f"{path}: an image that cannot be decoded; {RIGHT}")
@@ -142,14 +130,3 @@ def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:
         raise UserError(f"{path}: an image with alpha that is not opaque everywhere; {RIGHT}")
     planes = pixels[None] if pixels.ndim == 2 else pixels[..., :3].transpose(2, 0, 1)
     return np.ascontiguousarray(planes, dtype=np.float32) / np.float32(full), alpha
-
-
-def _load(image: Image.Image, content: bytes, path: Path) -> None:
-    """Decode the file with Pillow, which reports truncated files that OpenCV would pad."""
-    if image.format == "PNG" and PNG_END not in content:
-        raise UserError(f"{path}: truncated or damaged: the end of the PNG is missing; {RIGHT}")
-    try:
-        image.load()
-    except Exception as error:  # whatever a decoder trips over in a damaged file
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path}: truncated or damaged: {reason}; {RIGHT}") from error

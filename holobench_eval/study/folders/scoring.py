@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,8 +17,7 @@ from torch import Tensor
 from ...core.allocator import return_large_arrays
 from ...core.errors import CellError
 from ...core.hashing import digest
-from ...core.installed import __version__, installed
-from ...core.io import now, write_atomically
+from ...core.io import write_atomically
 from ...imaging.align import Alignment, align, confirmed, gray
 from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared
@@ -54,17 +52,8 @@ def described(folders: Folders, values: str) -> dict[str, Any]:
     """Everything about the present scoring of pictures for their ``provenance.json``."""
     files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
     files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
-    return {
-        "package": __version__,
-        "code_sha256": {"metrics": HARNESS, "alignment": ALIGNMENT},
-        "files": files,
-        "values": values,
-        "python": platform.python_version(),
-        "packages": {name: installed(name) for name in provenance.PACKAGES},
-        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "started": now(),
-        "ended": None,
-    }
+    code = {"metrics": HARNESS, "alignment": ALIGNMENT}
+    return {"code_sha256": code, "files": files, "values": values, **provenance.software()}
 
 
 @dataclass(frozen=True)
@@ -111,19 +100,16 @@ class Scoring:
         for name in self.folders.targets:
             step(f"floor of {name}")
             records += self.floor(name, parts.get(name)) if name in found else []
-        kept = set()
-        for method in self.folders.methods:
-            for name in self.folders.targets:
-                key = (method, name)
-                if key in self.folders.captures:
-                    step(f"scoring {method}, {name}")
-                shared = key in placements and placements[key] != own[key]
-                kind = "given" if self.aligned else "shared" if shared else "own"
-                records.append(self.scored(key, placements.get(key), kind, parts.get(name)))
-                kept.add(alignment_name(*key))
-        for old in (self.store.output / "figures").glob("alignment-*.jpg"):
-            if old.name not in kept:
-                old.unlink()
+        keys = [(method, name) for method in self.folders.methods for name in self.folders.targets]
+        for key in keys:
+            if key in self.folders.captures:
+                step(f"scoring {key[0]}, {key[1]}")
+            is_shared = key in placements and placements[key] != own[key]
+            kind = "given" if self.aligned else "shared" if is_shared else "own"
+            records.append(self.scored(key, placements.get(key), kind, parts.get(key[1])))
+        figures = self.store.output / "figures"
+        for old in {*figures.glob("alignment-*.jpg")} - {figures / alignment_name(*key) for key in keys}:
+            old.unlink()
         return records
 
     def alignments(self, step: Step) -> Alignments:
@@ -131,39 +117,35 @@ class Scoring:
         own: Alignments = {}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
-            pairing, target = self.folders.pairings[key], self.folders.targets[key[1]]
+            pairing = self.folders.pairings[key]
             if pairing.refused or self.aligned:
                 own[key] = pairing.refused or self.given(key)
                 continue
+            files = [picture.sha256, self.folders.targets[key[1]].sha256]
             chosen = [*filter(None, [pairing.channel, "visible" if self.visible else ""])]
-            key_digest = digest([picture.sha256, target.sha256, self.values == "linear", ALIGNMENT, *chosen])
+            key_digest = digest([*files, self.values == "linear", ALIGNMENT, *chosen])
             path = self.store.folder / f"alignment-{key_digest}.json"
-            plain = _read(path)
-            if plain is None:
-                plain = self.found(key)
+            found = _read(path)
+            if found is None:
+                capture, target = self.loaded(key)
+                try:
+                    found = align(self.viewable(capture), target, self.visible)
+                except CellError as error:
+                    found = f"{error}{burnt(capture)}"
+                plain = {"refused": found} if isinstance(found, str) else found.to_dict()
                 write_atomically(path, f"{json.dumps(plain, sort_keys=True, allow_nan=False)}\n".encode())
-            own[key] = str(plain["refused"]) if "refused" in plain else Alignment.from_dict(plain)
+            own[key] = found
         return own
 
     def given(self, key: Key) -> Alignment | str:
         """Pixel to pixel, how alike a capture is to its target; or why it is refused."""
         picture, target = self.folders.captures[key].shape[1:], self.folders.targets[key[1]].shape[1:]
         if picture != target:
-            return (
-                f"the capture has {picture[1]} x {picture[0]} pixels and the target {target[1]} x {target[0]}; aligned "
-                "captures have the size of their target"
-            )
+            sizes = f"{picture[1]} x {picture[0]} pixels and the target {target[1]} x {target[0]}"
+            return f"the capture has {sizes}; aligned captures have the size of their target"
         warp = Warp(target, np.eye(3), np.zeros((6, 2)))
         frame, reference = (gray(values) for values in self.loaded(key))
         return Alignment(warp, similarity(frame, reference, warp).overall)
-
-    def found(self, key: Key) -> dict[str, Any]:
-        """The alignment of a capture by itself, or why it is refused, as plain values."""
-        capture, target = self.loaded(key)
-        try:
-            return align(self.viewable(capture), target, self.visible).to_dict()
-        except CellError as error:
-            return {"refused": f"{error}{burnt(capture)}"}
 
     def loaded(self, key: Key) -> tuple[Values, Values]:
         """A capture and its target, in the channels that are compared."""
@@ -215,21 +197,21 @@ class Scoring:
             if not masks or all(mask.all() for mask in masks):
                 continue
             part = largest_part(np.logical_and.reduce(masks))
-            if share(part, target.shape[1:]) >= LEAST:
+            common = share(part, target.shape[1:])
+            if common >= LEAST:
                 parts[name] = part
                 continue
             seen = ", ".join(f"{key[0]} {mask.mean():.0%}" for key, mask in zip(found, masks, strict=True))
-            placements |= dict.fromkeys(
-                found,
-                f"the captures of this target have {share(part, target.shape[1:]):.0%} of it in common ({seen}), and "
-                f"{LEAST:.0%} is needed; score those that show least apart",
-            )
+            needed = f"{LEAST:.0%} is needed; score those that show least apart"
+            reason = f"the captures of this target have {common:.0%} of it in common ({seen}), and {needed}"
+            placements |= dict.fromkeys(found, reason)
         return parts
 
     def scored(self, key: Key, alignment: Alignment | str | None, kind: str, part: Part | None) -> Record:
         """The record of a capture: kept, or computed."""
         method, name = key
-        cell = self.cell(method, name, alignment, kind, part=part)
+        geometry = {"kind": kind, **alignment.to_dict()} if isinstance(alignment, Alignment) else {"kind": "none"}
+        cell = self.cell(method, name, geometry, part=part)
         if alignment is None:
             reason = f"no capture of '{name}' in the folder of {method}"
             return Record(cell, "missing", method, CONDITION, name, reason)
@@ -245,14 +227,13 @@ class Scoring:
         target = part_of(target, part)
         if too_few := too_few_levels(self.folders.captures[key], self.folders.targets[name], capture, target, warp):
             return self.failed(cell, too_few)
-        second = self.second(capture, target, warp)
+        frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
+        figures = self.second(frame, compared, warp)
         # In the precision that scores are computed in, so that there is no second copy of a large picture.
-        image = torch.from_numpy(sampled(self.capture_values(capture), warp)).double()
-        reference = torch.from_numpy(self.target_values(target)).double()
-        full = sampled((capture >= 1).astype(np.float32), warp)
-        saturated = float((full > 0.5).mean())
-        del capture, full  # of a large picture, read again to be drawn
-        scores, figures = self.scores(image, reference, self.metrics), second
+        image, reference = torch.from_numpy(sampled(frame, warp)).double(), compared.double()
+        saturated = float((sampled((capture >= 1).astype(np.float32), warp) > 0.5).mean())
+        del capture, frame, compared  # of a large picture, read again to be drawn
+        scores = self.scores(image, reference, self.metrics)
         capture, _ = self.loaded(key)
         if self.visible:
             figures["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
@@ -260,7 +241,8 @@ class Scoring:
         record = Record(cell, "done", method, CONDITION, name, scores=scores, figures=figures, saturated=saturated)
         matched, _ = match(image.float(), reference.float())
         write_thumbnail(self.store.thumbnail(record.id), self.as_light(matched))
-        self.draw(figure, self.viewable(capture), warp, self.encoded(matched), target)
+        encoded = matched if self.values == "stored" else srgb_encode(matched)
+        self.draw(figure, self.viewable(capture), warp, encoded.numpy(), target)
         self.store.write(record)
         return record
 
@@ -270,62 +252,50 @@ class Scoring:
         self.store.write(record)
         return record
 
-    def second(self, capture: Values, target: Values, first: Warp) -> dict[str, float]:
-        """PSNR and SSIM by a second algorithm's geometry, and the distance between the two geometries."""
-        frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
-        other = self.second_geometry(torch.from_numpy(frame), compared, first)
-        if other is None:
-            return {}
-        image = torch.from_numpy(sampled(frame, other))
-        other_scores = score(
-            image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=self.values == "stored"
-        )
-        scores = {f"{name}_{self.domain}_second": other_scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
-        return scores | {"second_aligner_px": disagreement(first, other)}
+    def second(self, frame: Values, compared: Tensor, first: Warp) -> dict[str, float]:
+        """PSNR and SSIM by a second algorithm's geometry, and the distance between the two; empty where it finds none.
 
-    def second_geometry(self, frame: Tensor, compared: Tensor, first: Warp) -> Warp | None:
-        """Where a second algorithm finds the target, from values of a capture and its target that are compared."""
+        frame, compared: a capture and its target in the values that are compared.
+        """
         small, to_target = reduced(gray(self.as_light(compared).numpy()), WIDE)
         side = round(max(frame.shape) * max(small.shape) / max(first.shape))
-        shrunk, to_frame = reduced(gray(self.as_light(frame).numpy()), side)
+        shrunk, to_frame = reduced(gray(self.as_light(torch.from_numpy(frame)).numpy()), side)
         homography = np.linalg.inv(to_frame) @ first.homography @ to_target
         found = second_warp(shrunk, small, Warp((small.shape[0], small.shape[1]), homography, np.zeros((6, 2))))
         if found is None:
-            return None
-        return replace(first, homography=to_frame @ found.homography @ np.linalg.inv(to_target))
+            return {}
+        other = replace(first, homography=to_frame @ found.homography @ np.linalg.inv(to_target))
+        image, stored = torch.from_numpy(sampled(frame, other)), self.values == "stored"
+        scores = score(image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=stored)
+        seconds = {f"{name}_{self.domain}_second": scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
+        return seconds | {"second_aligner_px": disagreement(first, other)}
 
     def floor(self, name: str, part: Part | None) -> list[Record]:
         """The records of floor images."""
-        names = list(self.folders.targets)
-        after = names[names.index(name) + 1 :] + names[: names.index(name)]
         targets, channels = self.folders.targets, self.floor_channels(name)
+        names = list(targets)
+        after = names[names.index(name) + 1 :] + names[: names.index(name)]
         fitting = [other for other in after if targets[other].shape[1:] == targets[name].shape[1:]]
         wrong = [other for other in fitting if self.floor_channels(other) == channels][:1]
+        other = {"floor_wrong_target": wrong[0]} if wrong else {}
         rows = [row for row in FLOORS if wrong or row != "floor_wrong_target"]
-        given = {row: wrong[0] if "wrong" in row else "" for row in rows}
-        cells = {row: self.cell(row, name, None, "reference", given[row], part) for row in rows}
+        cells = {row: self.cell(row, name, {"kind": "reference"}, other.get(row, ""), part) for row in rows}
         kept = [record for cell in cells.values() if (record := self.store.read(digest(cell))) is not None]
         thumbnail = self.store.target_thumbnail(name)
-        large = (
-            math.prod(self.folders.targets[name].shape[1:] if part is None else (part[1] - part[0], part[3] - part[2]))
-            > LARGE
-        )
-        metrics = {k: v for k, v in self.metrics.items() if not (large and k.startswith(SLOW))}
+        shape = targets[name].shape[1:] if part is None else (part[1] - part[0], part[3] - part[2])
+        is_large = math.prod(shape) > LARGE
+        metrics = {k: v for k, v in self.metrics.items() if not (is_large and k.startswith(SLOW))}
         lacking = [record for record in kept if identity.lacking(record.scores, metrics)]
-        if len(kept) == len(rows) and not lacking and thumbnail.is_file():
+        if len(kept) == len(cells) and not lacking and thumbnail.is_file():
             return kept
         pair = (part_of(targets[target].load()[:channels], part) for target in (name, *wrong))
         reference, *others = (torch.from_numpy(self.target_values(target)) for target in pair)
         write_thumbnail(thumbnail, self.as_light(reference))
-        pictures, wide = floor_captures(reference, others, name), reference.double()
-        records = [
-            Record(
-                cells[row], "done", row, REFERENCE, name, scores=self.scores(pictures[row]().double(), wide, metrics)
-            )
-            for row in rows
-        ]
-        for record in records:
-            self.store.write(record)
+        pictures, wide, records = floor_captures(reference, others, name), reference.double(), []
+        for row, cell in cells.items():
+            scores = self.scores(pictures[row]().double(), wide, metrics)
+            records.append(Record(cell, "done", row, REFERENCE, name, scores=scores))
+            self.store.write(records[-1])
         return records
 
     def scores(self, image: Tensor, reference: Tensor, metrics: Mapping[str, str]) -> dict[str, Scores]:
@@ -348,28 +318,15 @@ class Scoring:
         """Linear light of values that are compared, for thumbnails, which are sRGB, and for the second aligner."""
         return srgb_decode(compared) if self.values == "stored" else compared
 
-    def encoded(self, compared: Tensor) -> Values:
-        """Display-encoded values of values that are compared."""
-        values = compared if self.values == "stored" else srgb_encode(compared)
-        return values.float().numpy()
-
     def cell(
-        self,
-        method: str,
-        name: str,
-        alignment: Alignment | str | None,
-        kind: str,
-        wrong: str = "",
-        part: Part | None = None,
+        self, method: str, name: str, geometry: dict[str, Any], wrong: str = "", part: Part | None = None
     ) -> dict[str, Any]:
         """The plain description of a number."""
         capture = self.folders.captures.get((method, name))
         channel = self.folders.pairings[method, name].channel if capture else ""
-        if kind == "reference" and self.floor_channels(name) < self.folders.targets[name].shape[0]:
+        is_reference = geometry["kind"] == "reference"
+        if is_reference and self.floor_channels(name) < self.folders.targets[name].shape[0]:
             channel = "gray"
-        geometry: dict[str, Any] = {"kind": kind}
-        if kind != "reference":
-            geometry = {"kind": kind, **alignment.to_dict()} if isinstance(alignment, Alignment) else {"kind": "none"}
         return {
             "method": method,
             "params": {"target": wrong, "target_sha256": self.folders.targets[wrong].sha256} if wrong else {},
@@ -378,25 +335,24 @@ class Scoring:
             "target": name,
             "target_sha256": self.folders.targets[name].sha256,
             "capture_sha256": capture.sha256 if capture else "",
-            "condition": REFERENCE if kind == "reference" else CONDITION,
+            "condition": REFERENCE if is_reference else CONDITION,
             "panel": list(capture.shape[1:]) if capture else [],
             "repeat": 0,
             "values": self.values,
             "geometry": geometry,
             **({"channel": channel} if channel else {}),
             **({"part": list(part)} if part else {}),
-            **({"visible": True} if self.visible and kind != "reference" else {}),
+            **({"visible": True} if self.visible and not is_reference else {}),
             "protocol": VERSION,
             "harness": HARNESS,
             "alignment": ALIGNMENT,
         }
 
 
-def _read(path: Path) -> dict[str, Any] | None:
-    """A kept alignment; None where it is missing or unreadable."""
+def _read(path: Path) -> Alignment | str | None:
+    """A kept alignment, or why there is none; None where neither is kept or can be read."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        plain = json.loads(path.read_text(encoding="utf-8"))
+        return str(plain["refused"]) if "refused" in plain else Alignment.from_dict(plain)
+    except (OSError, ValueError, TypeError, LookupError):
         return None
-    keys = set(content) if isinstance(content, Mapping) else set()
-    return content if keys in ({"refused"}, {"shape", "homography", "correlation"}) else None

@@ -22,16 +22,16 @@ from ...lab.session.manifest import refuse_links_out
 from .. import isolation
 from ..config import load_study
 from ..definition import Study
-from ..displays import condition, displays, real_condition
+from ..displays import condition, displays
 from ..executors import Serial
 from ..opening import forget_sessions, open_display
 from ..plan import plan
 from ..progress import Lines
 from ..run import Outcome, run
+from .files import named
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
 
-NAMED = 5  # files of a config that one line names
 OWN = ("photographs", "dead_leaves", "charts")  # datasets that come with the package and read no folder
 
 
@@ -49,13 +49,7 @@ class Advance:
 
 
 def export(
-    config: Path,
-    folder: Path,
-    watch: Lines,
-    threads: int,
-    bench: Path | None = None,
-    display: str | None = None,
-    fixed_exposure: bool = False,
+    config: Path, folder: Path, watch: Lines, bench: Path | None, display: str | None, fixed_exposure: bool
 ) -> Advance:
     """Make a session folder for a study and write its first round of patterns.
 
@@ -67,44 +61,41 @@ def export(
         raise UserError(f"{folder}: not empty; give a new folder, or go on there with holoeval session import {folder}")
     study = load_study(config)
     chosen = _on_one_display(study, bench, display)
-    if fixed_exposure and "matched" in {chosen.display.exposure, *(entry.exposure for entry in chosen.methods)}:
+    if fixed_exposure and "matched" in {entry.exposure for entry in chosen.methods}:
         raise UserError(f"{config}: exposure: matched sets exposures one by one; not with --fixed-exposure")
+    shown = next(iter(displays(chosen).values()))
+    if shown.spec.bits != 8:
+        raise UserError(f"'{shown.name}' has {shown.spec.bits} bits; patterns are written with 8")
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / STUDY, chosen.text.encode())
-    named = study.display.bench
-    if bench is not None:
-        shutil.copyfile(bench, folder / BENCH)
-    if bench is None and named and _stays_inside(named):
-        if (folder / named).exists():
-            raise UserError(f"{named}: a session has a file of this name of its own; rename the bench file")
-        (folder / named).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(study.folder / named, folder / named)
-    real_display = next(iter(displays(chosen).values()))
-    spec, described = real_display.spec, real_display.digest
-    if spec.bits != 8:
-        raise UserError(f"'{real_display.name}' has {spec.bits} bits; patterns are written with 8")
-    described_bench = real_display.real.bench if real_display.real else None
+    inside = BENCH if bench else study.display.bench
+    if inside and _stays_inside(inside):
+        copy = folder / inside
+        if copy.exists():
+            raise UserError(f"{inside}: a session has a file of this name of its own; rename the bench file")
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(bench or study.folder / inside, copy)
+    described_bench = shown.real.bench if shown.real else None
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
-        session=digest([text, described, str(config), digest(folder.resolve().as_posix())]),
+        session=digest([text, shown.digest, str(config), digest(folder.resolve().as_posix())]),
         study_sha256=text,
-        bench_sha256=described,
-        display=real_display.name,
-        panel=spec.shape,
-        wavelengths=spec.wavelengths,
+        bench_sha256=shown.digest,
+        display=shown.name,
+        panel=shown.spec.shape,
+        wavelengths=shown.spec.wavelengths,
         phase=load_bench_file(described_bench).phase if described_bench else Convention(),
         fixed_exposure=fixed_exposure,
     )
     write_manifest(folder, manifest)
     forget_sessions()
-    session_photographer.cache_clear()
     opened = replace(chosen, display=replace(chosen.display, session=folder))
     session_photographer(folder).write_checks(letter(_bench(opened)).phase)
-    return _advance(chosen, folder, watch, threads)
+    return _advance(opened, folder, watch)
 
 
-def go_on(folder: Path, watch: Lines, threads: int, say: Callable[[str], None], config: Path | None = None) -> Advance:
+def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path | None) -> Advance:
     """Read the photographs of all rounds so far, score what can be scored, and write the next round if one is needed.
 
     config: use this config instead of the copy in the session folder (see ``study_of``); say: gets the findings, line
@@ -114,10 +105,9 @@ def go_on(folder: Path, watch: Lines, threads: int, say: Callable[[str], None], 
     manifest = read_manifest(folder)
     study = study_of(folder, manifest, config)
     forget_sessions()
-    session_photographer.cache_clear()
     photographer = session_photographer(folder)
     if not manifest.rounds:  # its export was interrupted
-        return _advance(study, folder, watch, threads)
+        return _advance(study, folder, watch)
     checks = bench_checks(photographer)
     for check in checks:
         say(check.line)
@@ -138,13 +128,9 @@ def go_on(folder: Path, watch: Lines, threads: int, say: Callable[[str], None], 
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
     notes = [study.note, *photographer.notes, *(check.line for check in checks), *findings]
-    advance = _advance(study, folder, watch, threads)
-    return replace(advance, study=replace(advance.study, note=" ".join(_sentence(note) for note in notes if note)))
-
-
-def _sentence(note: str) -> str:
-    text = note.strip()
-    return f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
+    texts = [note.strip() for note in notes]
+    sentences = [f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}" for text in texts if text]
+    return _advance(replace(study, note=" ".join(sentences)), folder, watch)
 
 
 def study_of(folder: Path, manifest: Manifest, config: Path | None) -> Study:
@@ -181,35 +167,23 @@ def _reaches_out(path: Path) -> str:
     A dataset outside ``OWN`` may read folders; code and profiles in files are recognized by their names. A bench file
     in the session is only read, and its devices are not opened.
     """
-    study = load(path).data
-    display = study.get("display")
-    bench = display.get("bench") if isinstance(display, dict) else None
-    if (
-        isinstance(display, dict)
-        and isinstance(bench, str)
-        and _stays_inside(bench)
-        and (path.parent / bench).is_file()
-    ):
-        study = {**study, "display": {key: value for key, value in display.items() if key != "bench"}}
 
-    def walk(value: object, key: str) -> list[str]:
+    def reached(value: object, *keys: str) -> list[str]:
         if isinstance(value, dict):
-            return [reason for name, item in value.items() for reason in walk(item, str(name))]
+            return [reason for name, item in value.items() for reason in reached(item, *keys, str(name))]
         if isinstance(value, list):
-            return [reason for item in value for reason in walk(item, key)]
-        file = isinstance(value, str) and (".py:" in value or value.endswith((".yaml", ".yml")) or "/" in value)
+            return [reason for item in value for reason in reached(item, *keys)]
+        key, text = keys[-1], str(value)
+        if key == "dataset" and text not in OWN:
+            return [f"dataset: {text[:60]}, which may read any folder"]
+        is_in_session = keys == ("display", "bench") and _stays_inside(text) and (path.parent / text).is_file()
         is_prose = key in ("title", "note", "label", "source", "question", "would_change")
-        reaches = (file and not is_prose) or key in ("path", "manifest", "lpips_weights", "weights")
-        return [f"{key}: {str(value)[:60]}"] if reaches else []
+        is_file = isinstance(value, str) and (".py:" in text or text.endswith((".yaml", ".yml")) or "/" in text)
+        reaches = is_file and not is_in_session and not is_prose
+        return [f"{key}: {text[:60]}"] if reaches or key in ("path", "manifest", "lpips_weights", "weights") else []
 
-    named = walk(study, "")
-    for section in ("targets", "training"):
-        entry = study.get(section)
-        dataset = entry.get("dataset", "dead_leaves") if isinstance(entry, dict) else "dead_leaves"
-        if dataset not in OWN and f"dataset: {dataset}" not in named:
-            named.append(f"dataset: {str(dataset)[:60]}, which may read any folder")
-    more = f" and {len(named) - NAMED} more" if len(named) > NAMED else ""
-    return f"names what is not in the session ({'; '.join(named[:NAMED])}{more})" if named else ""
+    found = reached(load(path).data)
+    return f"names what is not in the session ({named(found)})" if found else ""
 
 
 def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:
@@ -219,26 +193,20 @@ def _on_one_display(study: Study, bench: Path | None, display: str | None) -> St
         raise UserError(f"{study.file}: a session measures pictures on one real display, not {what}")
     if bench is not None:
         grid = replace(study.display, bench=str(bench.resolve()), profiles=(), panel=None)
-        real_condition(str(bench.resolve()), study.folder)
     elif study.display.bench:
         grid = study.display
     else:
         grid = replace(study.display, profiles=(_profile(study, display),))
     source = grid.sources[0]
-    methods = tuple(
+    kept = study.with_methods(
         replace(entry, profiles=(source,))
         for entry in study.methods
         if (bench is not None or source in entry.profiles) and not isolation.traits(entry.name, study.folder).privileged
     )
-    if not methods:
+    if not kept.methods:
         raise UserError(f"{study.file}: no method of it can be shown on a real display")
-    labels = {entry.label for entry in methods}
-    baseline = study.baseline if study.baseline in labels else methods[0].label
-    reported = None
-    if study.reported is not None:
-        rows = {label: row for label, row in study.reported.rows.items() if label in labels}
-        reported = replace(study.reported, rows=rows, beside=None)
-    return replace(study, display=grid, methods=methods, baseline=baseline, reported=reported)
+    reported = kept.reported and replace(kept.reported, beside=None)
+    return replace(kept, display=grid, baseline=kept.baseline or kept.labels[0], reported=reported)
 
 
 def _profile(study: Study, display: str | None) -> str:
@@ -246,11 +214,10 @@ def _profile(study: Study, display: str | None) -> str:
     names = {condition(profile, study.display.panel, study.folder).name: profile for profile in study.display.profiles}
     if display is None and len(names) > 1:
         raise UserError(f"{study.file}: several displays; choose one with --display, or describe yours with --bench")
-    if display is None:
-        return study.display.profiles[0]
-    if display not in names:
-        raise UserError(f"unknown display '{display}'; {suggest(display, names)}")
-    return names[display]
+    chosen = display or next(iter(names))
+    if chosen not in names:
+        raise UserError(f"unknown display '{chosen}'; {suggest(chosen, names)}")
+    return names[chosen]
 
 
 def _bench(study: Study) -> RealBench:
@@ -259,12 +226,11 @@ def _bench(study: Study) -> RealBench:
     return bench
 
 
-def _advance(study: Study, folder: Path, watch: Lines, threads: int) -> Advance:
-    """Compute what can be computed; write the patterns of what waits."""
-    study = replace(study, display=replace(study.display, session=folder))
+def _advance(study: Study, folder: Path, watch: Lines) -> Advance:
+    """Compute what can be computed; write the patterns of what waits. study: on the display of the session."""
     _bench(study).announce_grid()
     photographer = session_photographer(folder)
-    outcome = run(study, plan(study), folder / REPORT, Serial(), watch, threads, folder / ARTIFACTS, retry_failed=True)
+    outcome = run(study, plan(study), folder / REPORT, Serial(), watch, 1, folder / ARTIFACTS, retry_failed=True)
     if photographer.wanted and photographer.manifest.rounds and not _takes_rounds(study):
         raise UserError(
             f"{folder}: other holograms are computed here than were photographed, and {REPORT}/solved lacks those; "
@@ -277,5 +243,5 @@ def _advance(study: Study, folder: Path, watch: Lines, threads: int) -> Advance:
 def _takes_rounds(study: Study) -> bool:
     """Whether a hologram of the study may depend on photographs of others."""
     methods = [isolation.traits(entry.name, study.folder) for entry in study.methods]
-    exposures = {study.display.exposure, *(entry.exposure for entry in study.methods)}
-    return "matched" in exposures or any(method.trains or method.camera or method.follows for method in methods)
+    matched = any(entry.exposure == "matched" for entry in study.methods)
+    return matched or any(method.trains or method.camera or method.follows for method in methods)

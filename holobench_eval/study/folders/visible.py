@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...imaging.align import OVERHANG
-from ...imaging.warp import Warp
+from ...imaging.similarity import Mask
+from ...imaging.warp import Frame, Warp
 
 LEAST = 0.5  # of a target's pixels
 
-Mask = NDArray[np.bool_]
 Part = tuple[int, int, int, int]  # first row, row after the last, first column, column after the last
 
 
@@ -22,9 +21,8 @@ def shown(warp: Warp, frame: tuple[int, ...]) -> Mask:
     All, where no more lies beyond the border than any capture may lack.
     """
     x, y = warp.coordinates()
-    slack = OVERHANG * warp.scale()
     beyond = max(float(-min(x.min(), y.min())), float(x.max()) - frame[1] + 1, float(y.max()) - frame[0] + 1)
-    if beyond <= slack:
+    if beyond <= OVERHANG * warp.scale():
         return np.ones(warp.shape, dtype=bool)
     return np.asarray((x >= 0) & (y >= 0) & (x <= frame[1] - 1) & (y <= frame[0] - 1))
 
@@ -56,6 +54,6 @@ def cropped(warp: Warp, part: Part) -> Warp:
     return replace(warp, shape=(part[1] - part[0], part[3] - part[2]), homography=warp.homography @ shift)
 
 
-def part_of(picture: NDArray[np.float32], part: Part | None) -> NDArray[np.float32]:
+def part_of(picture: Frame, part: Part | None) -> Frame:
     """A part of ``(C, h, w)``, or all of it."""
     return picture if part is None else np.ascontiguousarray(picture[:, part[0] : part[1], part[2] : part[3]])

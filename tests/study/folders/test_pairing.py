@@ -70,7 +70,7 @@ def test_equal_channels_are_gray_and_that_is_said(tmp_path, capture, target):
     [
         (COLOUR, GRAY, "in colour and the target gray"),
         (laser(1, leak=0.6), GRAY, "1.00 in green"),
-        (GRAY, COLOUR, "gray and the target in colour"),
+        (GRAY, COLOUR, "gray and the target is in colour"),
     ],
 )
 def test_what_would_be_a_guess_is_refused(tmp_path, capture, target, why):
@@ -153,8 +153,18 @@ def nearly_gray() -> Picture:
     ("capture", "target", "whose", "remedy"),
     [
         (nearly_gray(), GRAY, "the target is gray and the capture nearly so", "save the capture in gray"),
-        (0.9 * GRAY, nearly_gray(), "the capture is gray and the target nearly so", "save the target as it was shown"),
-        (laser(0), nearly_gray(), "the target is nearly gray", "save the target as it was shown"),
+        (
+            0.9 * GRAY,
+            nearly_gray(),
+            "the capture is gray and the target is nearly gray",
+            "save the target as it was shown",
+        ),
+        (
+            laser(0),
+            nearly_gray(),
+            "the capture has light in its red channel alone and the target is nearly gray",
+            "save the target as it was shown",
+        ),
     ],
 )
 def test_nearly_gray_is_called_so_with_its_remedy(tmp_path, capture, target, whose, remedy):
@@ -229,7 +239,7 @@ def test_a_channel_of_few_levels_that_the_target_has_light_in_is_named(tmp_path)
 
 def test_three_equal_channels_of_a_colour_target_are_refused_as_one_is(tmp_path):
     refused = folders(tmp_path, (0.9 * EQUAL).astype(np.float32), COLOUR).pairings["m", "coffee"].refused
-    assert "the capture is gray and the target in colour" in refused
+    assert "the capture is gray and the target is in colour" in refused
 
 
 def test_a_lamp_beside_the_target_adds_no_levels():
