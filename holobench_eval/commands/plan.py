@@ -132,7 +132,7 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
         )
         kinds = Counter(cost.key(task, threads, workers, gpu, apart) for task in unsolved if not task.is_floor)
         known = {kind: seconds for kind in kinds if (seconds := cost.recorded(kind)) is not None}
-        seconds = [known.get(kind, mean(known.values())) * many for kind, many in kinds.items()] if known else []
+        estimates = [known.get(kind, mean(known.values())) * many for kind, many in kinds.items()] if known else []
         limit = limits.get(label)
         rows.append(
             Row(
@@ -144,7 +144,7 @@ def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, 
                 done=count["done"] + count["unscored"],
                 failed=count["failed"],
                 missing=count["missing"] + count["untimed"],
-                seconds=None if label == FLOOR or (kinds and not known) else sum(seconds),
+                seconds=None if label == FLOOR or (kinds and not known) else sum(estimates),
             )
         )
     return rows
