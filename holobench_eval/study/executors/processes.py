@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from multiprocessing import forkserver, get_all_start_methods, get_context, resource_tracker
 from multiprocessing.process import BaseProcess, current_process
 from typing import Any
 
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-# By the process that others are forked from.
-PRELOADED = ["holobench_eval.study.run", "holobench_eval.study.executors.imported"]
+PRELOADED = ["holobench_eval.study.executors.imported"]  # by the process that others are forked from
 # Not on Windows, nor where libraries of the system do not bear a fork: every process imports on its own there.
 FORKS = "forkserver" in get_all_start_methods() and sys.platform != "darwin"
 CONTEXT = get_context("forkserver") if FORKS else get_context("spawn")
@@ -25,8 +22,7 @@ def start(function: Callable[..., None], *arguments: Any) -> BaseProcess:
     current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     process = CONTEXT.Process(target=function, args=arguments, daemon=True)
     prepare()
-    with _one_thread():
-        process.start()
+    process.start()
     return process
 
 
@@ -36,8 +32,11 @@ def prepare() -> None:
         return
     CONTEXT.set_forkserver_preload(PRELOADED)
     resource_tracker.ensure_running()  # now, since it lets Ctrl-C through as it starts
-    with _one_thread(), _no_ctrl_c():
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # never seen there, not even in its imports
+    try:
         forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _has_server() -> bool:
@@ -47,28 +46,3 @@ def _has_server() -> bool:
         return False
     server.ensure_running = lambda: None  # would start one
     return True
-
-
-@contextmanager
-def _no_ctrl_c() -> Iterator[None]:
-    """Processes that are started meanwhile never see Ctrl-C, not even as they import; here it waits."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Libraries that a process imports as it starts have one thread each."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

@@ -21,7 +21,7 @@ from ...core.errors import CellError, UserError
 from ...core.hashing import canonical
 from ...core.reads import Seen, recorded
 from ...core.schema import FieldError
-from ...display.traits import BOOLEANS, FLAGS, FUNCTIONS, Traits, traits_of
+from ...display.traits import BOOLEANS, FLAGS, Traits, traits_of
 from ..definition import Isolation, Limits
 from ..versions import AGAIN, method_version
 from . import process
@@ -105,7 +105,7 @@ def traits(name: str, folder: Path) -> Traits:
 
 def _apart(name: str, folder: Path) -> type[Apart]:
     facts = process.process_of(name, folder).facts
-    calls: dict[str, Any] = {name: partialmethod(Apart._call, name) for name in FUNCTIONS if name in facts.functions}
+    calls: dict[str, Any] = {function: partialmethod(Apart._call, function) for function in facts.functions}
     flags = {flag: value for flag, value in facts.flags.items() if flag in FLAGS}  # the process may say anything
     identity = {"file": name, "folder": folder, "__doc__": facts.doc, "refused": facts.refused}
     cls = type(facts.name, (Apart,), {**flags, **calls, **identity})

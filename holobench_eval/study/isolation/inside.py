@@ -198,24 +198,18 @@ def _result(channel: Channel, cls: type[Any], owner: str, device: torch.device, 
 
 
 def _told(error: BaseException, cls: type[Any]) -> dict[str, Any]:
+    """An error as a message, with the last line of the method's own file on the way to it: `` (mine.py, line 7)``."""
+    file = str(getattr(sys.modules.get(cls.__module__), "__file__", None))
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    place = f" ({Path(file).name}, line {lines[-1]})" if lines and not isinstance(error, UserError | CellError) else ""
     fault = [list(error.where), error.at_key] if isinstance(error, FieldError) else None
     text = "".join(traceback.format_exception(error))
-    place = "" if isinstance(error, (UserError, CellError)) else _place(error, cls)
     return {"error": type(error).__name__, "message": f"{error}{place}", "fault": fault, "traceback": text}
-
-
-def _place(error: BaseException, cls: type[Any]) -> str:
-    """`` (mine.py, line 7)``: the last line of the method's own file on the way to an error; empty without one."""
-    with suppress(Exception):  # a stranger's class
-        file = inspect.unwrap(cls.solve).__code__.co_filename
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-        return f" ({Path(file).name}, line {lines[-1]})" if lines else ""
-    return ""
 
 
 def _limit_memory(gib: float) -> None:
     import resource  # not on Windows
 
-    fields = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
-    limit = int(gib * 2**30) + int(fields["VmData"].split()[0]) * 1024  # above what libraries take
+    pages = int(Path("/proc/self/statm").read_text().split()[5])  # of data, those of the libraries
+    limit = int(gib * 2**30) + pages * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))

@@ -24,6 +24,7 @@ from ...core.schema import FieldError
 from ...core.sources import Code
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
+from ...display.traits import Function
 from ..definition import Limits
 from ..executors.processes import CONTEXT, start
 from .handles import answer, known
@@ -48,7 +49,7 @@ class Facts:
     name: str
     doc: str
     flags: dict[str, Any]
-    functions: list[str]
+    functions: list[Function]
     refused: str
     code: Code | None
     seconds: float
