@@ -342,7 +342,7 @@ class StopsTheClock(Attempt):
 
 @dataclass(frozen=True)
 class ReturnsAPromise(Attempt):
-    kind, outcome, reason = "lies about time", "refused", "not a phase"
+    kind, outcome, reason = "lies about time", "refused", "a value is function"
 
     def phase(self, target, bench):
         return lambda: torch.zeros((*target.shape[:2], *bench.spec.shape))
@@ -412,7 +412,7 @@ class Dressed(torch.Tensor):
 
 @dataclass(frozen=True)
 class ReturnsADressedTensor(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "returned Dressed, not a phase"
+    kind, outcome, reason = "poisons records", "refused", "a value is Dressed"
 
     def phase(self, target, bench):
         return torch.zeros((*target.shape[:2], *bench.spec.shape)).as_subclass(Dressed)

@@ -5,15 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
 
 from ...core.errors import UserError, suggest
 from .clusters import Address, Slurm
 from .local import Local
-from .processes import prepare
-
-J = TypeVar("J")
-R = TypeVar("R")
+from .processes import J, R, prepare
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,11 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from ...core.errors import UserError
 from ...core.installed import installing
-from .processes import ONE_THREAD
-
-J = TypeVar("J")
-R = TypeVar("R")
+from .processes import ONE_THREAD, J, R
 
 POLL = 0.02  # s between two looks for results
 ANSWER = 30.0  # s that a scheduler has to answer

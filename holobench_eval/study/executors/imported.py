@@ -2,7 +2,6 @@
 
 import errno
 import os
-from contextlib import suppress
 from importlib import import_module
 from multiprocessing import reduction
 from socket import socket
@@ -10,10 +9,7 @@ from socket import socket
 from .processes import ONE_THREAD
 
 os.environ.update(ONE_THREAD)  # read by libraries as they are imported
-import_module("holobench_eval.study.run")
 import_module("holobench_eval.optics.transfer").kernel()
-with suppress(ImportError):
-    import_module("torch._dynamo")  # by torch's optimisers at their first use, which takes more than a second
 
 _receive = reduction.recvfds
 

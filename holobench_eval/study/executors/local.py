@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from multiprocessing import connection, parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from .processes import CONTEXT, ONE_THREAD, start
-
-J = TypeVar("J")
-R = TypeVar("R")
+from .processes import CONTEXT, ONE_THREAD, J, R, start
 
 ATTEMPTS = 2  # of a job whose worker dies: a second loss is the job's fault
 

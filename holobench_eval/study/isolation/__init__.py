@@ -5,10 +5,10 @@ The harness gets what such a method declares, asks it to solve, and answers what
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from functools import partialmethod
+from functools import partial, partialmethod
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -44,7 +44,7 @@ class Apart:
     def __init__(self, params: Mapping[str, Any], limits: Limits | None = None) -> None:
         self.params = dict(params)
         self.limits = limits or Limits(seconds=process.IMPORT_LIMIT)
-        self._running: process.Call | None = None
+        self._running: Callable[..., Any] | None = None
 
     def _call(self, function: str, *args: Any) -> Any:
         if self._running is not None:
@@ -84,10 +84,11 @@ def opened(method: Any, device: torch.device) -> Iterator[Opened]:
         code = running.facts.code
         if code is not None and code.sha256 != method_version(type(method)):
             raise CellError(f"the code of {method.file} {AGAIN}")
-        with running.opened(device, method.limits) as call:
-            method._running = call
+        with running.opened(device, method.limits) as (pid, channel):
+            seen = Seen()
+            method._running = partial(process.call, channel, seen)
             try:
-                yield Opened(method, call.seen, call.pid)
+                yield Opened(method, seen, pid)
             finally:
                 method._running = None
 

@@ -14,9 +14,8 @@ from ...core.device import moved
 from ...core.errors import BudgetError, CellError, StopError
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench, TrainingImage
-from .messages import Channel, refuse_unsendable
+from .messages import Channel
 
-ERRORS: dict[str, type[CellError]] = {"BudgetError": BudgetError}  # others arrive as a CellError
 CONSTANTS: dict[type[Any], tuple[str, ...]] = {
     MeteredDisplay: ("spec", "budget", "target_name", "target_sha256", "_label", "_target", "_learned"),
     TrainingBench: ("spec", "images", "held_out"),
@@ -42,8 +41,6 @@ def answer(handle: MeteredDisplay | TrainingBench | None, request: Mapping[str, 
         if handle is None or name not in REQUESTS[type(handle)]:
             raise CellError(f"there is no '{name}' here")
         args, value = moved(request["args"], handle.device), getattr(handle, name)
-        if name == "save":
-            refuse_unsendable(args, "what a method saves")
         if callable(value):
             value = value(*args, **request["named"])
         return {"value": value.initial_seed() if isinstance(value, torch.Generator) else value}
@@ -90,7 +87,7 @@ class _Remote:
             self._channel.send({"ask": name, "args": args, "named": named})
             got = self._channel.receive()
         if "error" in got:
-            raise ERRORS.get(got["error"], CellError)(got["message"])
+            raise (BudgetError if got["error"] == "BudgetError" else CellError)(got["message"])
         return moved(got["value"], self.device)
 
     def generator(self, *names: object) -> torch.Generator:

@@ -32,11 +32,10 @@ from ...core.parameters import words
 from ...core.reads import PACKAGE, recorded
 from ...core.schema import FieldError
 from ...display.api import from_numpy
-from ...display.traits import FLAGS, FUNCTIONS
+from ...display.traits import FLAGS, traits_of
 from .handles import SolvingHandle, TrainingHandle
 from .messages import Channel
 
-PICTURES = ("solve", "solve_planes", "predict")  # whose results are arrays of NumPy, too
 # The bench and the harness.
 HIDDEN = tuple(f"{PACKAGE}.{part}" for part in ("display.simulated", "study", "lab", "report", "commands", "testing"))
 HANDLES = {"MeteredDisplay": SolvingHandle, "TrainingBench": TrainingHandle}
@@ -52,23 +51,22 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     began = time.perf_counter()
     try:
         cls, refused = _imported(name, folder)
-    except UserError as error:
-        channel.send(str(error))
-        os._exit(1)
-    _flush()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # the file may have set another one
-    code = None if sources.ships(cls) else sources.code_of(cls)
-    channel.send(
-        {
+        _flush()
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # the file may have set another one
+        code = None if sources.ships(cls) else sources.code_of(cls)
+        facts = {
             "name": cls.__qualname__,
             "doc": inspect.getdoc(cls) or "",
             "flags": {flag: getattr(cls, flag) for flag in FLAGS if hasattr(cls, flag)},
-            "functions": [function for function in FUNCTIONS if callable(getattr(cls, function, None))],
+            "functions": list(traits_of(cls, name).functions),
             "refused": refused,
             "code": code and asdict(code),
             "seconds": time.perf_counter() - began,
         }
-    )
+        channel.send(facts)
+    except (UserError, CellError) as error:
+        channel.send(str(error))
+        os._exit(1)
     with suppress(EOFError, OSError):
         while True:
             number = reduction.recv_handle(control)
@@ -174,7 +172,8 @@ def _call(channel: Channel, cls: type[Any], owner: str, folder: str) -> None:
         try:
             channel.send(told | reads)
         except Exception as error:  # a result that is no message
-            channel.send(_told(error, cls) | reads)
+            refused = CellError(f"what {call['function']} returned: {error}")
+            channel.send(_told(refused, cls) | reads)
     with suppress(EOFError, OSError):
         channel.receive()  # until the harness has read what memory this took
 
@@ -190,11 +189,11 @@ def _result(channel: Channel, cls: type[Any], owner: str, device: torch.device, 
     if "handle" in call:
         args.append(HANDLES[call["handle"]](channel, moved(call["known"], device)))
     result = getattr(method, function)(*args)
-    if function in PICTURES:
-        return from_numpy(result)
     if function == "external":
-        return {name: None if path is None else str(path) for name, path in result.items()}
-    return list(result) if function in ("estimates", "files") else result
+        return {name: path and str(path) for name, path in result.items()}
+    if function == "files":
+        return [str(path) for path in result]
+    return list(result) if function == "estimates" else from_numpy(result)
 
 
 def _told(error: BaseException, cls: type[Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from math import prod
 from multiprocessing.connection import Connection
 from typing import Any
@@ -33,29 +33,11 @@ class GarbledError(CellError):
     """The other side sent what is no message."""
 
 
-@dataclass(frozen=True)
-class Unsendable:
-    """Stands for a value of a type that cannot be sent."""
-
-    type_name: str
-
-
-def refuse_unsendable(value: Any, what: str) -> None:
-    """CellError if a value that was received holds something that could not be sent."""
-    if isinstance(value, Unsendable):
-        raise CellError(f"{what} holds a {value.type_name}; expected tensors, numbers, text, lists or mappings of them")
-    if isinstance(value, Mapping):
-        value = [*value, *value.values()]
-    if isinstance(value, list | tuple):
-        for item in value:
-            refuse_unsendable(item, what)
-
-
 class Channel:
     """An end of a pipe for numbers, text, tensors, lists and mappings of them, and the classes of ``CLASSES``.
 
-    A tensor arrives on the CPU, without its gradient; of any other value arrives the name of its type, ``Unsendable``.
-    Every function raises EOFError or OSError where the other end is gone.
+    A tensor arrives on the CPU, without its gradient. Every function raises EOFError or OSError where the other end is
+    gone.
     """
 
     def __init__(self, connection: Connection) -> None:
@@ -63,7 +45,7 @@ class Channel:
         self.lock = threading.RLock()  # to be held from a request to its answer
 
     def send(self, value: Any) -> None:
-        """Send a value."""
+        """Send a value. CellError, and nothing is sent, for one that holds anything else."""
         tensors: list[Tensor] = []
         header = json.dumps(_plain(value, tensors)).encode()
         with self.lock:
@@ -80,30 +62,22 @@ class Channel:
                 raise
             raise GarbledError(f"no message: {error}") from None
 
-    def close(self) -> None:
-        """Close this end."""
-        self.connection.close()
-
     def _value(self, content: Any) -> Any:
         if not isinstance(content, list):
             return content
         kind, *items = content
         if kind == "tensor":
-            return self._tensor(TYPES[items[0]], items[1])
-        if kind == "unsendable":
-            return Unsendable(str(items[0]))
+            dtype, shape = TYPES[items[0]], items[1]
+            size = prod(shape) * dtype.itemsize
+            if min(shape, default=0) < 0 or size > LARGEST_TENSOR:
+                raise ValueError(f"a tensor of shape {shape}")
+            numbers = np.frombuffer(bytearray(self.connection.recv_bytes(size)), np.uint8)
+            return torch.from_numpy(numbers).view(dtype).clone().reshape(shape)
         if kind == "class":
             return CLASSES[items[0]](**self._value(items[1]))
         if kind == "dict":
             return {self._value(key): self._value(item) for key, item in items}
         return LISTS[kind](self._value(item) for item in items)
-
-    def _tensor(self, dtype: torch.dtype, shape: list[int]) -> Tensor:
-        size = prod(shape) * dtype.itemsize
-        if min(shape, default=0) < 0 or size > LARGEST_TENSOR:
-            raise ValueError(f"a tensor of shape {shape}")
-        content = np.frombuffer(bytearray(self.connection.recv_bytes(size)), np.uint8)
-        return torch.from_numpy(content).view(dtype).clone().reshape(shape)
 
 
 def _plain(value: Any, tensors: list[Tensor]) -> Any:
@@ -125,4 +99,4 @@ def _plain(value: Any, tensors: list[Tensor]) -> Any:
         return ["dict", *([_plain(key, tensors), _plain(item, tensors)] for key, item in value.items())]
     if type(value) is CLASSES.get(name):
         return ["class", name, _plain({field.name: getattr(value, field.name) for field in fields(value)}, tensors)]
-    return ["unsendable", type_name(value)]
+    raise CellError(f"a value is {type_name(value)}; expected tensors, numbers, text, lists or mappings of them")

@@ -8,7 +8,7 @@ import socket
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing import reduction, util
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -29,7 +29,7 @@ from ..definition import Limits
 from ..executors.processes import CONTEXT, start
 from .handles import answer, known
 from .inside import serve
-from .messages import Channel, GarbledError, refuse_unsendable
+from .messages import Channel, GarbledError
 
 KEPT = 32  # processes of methods that stay when they have nothing to do
 IMPORT_LIMIT = 600.0  # seconds that the import of a method's file may take
@@ -59,55 +59,18 @@ FACTS: TypeAdapter[Facts | str] = TypeAdapter(Facts | str)  # a text says why th
 SEEN = TypeAdapter(Seen)
 
 
-@dataclass(frozen=True)
-class Call:
-    """A process that is ready for its calls. pid: its number; seen: what they have read."""
-
-    pid: int
-    channel: Channel
-    seen: Seen = field(default_factory=Seen)
-
-    def __call__(self, function: str, params: dict[str, Any], args: Sequence[Any]) -> Any:
-        """What a method's function returns; meanwhile the display in ``args`` answers its requests.
-
-        An error that the method raises is a CellError with the name and text of its own, unless it is a BudgetError.
-        """
-        handle = next((argument for argument in args if isinstance(argument, Handle)), None)
-        plain = [argument for argument in args if not isinstance(argument, Handle)]
-        given = {} if handle is None else known(handle)
-        self.channel.send({"function": function, "params": params, "args": plain, **given})
-        while True:
-            got = self.channel.receive()
-            if not isinstance(got, dict):
-                raise GarbledError("no mapping")
-            if "ask" not in got:
-                break
-            self.channel.send(answer(handle, got))
-        self.note(got.get("seen"))
-        if "result" not in got:
-            raise _raised(got)
-        if function == "prepare":
-            refuse_unsendable(got["result"], "what prepare returned")
-        return got["result"]
-
-    def note(self, told: Any) -> None:
-        """Add what a call has read. GarbledError for a message that does not say it."""
-        try:
-            self.seen.add(SEEN.validate_python(told))
-        except ValidationError as error:
-            raise GarbledError(f"no reads: {error}") from None
-
-
 class MethodProcess:
     """A process that has imported a method, and forks one for every call.
 
     facts: what the method is. UserError for a method that cannot be imported.
     """
 
-    def __init__(self, name: str, folder: Path) -> None:
+    def __init__(self, name: str, folder: Path, home: Path) -> None:
         ours, theirs = CONTEXT.Pipe()
-        self.control, self.file = Channel(ours), folder / name.rpartition(":")[0]
-        self.process = start(serve, theirs, name, folder, Path.cwd())
+        self.control, self.key, self.file = Channel(ours), (name, folder, home), folder / name.rpartition(":")[0]
+        self.process = start(serve, theirs, name, folder, home)
+        # Before it is asked to end, which a method's file may have forbidden.
+        util.Finalize(None, self.end, exitpriority=100)
         theirs.close()
         ready = wait([ours, self.process.sentinel], IMPORT_LIMIT)  # others of its processes may hold the pipe
         try:
@@ -136,25 +99,17 @@ class MethodProcess:
         """Kill the process."""
         self.process.kill()
         self.process.join()
-        self.control.close()
+        self.control.connection.close()
 
     @contextmanager
-    def opened(self, device: torch.device, limits: Limits) -> Iterator[Call]:
-        """A process for one call, which ends with the context: on a device, with as many threads as this one.
+    def opened(self, device: torch.device, limits: Limits) -> Iterator[tuple[int, Channel]]:
+        """The number of a process that is ready for its calls, and the way to it (see ``call``); it ends with the
+        context. It computes on a device, with as many threads as this one.
 
         CellError where it ends by itself, sends what is no answer, or reaches a limit.
         """
         ours, theirs = CONTEXT.Pipe()
-        channel, late = Channel(ours), threading.Event()
-        failure: Exception | None = None
-        try:
-            reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
-            pid = self._told()
-        except (EOFError, OSError, GarbledError):
-            self.end()
-            raise CellError("the process that has imported the method does not answer") from None
-        finally:
-            theirs.close()
+        channel, late, pid = Channel(ours), threading.Event(), 0
 
         def stop() -> None:
             late.set()
@@ -164,16 +119,19 @@ class MethodProcess:
         timer = threading.Timer(min(limits.seconds, threading.TIMEOUT_MAX), stop)
         timer.daemon = True
         timer.start()
-        setting = {"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib}
+        failure: Exception | None = None
         try:
-            channel.send(setting)
+            with theirs:
+                reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
+            pid = self._told()
+            channel.send({"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib})
             channel.receive()
-            yield Call(pid, channel)
+            yield pid, channel
         except (EOFError, OSError, GarbledError) as error:
             failure = error
         finally:
             timer.cancel()
-            channel.close()
+            ours.close()
             ending = self._ending(pid)
         if failure is not None and late.is_set():
             raise CellError(f"took more than {limits.seconds:g} s, the limit of the study")
@@ -182,22 +140,51 @@ class MethodProcess:
             raise CellError(f"the process of the method {what}")
 
     def _told(self) -> int:
-        """A number that the process tells. EOFError where it does not in time."""
+        """A number that the process tells. EOFError where it does not in time, which ends it."""
         if not self.control.connection.poll(ANSWER_LIMIT):
+            self.end()
             raise EOFError
         return int(self.control.receive())
 
     def _ending(self, pid: int) -> str:
-        """End a call; in words, how it did by itself."""
+        """End a call, and say how it ended by itself. pid: 0 for one that has not begun."""
         try:
             self.control.send("end")
             status = self._told()
         except (EOFError, OSError, GarbledError):
-            with suppress(OSError):
-                os.killpg(pid, signal.SIGKILL)
             self.end()
+            if pid:
+                with suppress(OSError):
+                    os.killpg(pid, signal.SIGKILL)
             return "has ended the process that it came from"
         return f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with exit code {status}"
+
+
+def call(channel: Channel, seen: Seen, function: str, params: dict[str, Any], args: Sequence[Any]) -> Any:
+    """What a method's function returns; meanwhile the display in ``args`` answers its requests, and what is read
+    is added to ``seen``.
+
+    An error that the method raises is a CellError with the name and text of its own, unless it is a BudgetError.
+    GarbledError for what is no message, or does not say what was read.
+    """
+    handle = next((argument for argument in args if isinstance(argument, Handle)), None)
+    plain = [argument for argument in args if not isinstance(argument, Handle)]
+    given = {} if handle is None else known(handle)
+    channel.send({"function": function, "params": params, "args": plain, **given})
+    while True:
+        got = channel.receive()
+        if not isinstance(got, dict):
+            raise GarbledError("no mapping")
+        if "ask" not in got:
+            break
+        channel.send(answer(handle, got))
+    try:
+        seen.add(SEEN.validate_python(got.get("seen")))
+    except ValidationError as error:
+        raise GarbledError(f"no reads: {error}") from None
+    if "result" not in got:
+        raise _raised(got)
+    return got["result"]
 
 
 def _raised(told: dict[str, Any]) -> Exception:
@@ -211,25 +198,16 @@ def _raised(told: dict[str, Any]) -> Exception:
     return error
 
 
-_processes: dict[tuple[object, ...], MethodProcess] = {}
+_processes: list[MethodProcess] = []  # the last one is that which was used last
 
 
 def process_of(name: str, folder: Path) -> MethodProcess:
     """The process of a method, the same one while its code and the Python files beside it stay as they are."""
     key = (name, folder, Path.cwd())
-    if key in _processes and not _processes[key].is_current():
-        former = _processes.pop(key)
-        _processes[(*key, id(former))] = former  # a call may still run in it
-    _processes[key] = _processes.pop(key) if key in _processes else MethodProcess(name, folder)
-    while len(_processes) > KEPT:
-        _processes.pop(next(iter(_processes))).end()  # that whose last use is longest ago
-    return _processes[key]
-
-
-def _end_all() -> None:
-    for process in _processes.values():
-        process.end()
-
-
-# Before they are asked to end, which a method's file may have forbidden.
-util.Finalize(None, _end_all, exitpriority=100)
+    found = next((process for process in _processes if process.key == key and process.is_current()), None)
+    if found is not None:
+        _processes.remove(found)
+    _processes.append(found or MethodProcess(*key))
+    if len(_processes) > KEPT:
+        _processes.pop(0).end()
+    return _processes[-1]
