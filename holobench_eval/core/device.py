@@ -12,7 +12,6 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from torch import Tensor
 
 from .allocator import keep_freed_memory
 from .errors import UserError
@@ -53,8 +52,9 @@ def gpu_name(device: torch.device) -> str:
 
 
 def moved(value: Any, device: torch.device) -> Any:
-    """Tensors, or mappings and lists of them, on a device; where nothing has to move, the very same value."""
-    if isinstance(value, Tensor):
+    """Tensors and what else can go ``to`` a device, or mappings and lists of them, on it; where nothing has to move,
+    the very same value."""
+    if hasattr(value, "to"):
         return value.to(device)
     if isinstance(value, Mapping):
         mapping = {key: moved(item, device) for key, item in value.items()}

@@ -6,6 +6,7 @@ import itertools
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import torch
@@ -28,6 +29,10 @@ class TrainingImage:
 
     item: str
     target: Tensor
+
+    def to(self, device: torch.device) -> TrainingImage:
+        """The same on a device."""
+        return TrainingImage(self.item, self.target.to(device))
 
 
 class Memory(Protocol):
@@ -74,7 +79,7 @@ class TrainingBench:
         self._memory = memory
         self._account = Account(label, budget, " for training", journal)
         self._seed = seed
-        self._known = known or {}
+        self._known = known
         self._spent = 0.0
         self._started = time.perf_counter()
 
@@ -104,10 +109,9 @@ class TrainingBench:
 
     def solved(self, method: Solver, image: TrainingImage) -> Tensor:
         """The phase ``(C, H, W)`` [rad] of an image by another method; see ``MeteredDisplay.solved``."""
-        known = self._known.get(image.item)
-        if known is None:
-            return method.solve(image.target[None], self)[0]
-        return known(method, lambda: method.solve(image.target[None], self))[0]
+        solve = partial(method.solve, image.target[None], self)
+        known = (self._known or {}).get(image.item)
+        return (known(method, solve) if known else solve())[0]
 
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on the study's seed and ``names``."""

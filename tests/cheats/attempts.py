@@ -61,7 +61,7 @@ class Beside(Attempt):
 
 @dataclass(frozen=True)
 class AsksForTheSimulation(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "isolation: none"
+    kind, outcome, reason = "reads the bench", "refused", "privileged = True"
 
     def cheat(self, target, bench):
         bench.simulation.expected(self.phase(target, bench)[0], target[0])
@@ -69,7 +69,7 @@ class AsksForTheSimulation(Attempt):
 
 @dataclass(frozen=True)
 class AsksForOtherHolograms(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "isolation: none"
+    kind, outcome, reason = "reads the bench", "refused", "privileged = True"
 
     def cheat(self, target, bench):
         return bench.starts
@@ -272,9 +272,9 @@ class CopiesTheHandle(Photographer):
 @dataclass(frozen=True)
 class MakesAnotherHandle(Photographer):
     def cheat(self, target, bench):
-        known = {"spec": bench.spec, "budget": None, "label": "", "target": target, "learned": None}
+        known = {"spec": bench.spec, "budget": None, "_label": "", "_target": target, "_learned": None}
         known |= {"target_name": "", "target_sha256": ""}
-        handles = [type(bench)(bench._channel, known, bench.device) for _ in range(20)]
+        handles = [type(bench)(bench._channel, known) for _ in range(20)]
         self.photographed(self.phase(target, bench)[0], handles)
 
 
@@ -342,7 +342,7 @@ class StopsTheClock(Attempt):
 
 @dataclass(frozen=True)
 class ReturnsAPromise(Attempt):
-    kind, outcome, reason = "lies about time", "refused", "not a phase"
+    kind, outcome, reason = "lies about time", "refused", "a value is function"
 
     def phase(self, target, bench):
         return lambda: torch.zeros((*target.shape[:2], *bench.spec.shape))
@@ -412,7 +412,7 @@ class Dressed(torch.Tensor):
 
 @dataclass(frozen=True)
 class ReturnsADressedTensor(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "returned Dressed, not a phase"
+    kind, outcome, reason = "poisons records", "refused", "a value is Dressed"
 
     def phase(self, target, bench):
         return torch.zeros((*target.shape[:2], *bench.spec.shape)).as_subclass(Dressed)

@@ -4,7 +4,8 @@ import pytest
 
 from holobench_eval.study.executors.remaining import Kind, Remaining
 
-ROWS = {"slow": 20.0, "quick": 2.0}
+SLOW, QUICK = ("slow", "here"), ("quick", "here")
+ROWS = {SLOW: 20.0, QUICK: 2.0}
 
 
 class Clock:
@@ -25,9 +26,9 @@ def compute(remaining: Remaining, clock: Clock, row: Kind, seconds: float, alone
 
 def test_nothing_is_said_before_anything_is_known() -> None:
     clock = Clock()
-    remaining = Remaining([("slow", False)] * 2, {}, 1, clock)
+    remaining = Remaining([(SLOW, False)] * 2, {}, 1, clock)
     assert remaining.seconds() is None
-    remaining.begins("first", "slow", False)
+    remaining.begins("first", SLOW, False)
     clock.now += 5
     assert remaining.seconds() is None
 
@@ -38,15 +39,15 @@ def test_the_longest_first_do_not_make_the_rest_look_long() -> None:
     for row, seconds in ROWS.items():  # each row once, since none is known; then the longest
         compute(remaining, clock, row, seconds)
     for left in (3, 2, 1, 0):
-        compute(remaining, clock, "slow", ROWS["slow"])
-        assert remaining.seconds() == pytest.approx(left * ROWS["slow"] + 4 * ROWS["quick"])
+        compute(remaining, clock, SLOW, ROWS[SLOW])
+        assert remaining.seconds() == pytest.approx(left * ROWS[SLOW] + 4 * ROWS[QUICK])
 
 
 def test_time_passes_while_a_task_is_at_work_and_never_runs_out() -> None:
     clock = Clock()
-    remaining = Remaining([("slow", False)] * 2, {}, 1, clock)
-    compute(remaining, clock, "slow", 20)
-    remaining.begins("second", "slow", False)
+    remaining = Remaining([(SLOW, False)] * 2, {}, 1, clock)
+    compute(remaining, clock, SLOW, 20)
+    remaining.begins("second", SLOW, False)
     clock.now += 15
     assert remaining.seconds() == pytest.approx(5)
     clock.now += 15
@@ -57,22 +58,22 @@ def test_time_passes_while_a_task_is_at_work_and_never_runs_out() -> None:
 
 def test_to_what_was_measured_before_is_added_what_tasks_cost_beyond_it_after_the_first() -> None:
     clock = Clock()
-    remaining = Remaining([("slow", False)] + [("quick", False)] * 3, ROWS, 1, clock)
+    remaining = Remaining([(SLOW, False)] + [(QUICK, False)] * 3, ROWS, 1, clock)
     assert remaining.seconds() == pytest.approx(20 + 3 * 2)
-    compute(remaining, clock, "quick", 60)
+    compute(remaining, clock, QUICK, 60)
     assert remaining.seconds() == pytest.approx(20 + 2 * 2)
-    compute(remaining, clock, "quick", 3)  # a second more: it is scored, too
+    compute(remaining, clock, QUICK, 3)  # a second more: it is scored, too
     assert remaining.seconds() == pytest.approx(20 + 1 + 3)
-    compute(remaining, clock, "quick", 0.2)
+    compute(remaining, clock, QUICK, 0.2)
     assert remaining.seconds() == pytest.approx(20)  # nothing is taken off
 
 
 def test_only_the_first_tasks_of_the_run_are_left_out_not_those_of_every_row() -> None:
     clock = Clock()
-    remaining = Remaining([("slow", False)] + [("quick", False)] * 3, {}, 1, clock)
-    compute(remaining, clock, "slow", 20)
-    compute(remaining, clock, "quick", 4)
-    compute(remaining, clock, "quick", 2)
+    remaining = Remaining([(SLOW, False)] + [(QUICK, False)] * 3, {}, 1, clock)
+    compute(remaining, clock, SLOW, 20)
+    compute(remaining, clock, QUICK, 4)
+    compute(remaining, clock, QUICK, 2)
     assert remaining.seconds() == pytest.approx(3)
 
 
@@ -88,12 +89,12 @@ def test_tasks_may_begin_and_end_while_the_time_left_is_looked_up() -> None:
             if looking:
                 turns += 1
                 for part in ("ended", "begun"):
-                    remaining.begins(f"{turns} {part}", f"{turns} {part}", False)
+                    remaining.begins(f"{turns} {part}", (f"{turns} {part}", "here"), False)
                 remaining.ends(f"{turns} ended")
             return super().__hash__()
 
     clock = Clock()
-    rows = {row: Interrupted(row) for row in ("first", "done", "at work", "waiting")}
+    rows: dict[str, Kind] = {row: (Interrupted(row), "here") for row in ("first", "done", "at work", "waiting")}
     remaining = Remaining([(row, False) for row in rows.values()], {}, 1, clock)
     compute(remaining, clock, rows["first"], 1)
     compute(remaining, clock, rows["done"], 1)
@@ -105,29 +106,29 @@ def test_tasks_may_begin_and_end_while_the_time_left_is_looked_up() -> None:
 
 def test_workers_share_what_is_left_but_for_a_long_task_and_those_that_run_alone() -> None:
     clock = Clock()
-    remaining = Remaining([("slow", False)] * 4 + [("slow", True)], ROWS, 2, clock)
+    remaining = Remaining([(SLOW, False)] * 4 + [(SLOW, True)], ROWS, 2, clock)
     assert remaining.seconds() == pytest.approx(2 * 20 + 20)
-    remaining.begins(0, "slow", False)
-    remaining.begins(1, "slow", False)
+    remaining.begins(0, SLOW, False)
+    remaining.begins(1, SLOW, False)
     clock.now += 20
     remaining.ends(0)
     remaining.ends(1)
-    remaining.begins(2, "slow", False)
+    remaining.begins(2, SLOW, False)
     assert remaining.seconds() == pytest.approx(20 + 20)
-    remaining.begins(3, "slow", False)
+    remaining.begins(3, SLOW, False)
     clock.now += 20
     remaining.ends(2)
     remaining.ends(3)
-    compute(remaining, clock, "slow", 20, alone=True)
+    compute(remaining, clock, SLOW, 20, alone=True)
     assert remaining.seconds() == 0
 
 
 def test_the_first_task_of_a_worker_also_loads_libraries_and_does_not_count() -> None:
     clock = Clock()
-    remaining = Remaining([("quick", False)] * 4, {}, 1, clock)
-    compute(remaining, clock, "quick", 30)
+    remaining = Remaining([(QUICK, False)] * 4, {}, 1, clock)
+    compute(remaining, clock, QUICK, 30)
     assert remaining.seconds() == pytest.approx(3 * 30)  # nothing better is known
-    compute(remaining, clock, "quick", 2)
+    compute(remaining, clock, QUICK, 2)
     assert remaining.seconds() == pytest.approx(2 * 2)
 
 
@@ -145,23 +146,23 @@ def test_a_method_costs_on_each_display_what_it_took_there() -> None:
 
 def test_a_method_without_any_cost_makes_the_time_a_lower_limit_and_does_not_pass_for_another() -> None:
     clock = Clock()
-    remaining = Remaining([("slow", False)] * 2 + [("quick", False)] * 3, {}, 1, clock)
+    remaining = Remaining([(SLOW, False)] * 2 + [(QUICK, False)] * 3, {}, 1, clock)
     assert not remaining.is_whole()
-    compute(remaining, clock, "quick", 2)
+    compute(remaining, clock, QUICK, 2)
     assert remaining.seconds() == pytest.approx(2 * 2)
     assert not remaining.is_whole()
-    compute(remaining, clock, "slow", 60)
+    compute(remaining, clock, SLOW, 60)
     assert remaining.is_whole()
     assert remaining.seconds() == pytest.approx(2 * 2 + 60)
 
 
 def test_one_outlier_does_not_lengthen_all_others() -> None:
     clock = Clock()
-    names = ("a", "b", "c")
+    names = [(name, "here") for name in "abc"]
     remaining = Remaining([(name, False) for name in names for _ in range(3)], dict.fromkeys(names, 2.0), 1, clock)
-    compute(remaining, clock, "a", 9)  # the first of the run
-    for name, seconds in (("a", 3), ("b", 3), ("c", 63)):
+    compute(remaining, clock, names[0], 9)  # the first of the run
+    for name, seconds in zip(names, (3, 3, 63), strict=True):
         compute(remaining, clock, name, seconds)
     assert remaining.seconds() == pytest.approx(1 * 3 + 2 * 3 + 2 * 63)
-    compute(remaining, clock, "c", 63)
+    compute(remaining, clock, names[2], 63)
     assert remaining.seconds() == pytest.approx(1 * 3 + 2 * 3 + 63)

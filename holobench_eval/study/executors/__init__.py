@@ -5,33 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
 
 from ...core.errors import UserError, suggest
 from .clusters import Address, Slurm
 from .local import Local
-from .processes import prepare
-
-J = TypeVar("J")
-R = TypeVar("R")
-
-
-class Executor(Protocol):
-    """Runs a function over jobs.
-
-    ``map`` takes a job from the iterable when it starts it, and yields (job, result) as results come, in any
-    order; a job whose worker was lost gives the exception instead of a result. None instead of a job: the next job
-    waits for a running one; ask the iterable again after the next result.
-    """
-
-    @property
-    def workers(self) -> int:
-        """Jobs computed side by side."""
-        ...
-
-    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
-        """Results of ``function`` over ``jobs``."""
-        ...
+from .processes import J, R, prepare
 
 
 @dataclass(frozen=True)
@@ -47,6 +25,13 @@ class Serial:
                 yield job, function(job)
 
 
+Executor = Serial | Local | Slurm | Address
+"""Runs a function over jobs, ``workers`` of them side by side.
+
+``map`` takes a job from the iterable when it starts it, and yields (job, result) as results come, in any order; a job
+whose worker was lost gives the exception instead of a result. None instead of a job: the next job waits for a running
+one; ask the iterable again after the next result.
+"""
 NAMES = ("auto", "serial", "local", "slurm", "address")
 ELSEWHERE = ("slurm", "address")  # their workers are on other machines and know their own GPUs
 

@@ -8,39 +8,73 @@ import platform
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from ...core.errors import UserError
 from ...core.installed import installing
-from .processes import ONE_THREAD
+from .processes import ONE_THREAD, J, R
 
-J = TypeVar("J")
-R = TypeVar("R")
-
-WORKER_ENVIRONMENT = {
-    **ONE_THREAD,
-    # Not its profiler, which samples every worker's stack a hundred times a second.
-    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
-    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
-}
 POLL = 0.02  # s between two looks for results
 ANSWER = 30.0  # s that a scheduler has to answer
 GPU = {"GPU": 1}  # resource that a worker with a GPU declares, and that a job on a GPU requests
+# Dask's profiler samples every worker's stack a hundred times a second.
+QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "5s"}
 SETTINGS = {
-    # A worker lost twice on the same job is the job's fault.
-    "distributed.scheduler.allowed-failures": 1,
+    **QUIET,
+    "distributed.scheduler.allowed-failures": 1,  # a worker lost twice on the same job is the job's fault
     "distributed.logging.distributed": "critical",
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.system-monitor.interval": "5s",
 }
 
 
+class _Cluster:
+    """What both kinds share. on_gpu: jobs go only to workers that declare a GPU."""
+
+    on_gpu: bool
+    _client: Callable[[], AbstractContextManager[Any]]
+
+    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
+        """Results as they come; as many jobs are taken as there are workers, so the scheduler never holds a study.
+
+        UserError where there is no scheduler, or where it goes away.
+        """
+        import dask
+
+        home, waiting, running = str(Path.cwd()), iter(jobs), dict[Any, J]()
+        resources = GPU if self.on_gpu else None
+        with dask.config.set(SETTINGS), self._client() as client:
+            while True:
+                while len(running) < self._count(client) and (job := next(waiting, None)) is not None:
+                    with _answering():
+                        future = client.submit(_at_home, home, function, job, pure=False, resources=resources)
+                    running[future] = job
+                if not running:
+                    return
+                done = [future for future in running if future.done()]
+                with _answering():
+                    # Dask cancels what it had; what it is given as it looks for a lost scheduler would wait for ever.
+                    if not done and client.status == "closed":
+                        raise CancelledError
+                    results = [(running.pop(future), future.exception() or future.result()) for future in done]
+                yield from results
+                if not done:
+                    time.sleep(POLL)
+
+    def _usable(self, client: Any) -> dict[str, Any]:
+        """The scheduler's present information on the workers that may have jobs, by name."""
+        workers = client.scheduler_info(n_workers=-1).get("workers", {})  # none of a scheduler that went away
+        return {name: one for name, one in workers.items() if not self.on_gpu or one["resources"].get("GPU", 0) >= 1}
+
+    def _count(self, client: Any) -> int:
+        """The number of usable workers, at least 1 so that a job always waits for the first worker."""
+        return max(1, len(self._usable(client)))
+
+
 @dataclass(frozen=True)
-class Slurm:
+class Slurm(_Cluster):
     """Jobs in worker processes that a SLURM queue starts (dask-jobqueue), a worker a SLURM job.
 
     Queue, memory, cores, walltime and what else the site wants are those of Dask's own configuration
@@ -52,27 +86,29 @@ class Slurm:
     workers: int
     on_gpu: bool = False
 
-    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
-        """Results as they come, from the first worker that the queue starts on. UserError without dask-jobqueue."""
+    @contextmanager
+    def _client(self) -> Iterator[Any]:
         try:
             from dask_jobqueue.slurm import SLURMCluster
         except ImportError:
             raise UserError(f"the executor slurm needs dask-jobqueue: {installing(extra='cluster')}") from None
+        import dask
         from distributed import Client
 
-        with _settings():
-            try:
-                declared = _declared() if self.on_gpu else None  # None: the site's alone
-                cluster = SLURMCluster(processes=1, job_script_prologue=_exports(), worker_extra_args=declared)
-                cluster.scale(jobs=self.workers)  # type: ignore[no-untyped-call]
-            except (ValueError, TypeError) as error:  # a configuration that says too little, or what cannot be
-                raise UserError(f"the SLURM cluster: {error}; see jobqueue.slurm in Dask's configuration") from error
-            with cluster, Client(cluster) as client:  # type: ignore[no-untyped-call]
-                yield from _results(client, lambda: _there(client, self.on_gpu), function, jobs, self.on_gpu)
+        try:
+            declared = None  # the site's alone
+            if self.on_gpu:
+                declared = [*dask.config.get("jobqueue.slurm.worker-extra-args"), "--resources", "GPU=1"]
+            cluster = SLURMCluster(processes=1, job_script_prologue=_exports(), worker_extra_args=declared)
+            cluster.scale(jobs=self.workers)  # type: ignore[no-untyped-call]
+        except (ValueError, TypeError) as error:  # a configuration that says too little, or what cannot be
+            raise UserError(f"the SLURM cluster: {error}; see jobqueue.slurm in Dask's configuration") from error
+        with cluster, Client(cluster) as client:  # type: ignore[no-untyped-call]
+            yield client
 
 
 @dataclass(frozen=True)
-class Address:
+class Address(_Cluster):
     """Jobs on the workers of a Dask scheduler that runs already, which may come and go.
 
     Each worker has one thread (``dask worker --nthreads 1``): torch's settings are those of a process. Folders are as
@@ -86,12 +122,7 @@ class Address:
     def workers(self) -> int:
         """Workers that are there now. UserError: the scheduler does not answer, or has none that can be used."""
         with self._client() as client:
-            return _there(client, self.on_gpu)
-
-    def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
-        """Results as they come."""
-        with _settings(), self._client() as client:
-            yield from _results(client, lambda: _there(client, self.on_gpu), function, jobs, self.on_gpu)
+            return self._count(client)
 
     @contextmanager
     def _client(self) -> Iterator[Any]:
@@ -103,7 +134,7 @@ class Address:
         except (OSError, ValueError, TimeoutError) as error:
             raise UserError(f"no Dask scheduler answers at '{self.address}' (like tcp://host:8786)") from error
         with client:
-            workers = _usable(client, self.on_gpu)
+            workers = self._usable(client)
             several = [name for name, worker in workers.items() if worker["nthreads"] != 1]
             if several:
                 raise UserError(f"worker {several[0]} has several threads; start workers with --nthreads 1")
@@ -115,29 +146,6 @@ class Address:
             yield client
 
 
-def _usable(client: Any, on_gpu: bool) -> dict[str, Any]:
-    """The scheduler's present information on its workers, by name; on_gpu: only of those that declare a GPU."""
-    workers = client.scheduler_info(n_workers=-1).get("workers", {})  # none of a scheduler that went away
-    return {
-        name: worker
-        for name, worker in workers.items()
-        if not on_gpu or worker["resources"].get("GPU", 0) >= GPU["GPU"]
-    }
-
-
-def _there(client: Any, on_gpu: bool) -> int:
-    """The number of usable workers, at least 1 so that a job always waits for the first worker."""
-    return max(1, len(_usable(client, on_gpu)))
-
-
-@contextmanager
-def _settings() -> Iterator[None]:
-    import dask
-
-    with dask.config.set(SETTINGS):
-        yield
-
-
 def _at_home(home: str, function: Callable[[J], R], job: J) -> R:
     """The result of a job, whose relative paths start in the folder ``home``, wherever its worker was started."""
     try:
@@ -145,41 +153,6 @@ def _at_home(home: str, function: Callable[[J], R], job: J) -> R:
     except OSError as error:
         raise UserError(f"the worker on {platform.node()} does not see the folder {home}: {error.strerror}") from error
     return function(job)
-
-
-def _results(
-    client: Any, workers: Callable[[], int], function: Callable[[J], R], jobs: Iterable[J | None], on_gpu: bool
-) -> Iterator[tuple[J, R | Exception]]:
-    """Results as they come; as many jobs are taken as there are workers, so the scheduler never holds a whole study."""
-    from distributed import as_completed
-
-    home, waiting = str(Path.cwd()), iter(jobs)
-    running: dict[Any, J] = {}
-    completed = as_completed()  # type: ignore[no-untyped-call]
-
-    def fill() -> None:
-        while len(running) < workers() and (job := next(waiting, None)) is not None:
-            with _answering():
-                future = client.submit(_at_home, home, function, job, pure=False, resources=GPU if on_gpu else None)
-                running[future] = job
-                completed.add(future)  # type: ignore[no-untyped-call]
-
-    fill()
-    while running:
-        with _answering():
-            done = completed.next_batch(block=False)  # type: ignore[no-untyped-call]
-            # Dask cancels what it had; what it is given while it looks for a lost scheduler would wait for ever.
-            if not done and client.status == "closed":
-                raise CancelledError
-        if not done:
-            time.sleep(POLL)
-        for future in done:
-            job = running.pop(future)
-            with _answering():
-                error = future.exception()
-                result = error if error is not None else future.result()
-            yield job, result
-            fill()
 
 
 @contextmanager
@@ -196,12 +169,6 @@ def _answering() -> Iterator[None]:
 
 
 def _exports() -> list[str]:
-    """Lines of a job script that give a worker one thread."""
-    return [f"export {name}={value}" for name, value in WORKER_ENVIRONMENT.items()]
-
-
-def _declared() -> list[str]:
-    """Arguments of a worker that has a GPU, the site's own before them."""
-    import dask
-
-    return [*dask.config.get("jobqueue.slurm.worker-extra-args"), "--resources", "GPU=1"]
+    """Lines of a job script that give a worker one thread, and keep Dask quiet."""
+    names = {f"DASK_{key.upper().replace('-', '_').replace('.', '__')}": value for key, value in QUIET.items()}
+    return [f"export {name}={value}" for name, value in {**ONE_THREAD, **names}.items()]

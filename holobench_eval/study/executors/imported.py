@@ -1,16 +1,15 @@
 """What the process that workers are forked from imports before: what they need, and what lets it live on."""
 
 import errno
-from contextlib import suppress
+import os
 from importlib import import_module
 from multiprocessing import reduction
 from socket import socket
 
-from ...optics.transfer import kernel
+from .processes import ONE_THREAD
 
-kernel()
-with suppress(ImportError):
-    import_module("torch._dynamo")  # by torch's optimisers at their first use, which takes more than a second
+os.environ.update(ONE_THREAD)  # read by libraries as they are imported
+import_module("holobench_eval.optics.transfer").kernel()
 
 _receive = reduction.recvfds
 

@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from multiprocessing import connection, parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
-from .processes import CONTEXT, ONE_THREAD, start
-
-J = TypeVar("J")
-R = TypeVar("R")
+from .processes import CONTEXT, ONE_THREAD, J, R, start
 
 ATTEMPTS = 2  # of a job whose worker dies: a second loss is the job's fault
 
@@ -39,7 +36,7 @@ class Local:
     def map(self, function: Callable[[J], R], jobs: Iterable[J | None]) -> Iterator[tuple[J, R | Exception]]:
         """Results as they come. No more jobs are taken than there are workers."""
         waiting = iter(jobs)
-        crew = [_Worker[J](function, number, self.gpus) for number in range(self.workers)]
+        crew = [_Worker(function, number, self.gpus) for number in range(self.workers)]
         try:
             while True:
                 for worker in crew:
@@ -55,14 +52,15 @@ class Local:
                 worker.end()
 
 
-class _Worker(Generic[J]):
+class _Worker:
     """A process, the parent's end of its channel, the job it has (None: it is idle) and how often it was lost on it."""
+
+    job: Any = None
+    lost = 0
 
     def __init__(self, function: Callable[[J], Any], number: int, gpus: int) -> None:
         own = {"CUDA_VISIBLE_DEVICES": one_gpu(number, gpus)} if gpus > 1 else {}
         self.arguments = (function, {**os.environ, **ONE_THREAD, **own}, Path.cwd())
-        self.job: J | None = None
-        self.lost = 0
         self._begin()
 
     def _begin(self) -> None:
@@ -70,16 +68,14 @@ class _Worker(Generic[J]):
         self.process = start(_serve, theirs, *self.arguments)
         theirs.close()
 
-    def take(self, job: J) -> None:
+    def take(self, job: Any) -> None:
         """Start a job."""
         self.job = job
         with suppress(BrokenPipeError):  # a dead worker, which ``results`` sees
             self.channel.send(job)
 
-    def results(self) -> Iterator[tuple[J, Any]]:
+    def results(self) -> Iterator[tuple[Any, Any]]:
         """The job and its result; nothing where the worker died and another one has the job now."""
-        job = self.job
-        assert job is not None
         try:
             result = self.channel.recv()
         except (EOFError, ConnectionResetError):
@@ -87,10 +83,10 @@ class _Worker(Generic[J]):
             self.end()
             self._begin()
             if self.lost < ATTEMPTS:
-                self.take(job)
+                self.take(self.job)
                 return
             result = KilledWorkerError(f"its worker process died, {ATTEMPTS} times")
-        self.job, self.lost = None, 0
+        job, self.job, self.lost = self.job, None, 0
         yield job, result
 
     def end(self) -> None:
@@ -131,7 +127,5 @@ def one_gpu(number: int, gpus: int) -> str:
 
 
 def _die_with_the_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
+    parent_process().join()  # type: ignore[union-attr]
     os._exit(1)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from multiprocessing import forkserver, get_all_start_methods, get_context, resource_tracker
 from multiprocessing.process import BaseProcess, current_process
-from typing import Any
+from typing import Any, TypeVar
 
+J = TypeVar("J")  # a job
+R = TypeVar("R")  # its result
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-# By the process that others are forked from.
-PRELOADED = ["holobench_eval.study.run", "holobench_eval.study.executors.imported"]
+# By the process that others are forked from; torch's optimisers import the last at their first use, in over a second.
+PRELOADED = ["holobench_eval.study.executors.imported", "holobench_eval.study.run", "torch._dynamo"]
 # Not on Windows, nor where libraries of the system do not bear a fork: every process imports on its own there.
 FORKS = "forkserver" in get_all_start_methods() and sys.platform != "darwin"
 CONTEXT = get_context("forkserver") if FORKS else get_context("spawn")
@@ -25,50 +25,21 @@ def start(function: Callable[..., None], *arguments: Any) -> BaseProcess:
     current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     process = CONTEXT.Process(target=function, args=arguments, daemon=True)
     prepare()
-    with _one_thread():
-        process.start()
+    process.start()
     return process
 
 
 def prepare() -> None:
     """Start the process that workers are forked from, where it does not run; its imports take more than a second."""
-    if not FORKS or _has_server():
-        return
-    CONTEXT.set_forkserver_preload(PRELOADED)
-    resource_tracker.ensure_running()  # now, since it lets Ctrl-C through as it starts
-    with _one_thread(), _no_ctrl_c():
-        forkserver.ensure_running()
-
-
-def _has_server() -> bool:
-    """Whether this process was forked by a server, which then serves it, too: one of its own would import all again."""
     server: Any = forkserver._forkserver
-    if server._forkserver_pid is not None or server._forkserver_address is None:
-        return False
-    server.ensure_running = lambda: None  # would start one
-    return True
-
-
-@contextmanager
-def _no_ctrl_c() -> Iterator[None]:
-    """Processes that are started meanwhile never see Ctrl-C, not even as they import; here it waits."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Libraries that a process imports as it starts have one thread each."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+    if server._forkserver_pid is None and server._forkserver_address is not None:
+        # Forked by a server, which serves this process, too: one of its own would import all again.
+        server.ensure_running = lambda: None
+    elif FORKS:
+        CONTEXT.set_forkserver_preload(PRELOADED)
+        resource_tracker.ensure_running()  # now, since it lets Ctrl-C through as it starts
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # never seen there, not even in its imports
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)

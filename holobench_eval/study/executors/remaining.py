@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from statistics import mean, median
 
-Kind = str | tuple[str, str]  # the method of a task, and the display where methods cost more on one than on another
+Kind = tuple[str, str]  # the method of a task, and its display, since a method may cost more on one than on another
 
 
 class Remaining:
@@ -55,12 +55,12 @@ class Remaining:
         """The time left [s], without that of methods of which no cost is known (see `is_whole`); None while nothing is
         known of any cost. Any thread may ask while others count."""
         cost = self._costs()
-        if cost is None:
+        if not cost:
             return None
         now, waiting = self._clock(), list(self._waiting.items())
-        at_work = [max(0.0, (cost(kind) or 0.0) - (now - begun)) for kind, begun, _ in list(self._begun.values())]
-        shared = sum((cost(kind) or 0.0) * count for (kind, alone), count in waiting if not alone) + sum(at_work)
-        by_itself = sum((cost(kind) or 0.0) * count for (kind, alone), count in waiting if alone)
+        at_work = [max(0.0, cost.get(kind, 0.0) - (now - begun)) for kind, begun, _ in list(self._begun.values())]
+        shared = sum(cost.get(kind, 0.0) * count for (kind, alone), count in waiting if not alone) + sum(at_work)
+        by_itself = sum(cost.get(kind, 0.0) * count for (kind, alone), count in waiting if alone)
         return max(shared / max(self._workers, len(at_work)), *at_work, 0.0) + by_itself
 
     def is_whole(self) -> bool:
@@ -68,28 +68,18 @@ class Remaining:
         cost = self._costs()
         left = [kind for (kind, _), count in list(self._waiting.items()) if count > 0]
         left += [kind for kind, _, _ in list(self._begun.values())]
-        return cost is not None and all(cost(kind) is not None for kind in left)
+        return bool(cost) and cost.keys() >= set(left)
 
-    def _costs(self) -> Callable[[Kind], float | None] | None:
+    def _costs(self) -> dict[Kind, float]:
         """Seconds of a task of a kind: as in this run, else as known and what is added, else the mean of those of its
-        method on other displays; None for a method without any."""
+        method on other displays; nothing for a method without any."""
         # A worker's first task also loads libraries and registers the display: it counts where nothing else is known.
         first, seen = ({kind: mean(taken) for kind, taken in list(by.items())} for by in (self._first, self._taken))
         added = [seconds - self._known[kind] for kind, seconds in seen.items() if kind in self._known]
         more = max(0.0, median(added)) if added else 0.0
         costs = first | {kind: seconds + more for kind, seconds in self._known.items()} | seen
-        if not costs:
-            return None
         methods = defaultdict[str, list[float]](list)
-        for kind, seconds in costs.items():
-            methods[_method(kind)].append(seconds)
-
-        def cost(kind: Kind) -> float | None:
-            elsewhere = methods.get(_method(kind))
-            return costs.get(kind, mean(elsewhere) if elsewhere else None)
-
-        return cost
-
-
-def _method(kind: Kind) -> str:
-    return kind if isinstance(kind, str) else kind[0]
+        for (method, _), seconds in costs.items():
+            methods[method].append(seconds)
+        elsewhere = {kind: mean(methods[kind[0]]) for kind, _ in list(self._waiting) if kind[0] in methods}
+        return elsewhere | costs

@@ -5,9 +5,10 @@ The harness gets what such a method declares, asks it to solve, and answers what
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial, partialmethod
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,27 +21,13 @@ from ...core.errors import CellError, UserError
 from ...core.hashing import canonical
 from ...core.reads import Seen, recorded
 from ...core.schema import FieldError
-from ...display.traits import BOOLEANS, FLAGS, FUNCTIONS, Traits, traits_of
+from ...display.traits import BOOLEANS, FLAGS, Traits, traits_of
 from ..definition import Isolation, Limits
 from ..versions import AGAIN, method_version
 from . import process
-from .reads import NOTHING, Reads, changed, reads_of
-
-__all__ = [
-    "Apart",
-    "Opened",
-    "Reads",
-    "build",
-    "changed",
-    "find",
-    "imports",
-    "opened",
-    "params_of",
-    "runs_inside",
-    "solver",
-    "traits",
-    "words",
-]
+from .reads import Reads as Reads
+from .reads import changed as changed
+from .reads import reads_of
 
 
 class Apart:
@@ -57,36 +44,31 @@ class Apart:
     def __init__(self, params: Mapping[str, Any], limits: Limits | None = None) -> None:
         self.params = dict(params)
         self.limits = limits or Limits(seconds=process.IMPORT_LIMIT)
-        self._opened: Opened | None = None
+        self._running: Callable[..., Any] | None = None
 
     def _call(self, function: str, *args: Any) -> Any:
-        if self._opened is not None and self._opened.call is not None:
-            return process.call(self._opened.call, function, self.params, args)
-        handle = next((argument for argument in args if isinstance(argument, process.Handle)), None)
-        with opened(self, CPU if handle is None else handle.device):
+        if self._running is not None:
+            return self._running(function, self.params, args)
+        device = next((argument.device for argument in args if isinstance(argument, process.Handle)), CPU)
+        with opened(self, device):
             return self._call(function, *args)
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A method that is ready for its calls. seen: what they have opened so far; call: its process, None for a method
-    that runs inside."""
+    """A method that is ready for its calls. seen: what they have opened so far; pid: the number of its process, None
+    for a method that runs inside."""
 
     method: Any
     seen: Seen
-    call: process.Call | None = None
-
-    @property
-    def pid(self) -> int | None:
-        """The number of its process."""
-        return None if self.call is None else self.call.pid
+    pid: int | None = None
 
     @property
     def reads(self) -> Reads:
         """What a user's code has read so far; nothing for a method of this package, which declares it."""
         cls = type(self.method)
         if sources.ships(cls):
-            return NOTHING
+            return Reads({}, ())
         code = sources.code_of(cls)
         return reads_of(self.seen.of_the_method(code.folder), params_of(self.method), code)
 
@@ -97,18 +79,18 @@ def opened(method: Any, device: torch.device) -> Iterator[Opened]:
     if not isinstance(method, Apart):
         with nullcontext(Seen()) if sources.ships(type(method)) else recorded() as seen:
             yield Opened(method, seen)
-    elif method._opened is not None:
-        yield method._opened
     else:
         running = process.process_of(method.file, method.folder)
-        if running.code is not None and running.code.sha256 != method_version(type(method)):
+        code = running.facts.code
+        if code is not None and code.sha256 != method_version(type(method)):
             raise CellError(f"the code of {method.file} {AGAIN}")
-        with running.opened(device, method.limits) as call:
-            method._opened = Opened(method, call.seen, call)
+        with running.opened(device, method.limits) as (pid, channel):
+            seen = Seen()
+            method._running = partial(process.call, channel, seen)
             try:
-                yield method._opened
+                yield Opened(method, seen, pid)
             finally:
-                method._opened = None
+                method._running = None
 
 
 def find(name: str, folder: Path) -> type[Any]:
@@ -123,25 +105,15 @@ def traits(name: str, folder: Path) -> Traits:
 
 
 def _apart(name: str, folder: Path) -> type[Apart]:
-    described = process.process_of(name, folder)
-    facts = described.facts
-    functions: dict[str, Any] = {
-        function: _calling(function) for function in FUNCTIONS if function in facts["functions"]
-    }
-    flags = {name: value for name, value in facts["flags"].items() if name in FLAGS}  # the process may say anything
-    identity = {"file": name, "folder": folder, "__doc__": facts["doc"], "refused": str(facts["refused"])}
-    cls = type(facts["name"], (Apart,), {**flags, **functions, **identity})
+    facts = process.process_of(name, folder).facts
+    calls: dict[str, Any] = {function: partialmethod(Apart._call, function) for function in facts.functions}
+    flags = {flag: value for flag, value in facts.flags.items() if flag in FLAGS}  # the process may say anything
+    identity = {"file": name, "folder": folder, "__doc__": facts.doc, "refused": facts.refused}
+    cls = type(facts.name, (Apart,), {**flags, **calls, **identity})
     traits_of(cls, name)  # UserError for a flag that is neither True nor False
-    if described.code is not None:
-        sources.remember(cls, replace(described.code, study=str(folder.absolute())))
+    if facts.code is not None:
+        sources.remember(cls, replace(facts.code, study=str(folder.absolute())))
     return cls
-
-
-def _calling(function: str) -> Any:
-    def call(self: Apart, *args: Any) -> Any:
-        return self._call(function, *args)
-
-    return call
 
 
 def build(name: str, params: Mapping[str, Any], folder: Path) -> Any:
@@ -188,7 +160,7 @@ def solver(name: str, params: Mapping[str, Any], folder: Path, isolation: Isolat
 def imports(names: Iterable[str], folder: Path) -> dict[str, float]:
     """Seconds that the import of methods that do not ship with the package took, outside the clock of their cells."""
     return {
-        name: round(process.process_of(name, folder).seconds, 2)
+        name: round(process.process_of(name, folder).facts.seconds, 2)
         for name in dict.fromkeys(names)
         if not plugins.is_shipped("methods", name)
     }

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import wraps
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from ...core.device import CPU, moved
-from ...core.errors import BudgetError, CellError
-from ...display.api import DisplaySpec, Simulation, white_irradiance
-from ...display.metered import MeteredDisplay, Solver
-from ...display.training import TrainingBench, TrainingImage, Value
-from .messages import Channel, refuse_unsendable
+from ...core.device import moved
+from ...core.errors import BudgetError, CellError, StopError
+from ...display.metered import MeteredDisplay
+from ...display.training import TrainingBench, TrainingImage
+from .messages import Channel
 
-ERRORS: dict[str, type[CellError]] = {"BudgetError": BudgetError}  # others arrive as a CellError
 CONSTANTS: dict[type[Any], tuple[str, ...]] = {
     MeteredDisplay: ("spec", "budget", "target_name", "target_sha256", "_label", "_target", "_learned"),
     TrainingBench: ("spec", "images", "held_out"),
@@ -36,19 +34,20 @@ def known(handle: MeteredDisplay | TrainingBench) -> dict[str, Any]:
     return {"handle": type(handle).__name__, "known": constants}
 
 
-def answer(
-    handle: MeteredDisplay | TrainingBench | None, name: str, args: Sequence[Any], named: Mapping[str, Any]
-) -> Any:
-    """What a handle says to a request. CellError for a request that no method may make."""
-    if handle is None or name not in REQUESTS[type(handle)]:
-        raise CellError(f"there is no '{name}' here")
-    if name == "save":
-        refuse_unsendable(args, "what a method saves")
-    value = getattr(handle, name)
-    if not callable(value):
-        return value
-    value = value(*args, **named)
-    return value.initial_seed() if isinstance(value, torch.Generator) else value
+def answer(handle: MeteredDisplay | TrainingBench | None, request: Mapping[str, Any]) -> dict[str, Any]:
+    """What a handle says to a request: a value, or an error for the method to see, such as where none may ask that."""
+    name = str(request["ask"])
+    try:
+        if handle is None or name not in REQUESTS[type(handle)]:
+            raise CellError(f"there is no '{name}' here")
+        args, value = moved(request["args"], handle.device), getattr(handle, name)
+        if callable(value):
+            value = value(*args, **request["named"])
+        return {"value": value.initial_seed() if isinstance(value, torch.Generator) else value}
+    except StopError:
+        raise
+    except Exception as error:
+        return {"error": type(error).__name__, "message": str(error)}
 
 
 def _request(name: str, member: Any) -> Any:
@@ -66,20 +65,21 @@ def _request(name: str, member: Any) -> Any:
 
 
 class _Remote:
-    """What both handles share. of: the handle that one stands for; device: where the method computes."""
+    """What both handles have in the place of a display: constants, and requests to the process that holds it."""
 
-    spec: DisplaySpec
+    device: Any
+    _known: Any = None
+    _privileged = False
 
     def __init_subclass__(cls, of: type[Any]) -> None:
         for name in CONSTANTS[of]:
-            setattr(cls, name, None)  # each object has its own; here so that ``dir`` of the class shows it
+            setattr(cls, name, None)  # in the place of a property; each object has its own
         for name in REQUESTS[of]:
-            if not hasattr(cls, name):
+            if not hasattr(_Remote, name) and name not in vars(cls):
                 setattr(cls, name, _request(name, getattr(of, name)))
 
-    def __init__(self, channel: Channel, known: Mapping[str, Any], device: torch.device) -> None:
-        vars(self).update(known)
-        self.device = device
+    def __init__(self, channel: Channel, constants: Mapping[str, Any]) -> None:
+        vars(self).update(constants)
         self._channel = channel
 
     def _ask(self, name: str, /, *args: Any, **named: Any) -> Any:
@@ -87,7 +87,7 @@ class _Remote:
             self._channel.send({"ask": name, "args": args, "named": named})
             got = self._channel.receive()
         if "error" in got:
-            raise ERRORS.get(got["error"], CellError)(got["message"])
+            raise (BudgetError if got["error"] == "BudgetError" else CellError)(got["message"])
         return moved(got["value"], self.device)
 
     def generator(self, *names: object) -> torch.Generator:
@@ -95,56 +95,12 @@ class _Remote:
         return torch.Generator().manual_seed(self._ask("generator", *map(str, names)))
 
 
-class SolvingHandle(_Remote, of=MeteredDisplay):
+class SolvingHandle(_Remote, MeteredDisplay, of=MeteredDisplay):
     """``MeteredDisplay`` at a distance: the same names, arguments and errors."""
 
-    _label: str
-    _target: Tensor
-    _learned: Mapping[str, Any] | None
 
-    @property
-    def learned(self) -> Mapping[str, Any]:
-        """See ``MeteredDisplay``."""
-        if self._learned is None:
-            raise CellError(f"{self._label} was not trained; a method that learns declares trains = True")
-        return moved(self._learned, self.device)
-
-    @property
-    def light(self) -> Tensor:
-        """See ``MeteredDisplay``."""
-        return white_irradiance(self._target, self.spec).to(self.device)
-
-    @property
-    def simulation(self) -> Simulation:
-        """Not to be had: the bench is in another process."""
-        raise CellError(f"{self._label}: the simulated bench is in another process; only isolation: none shows it")
-
-    starts = simulation
-
-    def solved(self, method: Solver, target: Tensor) -> Tensor:
-        """See ``MeteredDisplay``; here nothing is kept."""
-        return method.solve(target, self)
-
-    def announce(self, phases: Sequence[Tensor]) -> None:
-        """See ``MeteredDisplay``."""
-        self._ask("announce", list(phases))
-
-
-class TrainingHandle(_Remote, of=TrainingBench):
+class TrainingHandle(_Remote, TrainingBench, of=TrainingBench):
     """``TrainingBench`` at a distance: the same names, arguments and errors."""
-
-    kept, light = TrainingBench.kept, TrainingBench.light
-
-    def __init__(self, channel: Channel, known: Mapping[str, Any], device: torch.device) -> None:
-        super().__init__(channel, known, device)
-        self.images, self.held_out = (
-            tuple(TrainingImage(image.item, image.target.to(device)) for image in known[name])
-            for name in ("images", "held_out")
-        )
-
-    def solved(self, method: Solver, image: TrainingImage) -> Tensor:
-        """See ``TrainingBench``; here nothing is kept."""
-        return method.solve(image.target[None], self)[0]
 
     def photograph(self, phase: Tensor, image: TrainingImage, *names: object) -> Tensor:
         """See ``TrainingBench``."""
@@ -153,7 +109,3 @@ class TrainingHandle(_Remote, of=TrainingBench):
     def announce(self, photographs: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:
         """See ``TrainingBench``."""
         self._ask("announce", [(phase, image, tuple(map(str, names))) for phase, image, names in photographs])
-
-    def save(self, name: str, value: Value) -> None:
-        """See ``TrainingBench``."""
-        self._ask("save", name, moved(value, CPU))

@@ -29,15 +29,15 @@ from ...core import plugins, sources
 from ...core.device import find, moved, repeatable
 from ...core.errors import CellError, UserError
 from ...core.parameters import words
-from ...core.reads import recorded
+from ...core.reads import PACKAGE, recorded
 from ...core.schema import FieldError
 from ...display.api import from_numpy
-from ...display.traits import FLAGS, FUNCTIONS
+from ...display.traits import FLAGS, traits_of
 from .handles import SolvingHandle, TrainingHandle
 from .messages import Channel
 
-PICTURES = ("solve", "solve_planes", "predict")  # whose results are arrays of NumPy, too
-HIDDEN = ("display.simulated", "study", "lab", "report", "commands", "testing")  # the bench and the harness
+# The bench and the harness.
+HIDDEN = tuple(f"{PACKAGE}.{part}" for part in ("display.simulated", "study", "lab", "report", "commands", "testing"))
 HANDLES = {"MeteredDisplay": SolvingHandle, "TrainingBench": TrainingHandle}
 
 
@@ -51,12 +51,22 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     began = time.perf_counter()
     try:
         cls, refused = _imported(name, folder)
-    except UserError as error:
-        channel.send({"error": str(error)})
+        _flush()
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # the file may have set another one
+        code = None if sources.ships(cls) else sources.code_of(cls)
+        facts = {
+            "name": cls.__qualname__,
+            "doc": inspect.getdoc(cls) or "",
+            "flags": {flag: getattr(cls, flag) for flag in FLAGS if hasattr(cls, flag)},
+            "functions": list(traits_of(cls, name).functions),
+            "refused": refused,
+            "code": code and asdict(code),
+            "seconds": time.perf_counter() - began,
+        }
+        channel.send(facts)
+    except (UserError, CellError) as error:
+        channel.send(str(error))
         os._exit(1)
-    _flush()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # the file may have set another one
-    channel.send({"facts": {**_facts(cls), "refused": refused}, "seconds": time.perf_counter() - began})
     with suppress(EOFError, OSError):
         while True:
             number = reduction.recv_handle(control)
@@ -64,7 +74,7 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
             if child == 0:
                 control.close()
                 os.setsid()  # what it starts ends with it
-                _call(Channel(Connection(number)), cls, f"method '{name}'")
+                _call(Channel(Connection(number)), cls, f"method '{name}'", code.folder if code else "")
                 os._exit(0)
             os.close(number)
             channel.send(child)
@@ -95,13 +105,12 @@ def _imported(name: str, folder: Path) -> tuple[type[Any], str]:
     if _threads() > threads:
         raise UserError(f"method '{name}' starts threads while its file is imported; start them in solve or prepare")
     if plugins.is_file(name):
-        sys.path.append(_folder(cls))  # for processes that it starts
+        sys.path.append(sources.code_of(cls).folder)  # for processes that it starts
     return cls, refused
 
 
 def _threads() -> int:
-    tasks = Path("/proc/self/task")
-    return len(list(tasks.iterdir())) if tasks.is_dir() else 1
+    return len(list(Path("/proc/self/task").iterdir()))
 
 
 def _flush() -> None:
@@ -111,58 +120,40 @@ def _flush() -> None:
 
 
 def _ended(child: int) -> int:
-    """End a process and all that it has started; its status as ``os.waitpid`` gives it."""
+    """End a process and all that it has started; its exit code, or less than 0 the signal."""
     for kill in (os.killpg, os.kill):  # it may not have a group yet
         with suppress(ProcessLookupError, PermissionError):
             kill(child, signal.SIGKILL)
-    return os.waitpid(child, 0)[1]
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
 def _hide() -> _Refusal:
     """Hide the modules that hold the bench and the harness from all imports that follow."""
-    package = __package__.partition(".")[0]
-    hidden = tuple(f"{package}.{part}" for part in HIDDEN)
     for name in list(sys.modules):
-        if name.startswith(hidden):
+        if name.startswith(HIDDEN):
             parent, _, child = name.rpartition(".")
             vars(sys.modules.get(parent, display)).pop(child, None)
             del sys.modules[name]
     for name, value in list(vars(display).items()):
-        if getattr(value, "__module__", "").startswith(hidden):
+        if getattr(value, "__module__", "").startswith(HIDDEN):
             delattr(display, name)
-    refusal = _Refusal(hidden)
+    refusal = _Refusal()
     sys.meta_path.insert(0, refusal)
     return refusal
 
 
 class _Refusal:
-    def __init__(self, hidden: tuple[str, ...]) -> None:
-        self.hidden = hidden
-        self.refused = ""  # the first name that was
+    refused = ""  # the first name that was
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
-        if name.startswith(self.hidden):
+        if name.startswith(HIDDEN):
             self.refused = self.refused or name
             raise ImportError(f"{name} is not for methods: the bench and the harness are in another process")
         return None
 
 
-def _facts(cls: type[Any]) -> dict[str, Any]:
-    return {
-        "name": cls.__qualname__,
-        "doc": inspect.getdoc(cls) or "",
-        "flags": {flag: getattr(cls, flag) for flag in FLAGS if hasattr(cls, flag)},
-        "functions": [function for function in FUNCTIONS if callable(getattr(cls, function, None))],
-        "code": None if sources.ships(cls) else asdict(sources.code_of(cls)),
-    }
-
-
-def _folder(cls: type[Any]) -> str:
-    return "" if sources.ships(cls) else sources.code_of(cls).folder
-
-
-def _call(channel: Channel, cls: type[Any], owner: str) -> None:
-    """Get ready, and answer one call."""
+def _call(channel: Channel, cls: type[Any], owner: str, folder: str) -> None:
+    """Get ready, and answer one call. folder: of the method's code."""
     setting = channel.receive()
     device = find(setting["device"])
     if setting["memory_gib"] is not None:
@@ -173,60 +164,51 @@ def _call(channel: Channel, cls: type[Any], owner: str) -> None:
         call = channel.receive()
         with recorded() as opened:
             try:
-                told = {"result": _result(channel, cls, owner, device, **call)}
+                told = {"result": _result(channel, cls, owner, device, call)}
                 _flush()
             except BaseException as error:
                 told = _told(error, cls)
-        reads = {"seen": vars(opened.of_the_method(_folder(cls)))}
+        reads = {"seen": vars(opened.of_the_method(folder))}
         try:
             channel.send(told | reads)
         except Exception as error:  # a result that is no message
-            channel.send(_told(error, cls) | reads)
+            refused = CellError(f"what {call['function']} returned: {error}")
+            channel.send(_told(refused, cls) | reads)
     with suppress(EOFError, OSError):
         channel.receive()  # until the harness has read what memory this took
 
 
-def _result(
-    channel: Channel, cls: type[Any], owner: str, device: torch.device, function: str, params: dict[str, Any], args: Any
-) -> Any:
+def _result(channel: Channel, cls: type[Any], owner: str, device: torch.device, call: dict[str, Any]) -> Any:
+    function = call["function"]
     if function == "words":
         return asdict(words(cls))
-    method = plugins.made(cls, owner, params)
+    method = plugins.made(cls, owner, call["params"])
     if function == "params":
         return plugins.params_of(method)
-    own = [
-        HANDLES[argument["handle"]](channel, argument["known"], device)
-        if isinstance(argument, dict) and "handle" in argument
-        else moved(argument, device)
-        for argument in args
-    ]
-    result = getattr(method, function)(*own)
-    if function in PICTURES:
-        return from_numpy(result)
+    args = moved(call["args"], device)
+    if "handle" in call:
+        args.append(HANDLES[call["handle"]](channel, moved(call["known"], device)))
+    result = getattr(method, function)(*args)
     if function == "external":
-        return {name: None if path is None else str(path) for name, path in result.items()}
-    return list(result) if function in ("estimates", "files") else result
+        return {name: path and str(path) for name, path in result.items()}
+    if function == "files":
+        return [str(path) for path in result]
+    return list(result) if function == "estimates" else from_numpy(result)
 
 
 def _told(error: BaseException, cls: type[Any]) -> dict[str, Any]:
+    """An error as a message, with the last line of the method's own file on the way to it: `` (mine.py, line 7)``."""
+    file = str(getattr(sys.modules.get(cls.__module__), "__file__", None))
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    place = f" ({Path(file).name}, line {lines[-1]})" if lines and not isinstance(error, UserError | CellError) else ""
     fault = [list(error.where), error.at_key] if isinstance(error, FieldError) else None
     text = "".join(traceback.format_exception(error))
-    place = "" if isinstance(error, (UserError, CellError)) else _place(error, cls)
     return {"error": type(error).__name__, "message": f"{error}{place}", "fault": fault, "traceback": text}
-
-
-def _place(error: BaseException, cls: type[Any]) -> str:
-    """`` (mine.py, line 7)``: the last line of the method's own file on the way to an error; empty without one."""
-    with suppress(Exception):  # a stranger's class
-        file = inspect.unwrap(cls.solve).__code__.co_filename
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-        return f" ({Path(file).name}, line {lines[-1]})" if lines else ""
-    return ""
 
 
 def _limit_memory(gib: float) -> None:
     import resource  # not on Windows
 
-    fields = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
-    limit = int(gib * 2**30) + int(fields["VmData"].split()[0]) * 1024  # above what libraries take
+    pages = int(Path("/proc/self/statm").read_text().split()[5])  # of data, those of the libraries
+    limit = int(gib * 2**30) + pages * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))

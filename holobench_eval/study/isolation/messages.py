@@ -23,13 +23,8 @@ from ...display.estimates import Estimate
 from ...display.training import TrainingImage
 
 LONGEST_HEADER, LARGEST_TENSOR = 64 * 2**20, 8 * 2**30  # bytes that are read
-TYPES = {
-    str(dtype).removeprefix("torch."): dtype
-    for dtype in (
-        *(torch.float16, torch.bfloat16, torch.float32, torch.float64, torch.complex64, torch.complex128),
-        *(torch.bool, torch.uint8, torch.int8, torch.int16, torch.int32, torch.int64),
-    )
-}
+NUMBERS = "float16 bfloat16 float32 float64 complex64 complex128 bool uint8 int8 int16 int32 int64"
+TYPES: dict[str, torch.dtype] = {name: getattr(torch, name) for name in NUMBERS.split()}
 CLASSES: dict[str, type[Any]] = {cls.__name__: cls for cls in (Capture, DisplaySpec, Estimate, Region, TrainingImage)}
 LISTS: dict[str, type[Any]] = {cls.__name__: cls for cls in (list, tuple, set, frozenset)}
 
@@ -38,29 +33,11 @@ class GarbledError(CellError):
     """The other side sent what is no message."""
 
 
-class Unsendable:
-    """Stands for a value of a type that cannot be sent."""
-
-    def __init__(self, type_name: str) -> None:
-        self.type_name = type_name
-
-
-def refuse_unsendable(value: Any, what: str) -> None:
-    """CellError if a value that was received holds something that could not be sent."""
-    if isinstance(value, Unsendable):
-        raise CellError(f"{what} holds a {value.type_name}; expected tensors, numbers, text, lists or mappings of them")
-    if isinstance(value, Mapping):
-        value = [*value, *value.values()]
-    if isinstance(value, list | tuple):
-        for item in value:
-            refuse_unsendable(item, what)
-
-
 class Channel:
     """An end of a pipe for numbers, text, tensors, lists and mappings of them, and the classes of ``CLASSES``.
 
-    A tensor arrives on the CPU, without its gradient; of any other value arrives the name of its type, ``Unsendable``.
-    Every function raises EOFError or OSError where the other end is gone.
+    A tensor arrives on the CPU, without its gradient. Every function raises EOFError or OSError where the other end is
+    gone.
     """
 
     def __init__(self, connection: Connection) -> None:
@@ -68,55 +45,39 @@ class Channel:
         self.lock = threading.RLock()  # to be held from a request to its answer
 
     def send(self, value: Any) -> None:
-        """Send a value."""
+        """Send a value. CellError, and nothing is sent, for one that holds anything else."""
         tensors: list[Tensor] = []
         header = json.dumps(_plain(value, tensors)).encode()
         with self.lock:
             self.connection.send_bytes(header)
             for tensor in tensors:
-                if tensor.numel():
-                    self.connection.send_bytes(tensor.view(torch.uint8).numpy().data)
+                self.connection.send_bytes(tensor.view(torch.uint8).numpy().data)
 
     def receive(self) -> Any:
         """The next value. GarbledError for what is no message."""
-        with self.lock:
-            try:
-                return self._value(json.loads(self.connection.recv_bytes(LONGEST_HEADER)))
-            except (ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
-                raise GarbledError(f"no message: {error}") from None
-            except OSError as error:
-                if error.errno is None:  # more bytes than were announced
-                    raise GarbledError(f"no message: {error}") from None
+        try:
+            return self._value(json.loads(self.connection.recv_bytes(LONGEST_HEADER)))
+        except (ValueError, TypeError, LookupError, RuntimeError, OSError) as error:
+            if getattr(error, "errno", None) is not None:  # the end is gone; without a number there is too much to read
                 raise
-
-    def close(self) -> None:
-        """Close this end."""
-        self.connection.close()
+            raise GarbledError(f"no message: {error}") from None
 
     def _value(self, content: Any) -> Any:
         if not isinstance(content, list):
             return content
         kind, *items = content
         if kind == "tensor":
-            return self._tensor(TYPES[items[0]], items[1])
-        if kind == "unsendable":
-            return Unsendable(str(items[0]))
+            dtype, shape = TYPES[items[0]], items[1]
+            size = prod(shape) * dtype.itemsize
+            if min(shape, default=0) < 0 or size > LARGEST_TENSOR:
+                raise ValueError(f"a tensor of shape {shape}")
+            numbers = np.frombuffer(bytearray(self.connection.recv_bytes(size)), np.uint8)
+            return torch.from_numpy(numbers).view(dtype).clone().reshape(shape)
         if kind == "class":
             return CLASSES[items[0]](**self._value(items[1]))
         if kind == "dict":
             return {self._value(key): self._value(item) for key, item in items}
         return LISTS[kind](self._value(item) for item in items)
-
-    def _tensor(self, dtype: torch.dtype, shape: list[int]) -> Tensor:
-        size = prod(shape) * dtype.itemsize
-        if min(shape, default=0) < 0 or not 0 <= size <= LARGEST_TENSOR:
-            raise ValueError(f"a tensor of shape {shape}")
-        if not size:
-            return torch.empty(shape, dtype=dtype)
-        content = bytearray(self.connection.recv_bytes(size))
-        if len(content) != size:
-            raise ValueError(f"{len(content)} bytes of a tensor of {size}")
-        return torch.frombuffer(content, dtype=dtype).clone().reshape(shape)
 
 
 def _plain(value: Any, tensors: list[Tensor]) -> Any:
@@ -133,12 +94,9 @@ def _plain(value: Any, tensors: list[Tensor]) -> Any:
         value = tuple(value)
     name = type(value).__name__
     if type(value) is LISTS.get(name):
-        return [
-            name,
-            *(_plain(item, tensors) for item in (sorted(value) if isinstance(value, set | frozenset) else value)),
-        ]
+        return [name, *(_plain(item, tensors) for item in value)]
     if isinstance(value, Mapping):
         return ["dict", *([_plain(key, tensors), _plain(item, tensors)] for key, item in value.items())]
     if type(value) is CLASSES.get(name):
         return ["class", name, _plain({field.name: getattr(value, field.name) for field in fields(value)}, tensors)]
-    return ["unsendable", type_name(value)]
+    raise CellError(f"a value is {type_name(value)}; expected tensors, numbers, text, lists or mappings of them")

@@ -6,10 +6,9 @@ import os
 import signal
 import socket
 import threading
-from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing import reduction, util
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -18,253 +17,197 @@ from typing import Any
 import torch
 from pydantic import TypeAdapter, ValidationError
 
-from ...core.device import moved
-from ...core.errors import BudgetError, CellError, ForeignError, Pending, StopError, UserError
+from ...core.errors import BudgetError, CellError, ForeignError, UserError
 from ...core.hashing import State, file_state
 from ...core.reads import Seen
 from ...core.schema import FieldError
 from ...core.sources import Code
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
+from ...display.traits import Function
 from ..definition import Limits
 from ..executors.processes import CONTEXT, start
 from .handles import answer, known
 from .inside import serve
-from .messages import Channel, GarbledError, refuse_unsendable
+from .messages import Channel, GarbledError
 
 KEPT = 32  # processes of methods that stay when they have nothing to do
 IMPORT_LIMIT = 600.0  # seconds that the import of a method's file may take
-ANSWER_LIMIT = 10.0  # seconds in which the process that has imported it ends a call
-SEEN = TypeAdapter(Seen)
+ANSWER_LIMIT = 10.0  # seconds in which the process that has imported it answers
+ERRORS = {cls.__name__: cls for cls in (UserError, CellError, BudgetError)}
 Handle = MeteredDisplay | TrainingBench
 
 
 @dataclass(frozen=True)
-class Call:
-    """A process that is ready for its calls. pid: its number; seen: what they have read."""
+class Facts:
+    """What a process tells of its method: see ``inside.serve``.
 
-    pid: int
-    channel: Channel
-    seen: Seen = field(default_factory=Seen)
+    flags: what its class declares, among anything else; refused: what its file imports that is hidden from methods;
+    code: None for a method of this package; seconds: that its import took.
+    """
 
-    def note(self, told: Any) -> None:
-        """Add what a call has read. GarbledError for a message that does not say it."""
-        try:
-            self.seen.add(SEEN.validate_python(told))
-        except ValidationError as error:
-            raise GarbledError(f"no reads: {error}") from None
+    name: str
+    doc: str
+    flags: dict[str, Any]
+    functions: list[Function]
+    refused: str
+    code: Code | None
+    seconds: float
+
+
+FACTS: TypeAdapter[Facts | str] = TypeAdapter(Facts | str)  # a text says why the method cannot be imported
+SEEN = TypeAdapter(Seen)
 
 
 class MethodProcess:
     """A process that has imported a method, and forks one for every call.
 
-    facts: what the method is, as ``inside.serve`` tells it; seconds: that its import took. UserError for a method that
-    cannot be imported.
+    facts: what the method is. UserError for a method that cannot be imported.
     """
 
-    def __init__(self, name: str, folder: Path) -> None:
+    def __init__(self, name: str, folder: Path, home: Path) -> None:
         ours, theirs = CONTEXT.Pipe()
-        self.control, self.name = Channel(ours), name
-        self.process = start(serve, theirs, name, folder, Path.cwd())
+        self.control, self.key, self.file = Channel(ours), (name, folder, home), folder / name.rpartition(":")[0]
+        self.process = start(serve, theirs, name, folder, home)
+        # Before it is asked to end, which a method's file may have forbidden.
+        util.Finalize(None, self.end, exitpriority=100)
         theirs.close()
         ready = wait([ours, self.process.sentinel], IMPORT_LIMIT)  # others of its processes may hold the pipe
         try:
-            if ours not in ready and not ours.poll():
+            if not ours.poll():
                 raise EOFError
-            told = self.control.receive()
-        except (EOFError, OSError, GarbledError):
+            facts = FACTS.validate_python(self.control.receive())
+        except (EOFError, OSError, GarbledError, ValidationError):
             self.end()
             why = f"ends its process ({self.process.exitcode})" if ready else f"takes more than {IMPORT_LIMIT:g} s"
             raise UserError(f"method '{name}': the import of its file {why}") from None
-        if not isinstance(told, dict) or "facts" not in told:
-            raise UserError(told["error"] if isinstance(told, dict) else f"method '{name}' does not say what it is")
-        self.facts: dict[str, Any] = told["facts"]
-        try:
-            self.code = TypeAdapter(Code | None).validate_python(self.facts["code"])
-        except ValidationError as error:
-            self.end()
-            raise UserError(f"method '{name}' does not say what its code is: {error}") from None
-        self.states = self._states()
-        self.seconds: float = told["seconds"]
+        if isinstance(facts, str):
+            raise UserError(facts)
+        self.facts, self.states = facts, self._states(facts)
 
     def is_current(self) -> bool:
-        """Whether it lives, and its code is still what it has imported."""
-        return self.process.is_alive() and self.states == self._states()
+        """Whether it lives, and its code, with the Python files beside it, is still what it has imported."""
+        return self.process.is_alive() and self.states == self._states(self.facts)
 
-    def _states(self) -> list[State | None]:
-        return [file_state(path) for path in self.code.paths] if self.code else []
+    def _states(self, facts: Facts) -> dict[Path, State | None]:
+        if facts.code is None:
+            return {}
+        beside = Path(facts.code.folder).glob("*.py")  # one more may be what an import finds
+        return {path: file_state(path) for path in (*map(Path, facts.code.paths), self.file, *beside)}
 
     def end(self) -> None:
         """Kill the process."""
         self.process.kill()
         self.process.join()
-        self.control.close()
+        self.control.connection.close()
 
     @contextmanager
-    def opened(self, device: torch.device, limits: Limits) -> Iterator[Call]:
-        """A process for one call, which ends with the context: on a device, with as many threads as this one.
+    def opened(self, device: torch.device, limits: Limits) -> Iterator[tuple[int, Channel]]:
+        """The number of a process that is ready for its calls, and the way to it (see ``call``); it ends with the
+        context. It computes on a device, with as many threads as this one.
 
         CellError where it ends by itself, sends what is no answer, or reaches a limit.
         """
         ours, theirs = CONTEXT.Pipe()
-        channel = Channel(ours)
-        reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
-        theirs.close()
-        if not self.control.connection.poll(ANSWER_LIMIT):
-            self.end()
-            raise CellError("the process that has imported the method does not answer")
-        pid = int(self.control.receive())
+        channel, late, pid = Channel(ours), threading.Event(), 0
 
         def stop() -> None:
-            with suppress(OSError):
-                os.kill(pid, signal.SIGKILL)
+            late.set()
             with socket.socket(fileno=os.dup(ours.fileno())) as end:  # others of its processes may hold the pipe
                 end.shutdown(socket.SHUT_RDWR)
 
-        with _ending_after(limits.seconds, stop) as late:
-            try:
-                channel.send(
-                    {"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib}
-                )
-                channel.receive()
-                yield Call(pid, channel)
-            except (EOFError, OSError, GarbledError) as error:
-                status = self._close(channel, pid)
-                if late:
-                    raise CellError(f"took more than {limits.seconds:g} s, the limit of the study") from None
-                what = "sent what is no answer" if isinstance(error, GarbledError) else _ending(status)
-                raise CellError(f"the process of the method {what}") from None
-            finally:
-                if not channel.connection.closed:
-                    self._close(channel, pid)
+        timer = threading.Timer(min(limits.seconds, threading.TIMEOUT_MAX), stop)
+        timer.daemon = True
+        timer.start()
+        failure: Exception | None = None
+        try:
+            with theirs:
+                reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
+            pid = self._told()
+            channel.send({"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib})
+            channel.receive()
+            yield pid, channel
+        except (EOFError, OSError, GarbledError) as error:
+            failure = error
+        finally:
+            timer.cancel()
+            ours.close()
+            ending = self._ending(pid)
+        if failure is not None and late.is_set():
+            raise CellError(f"took more than {limits.seconds:g} s, the limit of the study")
+        if failure is not None:
+            what = "sent what is no answer" if isinstance(failure, GarbledError) else ending
+            raise CellError(f"the process of the method {what}")
 
-    def _close(self, channel: Channel, pid: int) -> int | None:
-        """End a call; its status as ``os.waitpid`` gives it, None where this process is gone, too."""
-        channel.close()
+    def _told(self) -> int:
+        """A number that the process tells. EOFError where it does not in time, which ends it."""
+        if not self.control.connection.poll(ANSWER_LIMIT):
+            self.end()
+            raise EOFError
+        return int(self.control.receive())
+
+    def _ending(self, pid: int) -> str:
+        """End a call, and say how it ended by itself. pid: 0 for one that has not begun."""
         try:
             self.control.send("end")
-            if not self.control.connection.poll(ANSWER_LIMIT):
-                raise EOFError
-            return int(self.control.receive())
+            status = self._told()
         except (EOFError, OSError, GarbledError):
-            with suppress(OSError):
-                os.killpg(pid, signal.SIGKILL)
             self.end()
-            return None
+            if pid:
+                with suppress(OSError):
+                    os.killpg(pid, signal.SIGKILL)
+            return "has ended the process that it came from"
+        return f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with exit code {status}"
 
 
-def call(opened: Call, function: str, params: dict[str, Any], args: Sequence[Any]) -> Any:
-    """What a method's function returns; meanwhile the display in ``args`` answers its requests.
+def call(channel: Channel, seen: Seen, function: str, params: dict[str, Any], args: Sequence[Any]) -> Any:
+    """What a method's function returns; meanwhile the display in ``args`` answers its requests, and what is read
+    is added to ``seen``.
 
     An error that the method raises is a CellError with the name and text of its own, unless it is a BudgetError.
+    GarbledError for what is no message, or does not say what was read.
     """
     handle = next((argument for argument in args if isinstance(argument, Handle)), None)
-    sent = [known(argument) if isinstance(argument, Handle) else argument for argument in args]
-    opened.channel.send({"function": function, "params": params, "args": sent})
+    plain = [argument for argument in args if not isinstance(argument, Handle)]
+    given = {} if handle is None else known(handle)
+    channel.send({"function": function, "params": params, "args": plain, **given})
     while True:
-        got = opened.channel.receive()
+        got = channel.receive()
         if not isinstance(got, dict):
             raise GarbledError("no mapping")
-        if "result" in got or "error" in got:
-            opened.note(got.get("seen"))
-        if "result" in got:
-            if function == "prepare":
-                refuse_unsendable(got["result"], "what prepare returned")
-            return got["result"]
-        if "error" in got:
-            raise _raised(got)
-        opened.channel.send(_answer(handle, got))
-
-
-def _answer(handle: Handle | None, request: dict[str, Any]) -> dict[str, Any]:
-    args, named = request.get("args", ()), request.get("named", {})
-    if handle is not None:
-        args = moved(list(args), handle.device)
+        if "ask" not in got:
+            break
+        channel.send(answer(handle, got))
     try:
-        return {"value": answer(handle, str(request.get("ask")), args, named)}
-    except (Pending, StopError):
-        raise
-    except Exception as error:  # the method's to see
-        return {"error": type(error).__name__, "message": str(error)}
+        seen.add(SEEN.validate_python(got.get("seen")))
+    except ValidationError as error:
+        raise GarbledError(f"no reads: {error}") from None
+    if "result" not in got:
+        raise _raised(got)
+    return got["result"]
 
 
 def _raised(told: dict[str, Any]) -> Exception:
-    name, message = str(told["error"]), str(told["message"])
+    name, message = str(told.get("error")), str(told.get("message"))
     if told.get("fault"):
         where, at_key = told["fault"]
         return FieldError(tuple(where), message, bool(at_key))
-    if name == "UserError":
-        return UserError(message)
-    own = {cls.__name__: cls for cls in (CellError, BudgetError)}
-    kind = own.get(name) or type(name if name.isidentifier() else "Error", (ForeignError,), {})
-    error = kind(message)
+    kind = ERRORS.get(name) or type(name if name.isidentifier() else "Error", (ForeignError,), {})
+    error: Exception = kind(message)
     error.add_note(f"In the method's process:\n{told.get('traceback', '')}")
     return error
 
 
-def _ending(status: int | None) -> str:
-    """What a status of ``os.waitpid`` says, in words."""
-    if status is None:
-        return "has ended the process that it came from"
-    if os.WIFSIGNALED(status):
-        number = os.WTERMSIG(status)
-        return f"was ended by {signal.Signals(number).name}"
-    return f"ended with exit code {os.WEXITSTATUS(status)}"
-
-
-@contextmanager
-def _ending_after(seconds: float, stop: Callable[[], None]) -> Iterator[list[bool]]:
-    """Call ``stop`` after a time; the list is then not empty."""
-    late: list[bool] = []
-
-    def end() -> None:
-        late.append(True)
-        stop()
-
-    timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), end)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield late
-    finally:
-        timer.cancel()
-
-
-_processes: OrderedDict[tuple[Any, ...], MethodProcess] = OrderedDict()
+_processes: list[MethodProcess] = []  # the last one is that which was used last
 
 
 def process_of(name: str, folder: Path) -> MethodProcess:
     """The process of a method, the same one while its code and the Python files beside it stay as they are."""
-    key = (name, folder, Path.cwd(), _state(name, folder))
-    if key in _processes and not _processes[key].is_current():
-        former = _processes.pop(key)
-        _processes[(*key, id(former))] = former  # a call may still run in it
-    if key not in _processes:
-        _processes[key] = MethodProcess(name, folder)
-    _processes.move_to_end(key)
-    while len(_processes) > KEPT:
-        _processes.popitem(last=False)[1].end()
-    return _processes[key]
-
-
-def _state(name: str, folder: Path) -> tuple[tuple[str, int, int], ...]:
-    """Names, times and sizes of a method's file and those beside it; empty for a method of an installed package."""
-    file = name.rpartition(":")[0]
-    if not file.endswith(".py"):
-        return ()
-    beside = next((path.parent for path in (folder / file, Path(file)) if path.is_file()), folder)
-    found = []
-    for path in sorted(beside.glob("*.py")):
-        with suppress(OSError):  # an editor's lock, which points to nothing
-            state = path.stat()
-            found.append((path.name, state.st_mtime_ns, state.st_size))
-    return tuple(found)
-
-
-def _end_all() -> None:
-    for process in _processes.values():
-        process.end()
-
-
-# Before they are asked to end, which a method's file may have forbidden.
-util.Finalize(None, _end_all, exitpriority=100)
+    key = (name, folder, Path.cwd())
+    found = next((process for process in _processes if process.key == key and process.is_current()), None)
+    if found is not None:
+        _processes.remove(found)
+    _processes.append(found or MethodProcess(*key))
+    if len(_processes) > KEPT:
+        _processes.pop(0).end()
+    return _processes[-1]

@@ -29,9 +29,6 @@ class Reads:
     uncovered: tuple[str, ...]
 
 
-NOTHING = Reads({}, ())
-
-
 def reads_of(seen: Seen, params: Any, code: Code) -> Reads:
     """What was read, told apart: covered is what lies below the folder of the study or of the method's file, and what
     a parameter names, itself or by a folder above it.
@@ -70,11 +67,4 @@ def _named(params: Any, study: Path) -> list[str]:
     if not isinstance(params, str) or not params or "\0" in params:
         return []
     paths = (Path(place, Path(params).expanduser()).absolute() for place in (Path.cwd(), study))
-    return list(dict.fromkeys(os.path.normpath(path) for path in paths if _exists(path)))
-
-
-def _exists(path: Path) -> bool:
-    try:
-        return path.exists()
-    except OSError:  # too long for a name
-        return False
+    return list(dict.fromkeys(os.path.normpath(path) for path in paths if os.access(path, os.F_OK)))

@@ -14,7 +14,6 @@ from ...display import MeteredDisplay
 from ...display.api import from_numpy, is_plain, type_name
 from .. import cost, identity, isolation
 from ..displays import Condition
-from ..isolation.messages import Unsendable
 from ..isolation.read_files import digests
 from ..phases import Solution, Starts
 from ..versions import gate
@@ -88,8 +87,7 @@ def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: 
 
 def wrong_output(label: str, function: str, output: Any, wanted: str) -> CellError:
     """The error for an ``output`` that is not what was wanted."""
-    named = output.type_name if isinstance(output, Unsendable) else type_name(output)
-    actual = tuple(output.shape) if is_plain(output) else named
+    actual = tuple(output.shape) if is_plain(output) else type_name(output)
     return CellError(f"{label}: {function} returned {actual}, not {wanted}")
 
 

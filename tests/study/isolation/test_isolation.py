@@ -149,7 +149,7 @@ def test_a_process_that_ends_while_its_study_is_read_is_told_in_one_line(tmp_pat
 def test_a_method_is_imported_once_until_a_file_beside_it_changes(file: str) -> None:
     first = process_of(f"{file}:Mine", Path())
     assert process_of(f"{file}:Mine", Path()) is first
-    assert first.seconds > 0.2
+    assert first.facts.seconds > 0.2
     Path(file).with_name("beside.py").write_text("LEVEL = 2")
     assert process_of(f"{file}:Mine", Path()) is not first
 
@@ -273,7 +273,7 @@ methods: [{name: "learns.py:Learns", params: {odd: true}}]
     )
     records = compute(tmp_path / "study.yaml", tmp_path / "out").records
     (reason,) = {record["reason"] for record in records if record["label"] == "Learns"}
-    assert "what prepare returned holds a object; expected tensors" in reason
+    assert "what prepare returned: a value is object; expected tensors" in reason
 
 
 def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path: Path) -> None:
@@ -289,6 +289,24 @@ methods: ["mine.py:Mine"]
     )
     with pytest.raises(UserError, match=r"study.yaml:4:.*looks into the simulated bench.*isolation: none"):
         compute(config, tmp_path / "out")
+
+
+def test_files_that_a_method_names_by_their_paths_are_known_apart(tmp_path: Path) -> None:
+    (tmp_path / "named.py").write_text(
+        """
+from pathlib import Path
+
+
+def named(target, bench): ...
+
+
+named.files = lambda item: [Path(item)]
+named.external = lambda: {"weights": Path("weights.pt"), "none": None}
+"""
+    )
+    method = isolation.build("named.py:named", {}, tmp_path)
+    assert method.files("a.npy") == ["a.npy"]
+    assert method.external() == {"weights": "weights.pt", "none": None}
 
 
 def test_threads_of_the_harness_are_those_of_a_call(tmp_path: Path) -> None:

@@ -6,13 +6,15 @@ from contextlib import suppress
 from multiprocessing import Pipe
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from holobench_eval.core.errors import CellError
 from holobench_eval.display.api import Capture
-from holobench_eval.study.isolation.messages import TYPES, Channel, GarbledError, Unsendable
+from holobench_eval.study.isolation.messages import TYPES, Channel, GarbledError
 
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 VALUES = st.recursive(
@@ -63,13 +65,17 @@ def test_a_capture_arrives_without_its_gradient() -> None:
     assert not found.frame.requires_grad
 
 
-def test_of_what_cannot_be_sent_the_type_arrives() -> None:
-    class Odd(torch.Tensor):
-        pass
+class Odd(torch.Tensor):
+    pass
 
-    odd, function = passed([torch.zeros(2).as_subclass(Odd), lambda: None])
-    assert isinstance(odd, Unsendable)
-    assert (odd.type_name, function.type_name) == ("Odd", "function")
+
+@pytest.mark.parametrize("value", [torch.zeros(2).as_subclass(Odd), lambda: None, np.zeros(2)])
+def test_what_cannot_be_sent_is_refused_where_it_is_and_leaves_nothing_behind(value: Any) -> None:
+    ours, theirs = (Channel(end) for end in Pipe())
+    with pytest.raises(CellError, match=r"a value is (Odd|function|ndarray of float64); expected tensors"):
+        ours.send([torch.ones(1), {"a": value}])
+    ours.send(1)
+    assert theirs.receive() == 1
 
 
 @pytest.mark.parametrize(

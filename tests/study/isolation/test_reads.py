@@ -16,10 +16,10 @@ import torch
 
 from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU
-from holobench_eval.core.reads import STARTED
+from holobench_eval.core.reads import STARTED, Seen
 from holobench_eval.study import isolation
 from holobench_eval.study.isolation.messages import Channel, GarbledError
-from holobench_eval.study.isolation.process import Call
+from holobench_eval.study.isolation.process import call
 
 METHOD = """
 import os
@@ -156,6 +156,6 @@ def test_a_file_that_is_another_one_is_named(tmp_path: Path, edit: Callable[[Pat
 )
 def test_reads_that_are_no_reads_are_refused(told: Any) -> None:
     ours, theirs = Pipe()
+    Channel(theirs).send({"result": 1, "seen": told})
     with pytest.raises(GarbledError, match="no reads"):
-        Call(0, Channel(ours)).note(told)
-    theirs.close()
+        call(Channel(ours), Seen(), "solve", {}, ())

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.core.device import CPU
 from holobench_eval.display import load_profile
 from holobench_eval.study import isolation
 from holobench_eval.study.isolation import process
@@ -20,7 +19,7 @@ def test_a_row_of_a_training_may_have_any_names(tmp_path: Path) -> None:
     sent: list[dict[str, Any]] = []
     channel: Any = SimpleNamespace(lock=nullcontext(), send=sent.append, receive=lambda: {"value": None})
     known = {"spec": load_profile("ideal").spec((128, 128)), "images": (), "held_out": ()}
-    TrainingHandle(channel, known, CPU).log(name=1, step=2)
+    TrainingHandle(channel, known).log(name=1, step=2)
     assert sent == [{"ask": "log", "args": (), "named": {"name": 1, "step": 2}}]
 
 
@@ -28,8 +27,8 @@ def test_only_what_a_method_may_declare_is_taken_from_its_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     flags = {"camera": True, "timed": False, "solve": "mine", "_call": None}
-    facts = {"flags": flags, "functions": ["solve"], "version": "1", "doc": "", "refused": "", "name": "Mine"}
-    monkeypatch.setattr(process, "process_of", lambda *_: SimpleNamespace(facts=facts, code=None))
+    facts = process.Facts("Mine", "", flags, ["solve"], "", None, 0.0)
+    monkeypatch.setattr(process, "process_of", lambda *_: SimpleNamespace(facts=facts))
     cls = isolation.find("mine.py:Mine", tmp_path)
     assert isolation.traits("mine.py:Mine", tmp_path).camera
     assert isolation.traits("mine.py:Mine", tmp_path).timed

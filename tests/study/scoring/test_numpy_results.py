@@ -48,6 +48,11 @@ def levels(target, bench):
     return np.zeros((*target.shape[:2], *bench.spec.shape), np.uint8)
 """
 
+EXPECTED = "expected tensors, numbers, text, lists or mappings of them"
+REFUSED = {
+    "none": "{}: solve returned ndarray of uint8, not a phase (1, 3, H, W)",
+    "files": f"what solve returned: a value is ndarray of uint8; {EXPECTED}",
+}
 CONFIG = """\
 title: "NumPy"
 display: {{profiles: [leto-mild], panel: [128, 160]}}
@@ -89,7 +94,7 @@ def test_a_phase_scores_what_its_tensor_scores(tmp_path: Path, isolation: str) -
 def test_levels_are_no_phase(tmp_path: Path, isolation: str) -> None:
     record = records(tmp_path, named("levels", "levels"), isolation)["levels"]
     assert record["state"] == "failed"
-    assert record["reason"] == "levels: solve returned ndarray of uint8, not a phase (1, 3, H, W)"
+    assert record["reason"] == REFUSED[isolation].format("levels")
 
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
@@ -109,7 +114,7 @@ def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path
 def test_a_hologram_that_is_no_phase_is_named(tmp_path: Path, isolation: str) -> None:
     measure = 'measure: prediction\nholograms: {name: "mine.py:levels"}'
     reason = records(tmp_path, named("t", "Tensors"), isolation, measure)["t"]["reason"]
-    assert reason == "mine.py:levels: solve returned ndarray of uint8, not a phase (1, 3, H, W)"
+    assert reason == REFUSED[isolation].format("mine.py:levels")
 
 
 @pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])
