@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import torch
 from torch import Tensor
@@ -28,6 +28,9 @@ class Bench(Protocol):
 
     def generator(self, *names: object) -> torch.Generator:
         """Named random numbers of this cell."""
+
+    def solved(self, method: Any, target: Tensor) -> Tensor:
+        """Phases ``(B, C, H, W)`` [rad] by another method without camera, solved once where phases are kept."""
 
 
 def per_channel(target: Tensor, solve_channel: Callable[[Tensor, int], Tensor]) -> Tensor:

@@ -110,6 +110,8 @@ class Wirtinger:
         UserError
             For a region that is too small for the loss.
         """
+        if self.offset != "none":  # one descent serves all offsets
+            return with_offset(bench.solved(replace(self, offset="none"), target), self.offset)
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
@@ -117,12 +119,10 @@ class Wirtinger:
         start = initial_phase(self.initial_phase, target, bench, channel)
         objective = Objective(model, region, target, LOSSES[self.loss])
         if self.optimiser == "adam":
-            phase = self._adam(start, objective)
-        else:
-            # a line search that is shared would let one image decide the steps of another
-            pairs = zip(start.split(1), target.split(1), strict=True)
-            phase = torch.cat([self._lbfgs(begin, replace(objective, target=image)) for begin, image in pairs])
-        return with_offset(phase, self.offset)
+            return self._adam(start, objective)
+        # A line search that is shared would let one image decide the steps of another.
+        pairs = zip(start.split(1), target.split(1), strict=True)
+        return torch.cat([self._lbfgs(begin, replace(objective, target=image)) for begin, image in pairs])
 
     def _adam(self, start: Tensor, objective: Objective) -> Tensor:
         decay = self.schedule == "cosine"

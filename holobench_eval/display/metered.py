@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
@@ -26,6 +27,26 @@ class Solver(Protocol):
 
 # A method, and what has it solve; the phases, from where they are kept or from there.
 Known = Callable[[Solver, Callable[[], Tensor]], Tensor]
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """What a method has of a display that needs no camera: nominal optics, named random numbers, other methods' phases.
+
+    target: ``(C, h, w)``, whose phases ``known`` gives from where phases are kept; None: nothing is kept.
+    """
+
+    spec: DisplaySpec
+    generator: Callable[..., torch.Generator]
+    target: Tensor
+    known: Known | None
+
+    def solved(self, method: Solver, target: Tensor) -> Tensor:
+        """Phases ``(B, C, H, W)`` [rad] of targets ``(B, C, h, w)`` by another method that knows the nominal optics
+        alone, such as where a method begins; solved once for all methods and displays that need them."""
+        if self.known is None or len(target) > 1 or not torch.equal(target[0], self.target):
+            return method.solve(target, self)
+        return self.known(method, lambda: method.solve(target, self))
 
 
 class MeteredDisplay:
@@ -145,11 +166,8 @@ class MeteredDisplay:
         return self._starts
 
     def solved(self, method: Solver, target: Tensor) -> Tensor:
-        """Phases ``(B, C, H, W)`` [rad] of targets ``(B, C, h, w)`` by another method that knows the nominal optics
-        alone, such as where a method begins; solved once for all methods and displays that need them."""
-        if self._known is None or len(target) > 1 or not torch.equal(target[0], self._target):
-            return method.solve(target, self)
-        return self._known(method, lambda: method.solve(target, self))
+        """The phases of targets by another method, see ``OpenLoop``."""
+        return OpenLoop(self.spec, self.generator, self._target, self._known).solved(method, target)
 
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on study seed, target, repeat and ``names``."""

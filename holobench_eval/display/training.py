@@ -6,7 +6,6 @@ import itertools
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Protocol
 
 import torch
@@ -17,7 +16,7 @@ from ..core.errors import CellError
 from ..core.seeds import generator
 from .account import Account, Journal
 from .api import Camera, Display, DisplaySpec, check_phase, white_irradiance
-from .metered import Known, Solver
+from .metered import Known, OpenLoop, Solver
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
@@ -108,10 +107,9 @@ class TrainingBench:
         return white_irradiance(image.target, self.spec)
 
     def solved(self, method: Solver, image: TrainingImage) -> Tensor:
-        """The phase ``(C, H, W)`` [rad] of an image by another method; see ``MeteredDisplay.solved``."""
-        solve = partial(method.solve, image.target[None], self)
+        """The phase ``(C, H, W)`` [rad] of an image by another method, see ``OpenLoop``."""
         known = (self._known or {}).get(image.item)
-        return (known(method, solve) if known else solve())[0]
+        return OpenLoop(self.spec, self.generator, image.target, known).solved(method, image.target[None])[0]
 
     def generator(self, *names: object) -> torch.Generator:
         """Random numbers that depend on the study's seed and ``names``."""

@@ -16,6 +16,7 @@ import math
 import os
 import platform
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -45,6 +46,15 @@ class Cost:
 
     seconds: float
     memory_mib: float | None = None
+
+    def after(self, before: Sequence[Cost]) -> Cost:
+        """The same with what was begun with and is from before: all of its time, and the peak, if each is known."""
+        if not before:
+            return self
+        peaks = [each.memory_mib for each in (self, *before)]
+        known = [peak for peak in peaks if peak is not None]
+        seconds = self.seconds + sum(each.seconds for each in before)
+        return Cost(seconds, max(known) if len(known) == len(peaks) else None)
 
 
 @dataclass(frozen=True)

@@ -105,14 +105,14 @@ class Phases:
 class Starts:
     """The phases of one target that other methods begin with, each by a method that knows the nominal optics alone.
 
-    basis: what such a phase depends on besides its method, see ``identity.phase``; device: where it is needed; seconds:
-    what those from before took, which is part of what a method costs that begins with them.
+    basis: what such a phase depends on besides its method, see ``identity.phase``; device: where it is needed; before:
+    what those took that are from before, which is part of what a method costs that begins with them.
     """
 
     phases: Phases
     basis: Mapping[str, Any]
     device: torch.device
-    seconds: float = 0.0
+    before: list[Cost] = field(default_factory=list)
 
     def __call__(self, method: Solver, solve: Callable[[], Tensor]) -> Tensor:
         """The phase ``(1, C, H, W)`` of a method: kept from before, or solved now and kept.
@@ -124,11 +124,11 @@ class Starts:
             return solve()
         identity = digest({**self.basis, "code": method_version(type(method)), "params": plugins.params_of(method)})
         if (known := self.phases.read(identity)) is not None:
-            self.seconds += known.cost.seconds
+            self.before.append(known.cost)
             return known.phase[None].to(self.device)
-        began = time.perf_counter()
+        began, earlier = time.perf_counter(), len(self.before)
         phase = solve()
-        cost = Cost(time.perf_counter() - began)
+        cost = Cost(time.perf_counter() - began).after(self.before[earlier:])
         self.phases.keep(identity, Solution(phase.detach().cpu()[0], 0, cost, alone=False))
         return phase
 

@@ -102,7 +102,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     facts: dict[str, Any] = {
         **({"in_the_place_of": outdated} if outdated else {}),
         "captures": bench.captures if journal is None else journal.captures,
-        "seconds": round(bench.seconds + sum(start.seconds for start in shared.values()), 1),
+        "seconds": round(bench.seconds + sum(cost.seconds for start in shared.values() for cost in start.before), 1),
         "threads": setting.threads,
         **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),

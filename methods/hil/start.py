@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import torch
@@ -48,8 +48,8 @@ class SmoothStart(Wirtinger):
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]; each image has its own last iteration."""
-        solve = super().solve
-        return torch.cat([solve(image[None], bench) for image in target]) + self.constant
+        descent = replace(self, constant=0.0)
+        return torch.cat([Wirtinger.solve(descent, image[None], bench) for image in target]) + self.constant
 
     def _done(self, loss: Tensor) -> bool:
         return self.tolerance > 0 and bool((loss <= self.tolerance).all())

@@ -1,5 +1,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 import torch
@@ -51,6 +52,9 @@ class FakeBench:
 
     def generator(self, *names: object) -> torch.Generator:
         return seeds.generator(self.cell, *names)
+
+    def solved(self, method: Any, target: Tensor) -> Tensor:
+        return method.solve(target, self)
 
     @property
     def simulation(self) -> BentSimulation:

@@ -57,7 +57,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         journal=journal,
     )
     solved = solved_by(job, method, task.label, handle, solve)
-    taken = replace(solved.cost, seconds=solved.cost.seconds + shared.seconds)
+    taken = solved.cost.after(shared.before)
     cost.keep(job.timing, taken.seconds)
     solved = replace(solved, captures=journal.captures, cost=taken, learned=state)
     if starts.all_there(first, others):
