@@ -38,18 +38,6 @@ def timed(done: pd.DataFrame) -> pd.DataFrame:
     return done if alone.empty else alone
 
 
-def captures_behind(done: pd.DataFrame) -> float:
-    """Every capture behind the done cells of a row: those of the training once, and those of every target.
-
-    Repeats are averaged within a target, since only the measurement is repeated. NaN for no cells, and where no number
-    of captures is known.
-    """
-    if done.empty or done["captures"].isna().all():
-        return float("nan")
-    trained = done["training_captures"].mean() if "training_captures" in done else 0.0
-    return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())
-
-
 def _learned(record: Record, key: str, untrained: Any, unknown: Any) -> Any:
     """A fact of the training behind a score, and what stands for it where nothing was trained or scored."""
     return (record.get("learned") or {}).get(key, untrained) if record["state"] == DONE else unknown
@@ -287,7 +275,11 @@ FIGURES.append(Column("memory_mib", _MEMORY, "number", "MiB", table=InTable(medi
 @column(FIGURES, "number", source=None, heading="captures in total")
 def total_captures(cells: Cells, name: str) -> float:
     """All captures behind the row: of the training, and of every target."""
-    return captures_behind(cells.done)
+    done = cells.done
+    if done.empty or done["captures"].isna().all():
+        return float("nan")
+    trained = done["training_captures"].mean() if "training_captures" in done else 0.0
+    return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())  # repeats: averaged
 
 
 @column(FIGURES, "count", source=None)

@@ -38,5 +38,5 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
     rows = [("the ideal image", name, condition) for name in layout.identities if name in results.methods(condition)]
     if CONSTANT in results.floors and results.has_floor(condition):
         rows.insert(0, ("the constant image", CONSTANT, REFERENCE))
-    sign, ours = (1 if results.headline.higher_is_better else -1), results.values(label, condition).mean()
-    return [text for text, name, where in rows if sign * (ours - results.values(name, where).mean()) < 0]
+    ours, better = results.values(label, condition).mean(), results.headline.better
+    return [text for text, name, where in rows if better(results.values(name, where).mean(), ours)]

@@ -61,8 +61,7 @@ def column(file: File, name: str) -> Column | None:
         unit = parse(name.removeprefix(PUBLISHED)).unit
         return Column(name, "Published figure of the metric, of other hardware and images", "number", unit)
     for end, meaning in (_STATISTICS if file == "table.csv" else {"": ""}).items():
-        before, _, unit = name.rpartition(end) if end else (name, "", "")
-        score = parse(f"{before}{unit}")
+        score = parse(name.replace(end, ""))
         if score.statistic(end) == name and (found := _score(score, name, meaning)):
             return found
     return None

@@ -92,7 +92,7 @@ class Ranks:
         """``(1 + draws,)`` mean headline of every method, that on the nominal display first; turned so that larger is
         better, NaN where a target has no score."""
         results, conditions = self.results, [self.swept.before, *(name for _, name in self.swept.points)]
-        sign = 1 if results.headline.higher_is_better else -1
+        sign = results.headline.sign
         labels = [label for label in results.methods(conditions[0]) if results.layout.category(label) in OFFLINE]
         return {
             label: sign * np.array([results.values(label, condition).mean() for condition in conditions])

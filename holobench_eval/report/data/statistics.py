@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -43,6 +44,9 @@ class Estimate:
         return self.low > 0 or self.high < 0
 
 
+NONE = Estimate(np.nan, np.nan, np.nan, 0, 0)
+
+
 def _sums(values: Array, clusters: Clusters | None) -> Array:
     """Sums over each cluster of ``(..., n)`` values, ``(..., clusters)``; without clusters each value is one."""
     if clusters is None:
@@ -63,7 +67,7 @@ def mean_interval(values: Sequence[float] | Array, clusters: Clusters | None = N
     sample = np.asarray(values, dtype=np.float64)
     n = sample.size
     if n == 0:
-        return Estimate(np.nan, np.nan, np.nan, 0, 0)
+        return NONE
     mean = float(sample.mean())
     residuals = _sums(sample - mean, clusters)
     half = _quantile(residuals.size) * np.sqrt(_products(residuals, residuals)) / n
@@ -159,9 +163,13 @@ class PairedTest:
     p: float
 
     @property
-    def known(self) -> Array:
-        """The differences that there are."""
-        return self.differences[np.isfinite(self.differences)]
+    def median(self) -> float:
+        """Of the differences that there are; NaN for none."""
+        return float(pd.Series(self.differences).median())
+
+    def better(self, sign: int) -> int:
+        """Targets for which ``second`` is better. sign: of what is better, see ``scores.Score``."""
+        return int((sign * self.differences > 0).sum())
 
     @property
     def is_shown(self) -> bool:

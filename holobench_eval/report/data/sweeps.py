@@ -10,7 +10,7 @@ import numpy as np
 from ...display.simulated.changes import KINDS, Kind
 from .layout import Swept
 from .results import Results
-from .statistics import Estimate, mean_interval, ratio_interval
+from .statistics import Array, Estimate, mean_interval, ratio_interval
 
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
 # Kinds whose points are other benches: they are asked for rankings and not for losses.
@@ -58,8 +58,15 @@ class Sweep:
         return mean_interval(self.results.values(label, condition), self.results.clusters)
 
     def loss(self, label: str, condition: str) -> Estimate | None:
-        """What the change cost, target by target."""
-        return self.results.lost(label, self.swept.before, condition)
+        """What the change cost, target by target, positive where the score got worse; None without a complete pair of
+        rows."""
+        if not all(self.results.is_complete(label, name) for name in (self.swept.before, condition)):
+            return None
+        return self.results.estimate(self._lost(label, condition))
+
+    def _lost(self, label: str, condition: str) -> Array:
+        values = self.results.values
+        return self.results.headline.sign * (values(label, self.swept.before) - values(label, condition))
 
     def losses(self, label: str) -> dict[str, Estimate]:
         """What every change cost, by condition; without those that lack a target."""
@@ -88,11 +95,8 @@ class Sweep:
         points = [(abs(float(v) - nominal), name) for v, name in self.swept.points if side * (float(v) - nominal) > 0]
         if not points or any(self.loss(label, name) is None for _, name in points):
             return None
-        sign = 1 if self.results.headline.higher_is_better else -1
-        reach = np.array([away for away, _ in points])
-        before = self.results.values(label, self.swept.before)
-        after = np.stack([self.results.values(label, condition) for _, condition in points])
-        return self.results.estimate(self.kind.per * (reach @ (sign * (before - after))) / float(reach @ reach))
+        reach, lost = np.array([away for away, _ in points]), np.stack([self._lost(label, name) for _, name in points])
+        return self.results.estimate(self.kind.per * (reach @ lost) / float(reach @ reach))
 
     def gain(self, label: str, condition: str) -> Estimate | None:
         """Headline score above the baseline under the same change, positive where it is better."""

@@ -10,8 +10,6 @@ from ..data.column import Column
 from ..data.meanings import File, column
 from ..markdown import Markdown, blocks, code, heading, table
 
-_UNKNOWN = "Not described"
-
 
 def dictionary(files: Mapping[File, pd.DataFrame]) -> Markdown:
     """A section for every file, a row for every column that it has."""
@@ -30,5 +28,5 @@ def dictionary(files: Mapping[File, pd.DataFrame]) -> Markdown:
 
 
 def _row(file: File, name: str) -> list[object]:
-    found = column(file, name) or Column(name, _UNKNOWN, "number")
+    found = column(file, name) or Column(name, "Not described", "number")
     return [code(name), Markdown(found.meaning), Markdown(found.unit), found.kind]

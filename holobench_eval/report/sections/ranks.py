@@ -49,8 +49,7 @@ def flips(ranks: Ranks) -> Markdown | None:
     if not flipping:
         return None
     score = ranks.results.headline
-    unit = f" [{score.unit}]" if score.unit else ""
-    columns = ["nominally better", "than", f"nominally by{unit}", f"over draws by{unit}"]
+    columns = ["nominally better", "than", f"nominally by{score.brackets}", f"over draws by{score.brackets}"]
     columns += ["other way in [% of draws]", "goes with"]
     return table(columns, [_flip(ranks, pair) for pair in flipping])
 

@@ -90,11 +90,10 @@ def _marked(results: Results, name: str) -> str:
 def losses(sweep: Sweep) -> Markdown | None:
     """What the worst change cost each method, the slope, and what is left above the baseline."""
     score, kind, baseline = sweep.results.headline, sweep.kind, sweep.results.layout.baseline
-    unit = f" [{score.unit}]" if score.unit else ""
     sides = {-1: " below", 1: " above"} if len(sweep.sides) > 1 else {-1: "", 1: ""}
-    per = [f"loss per {kind.per:g} {kind.unit}{sides[side]}{unit}" for side in sweep.sides]
-    columns = ["method", "worst at", f"loss there{unit}", *per]
-    columns += [f"above {baseline} there{unit}", *([f"falls to {baseline} at"] if kind.numeric else [])]
+    per = [f"loss per {kind.per:g} {kind.unit}{sides[side]}{score.brackets}" for side in sweep.sides]
+    columns = ["method", "worst at", f"loss there{score.brackets}", *per]
+    columns += [f"above {baseline} there{score.brackets}", *([f"falls to {baseline} at"] if kind.numeric else [])]
     rows = []
     for label in sweep.methods:
         worst, slopes = sweep.worst(label), [sweep.slope(label, side) for side in sweep.sides]
@@ -201,7 +200,7 @@ def _claim(sweep: Sweep, label: str) -> str:
     where = f"{sweep.kind.words}, {value_text(value)} {sweep.kind.unit}".rstrip(" ,")
     sentence = (
         f'"{claim}" {verdict} for {label} on {sweep.swept.before}: its largest loss ({where}) is '
-        f"{score.interval(loss.mean, loss.low, loss.high)} {score.unit}"
+        f"{score.estimate(loss)} {score.unit}"
     )
     if label == baseline:
         return f"{sentence}."
