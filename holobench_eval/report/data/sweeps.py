@@ -13,8 +13,6 @@ from .results import Results
 from .statistics import Array, Estimate, mean_interval, ratio_interval
 
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
-# Kinds whose points are other benches: they are asked for rankings and not for losses.
-RANKS = frozenset({"draw"})
 
 
 @dataclass(frozen=True)
@@ -171,5 +169,5 @@ class Sweep:
 
 
 def sweeps(results: Results) -> list[Sweep]:
-    """The sweeps of a study, those of rankings aside."""
-    return [Sweep(swept, results) for swept in results.layout.sweeps if swept.kind not in RANKS]
+    """The sweeps of a study without draws, which are other benches and are asked for rankings, not for losses."""
+    return [Sweep(swept, results) for swept in results.layout.sweeps if swept.kind != "draw"]

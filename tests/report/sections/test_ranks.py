@@ -203,18 +203,6 @@ def test_the_ceiling_and_methods_that_see_the_camera_are_not_ranked():
     assert not one.exists
 
 
-def test_two_sweeps_of_one_display_are_one_ranking():
-    records, layout = study(FLIPPING)
-    (swept,) = layout.sweeps
-    halves = (
-        Swept("draw", DISPLAY, swept.points[:9], swept.drawn[:9]),
-        Swept("draw", DISPLAY, swept.points[9:], swept.drawn[9:]),
-    )
-    _, split = study(FLIPPING, sweeps=halves)
-    results = [Results(records_frame(records, one), one) for one in (layout, split)]
-    assert ranks(results[1])[0].swept == ranks(results[0])[0].swept
-
-
 def test_a_share_has_wilsons_interval():
     some = share(15, 40)
     z, n, p = 1.959964, 40, 15 / 40
@@ -263,6 +251,14 @@ def test_a_layout_knows_what_was_drawn_whether_the_profile_has_a_name_or_a_path(
     path = files("holobench_eval.display.simulated") / "profiles" / "leto-2020.yaml"
     (tmp_path / "own.yaml").write_text(path.read_text())
     assert swept_of(tmp_path, "own.yaml")[0] == drawn
+
+
+def test_two_sweeps_of_one_display_are_one_ranking(tmp_path):
+    text = CONFIG.format(profile="leto-2020").replace("count: 3}", "count: 2}, {condition: draw, values: [5]}")
+    (tmp_path / "study.yaml").write_text(text)
+    drawn, _ = layout_of(load_study(tmp_path / "study.yaml")).sweeps
+    assert [float(value) for value, _ in drawn.points] == [1, 2, 5]
+    assert drawn.drawn == tuple(draws.values(load_profile("leto-2020"), index) for index in (1, 2, 5))
 
 
 def test_parameters_of_a_stage_that_the_display_lacks_are_not_among_what_was_drawn(tmp_path):
