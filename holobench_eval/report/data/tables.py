@@ -31,6 +31,7 @@ MEDIAN = "_median"  # the statistic of the headline beside its mean
 _EXACT = 2.0**53  # below it every whole number is a float
 # Text that a spreadsheet would run as a formula, after any apostrophes, which this module puts before it.
 _FORMULA = re.compile(r"'*\s*[=+\-@＝＋－＠]")
+GUARDED = rf"^'({_FORMULA.pattern})"
 
 
 def rounded(value: Any) -> float:
@@ -195,7 +196,7 @@ def read_records(text: str) -> pd.DataFrame:
     if lacking:
         raise UserError(f"records.csv lacks the columns {', '.join(lacking)}; it was written by another version")
     texts = [column.name for column in listed if column.kind == "text" and column.name in frame]
-    frame[texts] = frame[texts].replace(f"^'({_FORMULA.pattern})", r"\1", regex=True)
+    frame[texts] = frame[texts].replace(GUARDED, r"\1", regex=True)
     for name in frame.columns.drop(texts):
         try:
             frame[name] = [float(value) if value else np.nan for value in frame[name]]
