@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from ...study.plan import REFERENCE
 from ..data.categories import CATEGORIES, OFFLINE, ONLINE
-from ..data.marks import counted
-from ..data.phrases import difference, relation, tested, value, verdict
+from ..data.phrases import counted, difference, relation, tested, value, verdict
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES
 from ..data.text import number, p_value, percent, words

@@ -27,11 +27,6 @@ CELL: list[Column] = []  # what a cell is, before the scores
 FIGURES: list[Column] = []  # what was measured beside scores, and its origin, after them
 
 
-def identity_of(record: Record) -> str:
-    """The name of a record, which names its row and its thumbnail, too."""
-    return str(record["id"])
-
-
 def timed(done: pd.DataFrame) -> pd.DataFrame:
     """Of the done cells of a row those whose seconds count: what was solved alone if anything was, else all."""
     alone = done[done["timed_alone"] == 1] if "timed_alone" in done else done
@@ -303,7 +298,7 @@ def fell_back(record: Record, layout: Layout) -> str:
 @column(FIGURES)
 def cell(record: Record, layout: Layout) -> str:
     """Name of the capture: the digest of all that it depends on."""
-    return identity_of(record)
+    return str(record["id"])
 
 
 @column(FIGURES)

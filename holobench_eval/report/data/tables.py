@@ -16,12 +16,11 @@ import numpy as np
 import pandas as pd
 
 from ...core.errors import UserError
-from ...study.plan import FLOORS, REFERENCE
+from ...study.plan import FLOORS, REFERENCE, Plan
 from . import columns
 from .categories import FLOOR, ORACLE
 from .column import DONE as DONE
 from .column import Cells, Column, Record, always
-from .columns import identity_of as identity_of
 from .layout import Layout
 from .scores import order_scores, parse
 from .statistics import mean_interval
@@ -40,7 +39,7 @@ def rounded(value: Any) -> float:
 
 
 def _row(record: Record, layout: Layout, listed: Sequence[Column]) -> dict[str, Any]:
-    """A row from its record, or as it was written where the record is of a records.csv (``committed``)."""
+    """A row from its record, or as it was written where the record is one of ``committed_records``."""
     if "row" in record:
         return dict(record["row"])
     row = {
@@ -203,3 +202,35 @@ def read_records(text: str) -> pd.DataFrame:
         except ValueError as error:
             raise UserError(f"records.csv, column {name}: {error}") from error
     return _whole(frame)
+
+
+def difference(frame: pd.DataFrame, plan: Plan) -> str:
+    """How the cells of a records frame differ from those that are planned now, in words; empty where they do not."""
+    planned, measured = {cell.id for cell in plan.cells}, set(frame["cell"])
+    parts = [(len(planned - measured), f"of {len(planned)} planned cells are not in records.csv")]
+    parts += [(len(measured - planned), f"of {len(measured)} cells in records.csv are not planned")]
+    return ", ".join(f"{count} {text}" for count, text in parts if count)
+
+
+def committed_records(frame: pd.DataFrame, plan: Plan) -> list[dict[str, Any]]:
+    """A record for every cell of a plan, as ``Store.load`` gives them under the plan's labels.
+
+    frame: a records frame that has all of them, see ``difference``.
+    """
+    rows = {row["cell"]: row for row in frame.to_dict("records")}
+    scores = {parse(name).key: name for name in score_columns(frame)}
+    found = []
+    for label, cell in plan.labelled():
+        row = rows[cell.id]
+        found.append(
+            {
+                "id": cell.id,
+                "cell": cell.facts(),
+                "label": label,
+                "state": row["state"],
+                "scores": {key: row[name] for key, name in scores.items() if not pd.isna(row[name])},
+                "learned": {"sha256": row["learned_sha256"]} if row.get("learned_sha256") else None,
+                "row": {**row, "label": label},  # what the numbers of the tables come from
+            }
+        )
+    return found

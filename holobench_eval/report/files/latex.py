@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from ..data.marks import marked
+from ..data.phrases import marked
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES, Score
 from ..data.statistics import LEVEL, NONE, SIGNIFICANCE, Estimate, PairedTest

@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from ...core.io import write_atomically
-from ..data.meanings import column
+from .dictionary import column
 
 
 def is_available() -> bool:

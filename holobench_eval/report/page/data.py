@@ -9,7 +9,7 @@ from typing import Any
 from ...study.plan import REFERENCE
 from ..charts.look.methods import looks
 from ..data.columns import costs
-from ..data.marks import counted
+from ..data.phrases import counted
 from ..data.ranks import Ranks
 from ..data.results import Results
 from ..data.scores import Score

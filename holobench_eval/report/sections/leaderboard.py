@@ -13,7 +13,7 @@ from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
 from ..charts.look.methods import looks
 from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
 from ..data.columns import costs
-from ..data.marks import CONSTANT, marked
+from ..data.phrases import CONSTANT, marked
 from ..data.results import Results
 from ..data.text import number, percent, words
 from ..markdown import Markdown, bullets, heading, table

@@ -12,7 +12,7 @@ from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..charts.sweeps import Curve, Panel, draw_sweep
 from ..data.categories import OFFLINE, ONLINE
-from ..data.marks import CONSTANT
+from ..data.phrases import CONSTANT
 from ..data.results import Results
 from ..data.statistics import Estimate
 from ..data.sweeps import SMALL, Sweep

@@ -18,7 +18,7 @@ import numpy as np
 from ...study.plan import REFERENCE
 from ...study.versions import HARNESS
 from ..data.categories import ORACLE
-from ..data.marks import CONSTANT, marked
+from ..data.phrases import CONSTANT, marked
 from ..data.scores import Score
 from ..data.statistics import Estimate, mean_interval
 from ..data.tables import DONE

@@ -12,10 +12,10 @@ from holobench_eval.metrics.catalogue import catalogue
 from holobench_eval.report import Description, Layout, write_report
 from holobench_eval.report.data import columns
 from holobench_eval.report.data.column import Column, InTable, Record, column, if_known, mean
-from holobench_eval.report.data.meanings import File
-from holobench_eval.report.data.meanings import column as described
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.tables import read_records, records_frame
+from holobench_eval.report.files.dictionary import File
+from holobench_eval.report.files.dictionary import column as described
 from holobench_eval.report.page.data import page_data
 from holobench_eval.report.section import Report
 from holobench_eval.report.sections.leaderboard import leaderboard
