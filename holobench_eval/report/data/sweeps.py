@@ -29,26 +29,26 @@ class Sweep:
 
     @property
     def points(self) -> tuple[tuple[float | str, str], ...]:
-        """(value, condition), by value, the unchanged display among numbers at its place."""
+        """(value, condition), by value, the unchanged display at its place; it leads as ``before`` where the values are
+        no numbers."""
         if self.kind.nominal is None:
-            return self.swept.points
+            return (("before", self.swept.before), *self.swept.points)
         numbers = [(self.kind.nominal, self.swept.before), *self.swept.points]
         return tuple(sorted(numbers, key=lambda point: float(point[0])))
 
     @property
-    def named_points(self) -> tuple[tuple[float | str, str], ...]:
-        """``points``, led by the unchanged display as ``before`` where the values are no numbers."""
-        return self.points if self.kind.numeric else (("before", self.swept.before), *self.points)
-
-    @property
-    def values(self) -> dict[str, float | str]:
-        """The value of every changed condition."""
-        return {condition: value for value, condition in self.swept.points}
+    def _ways(self) -> dict[int, list[tuple[float, str]]]:
+        """(value, condition) from the unchanged display down (-1) and up (1); none where the values are no numbers."""
+        if self.kind.nominal is None:
+            return {}
+        points = [(float(value), condition) for value, condition in self.points]
+        start = points.index((self.kind.nominal, self.swept.before))
+        return {-1: points[start::-1], 1: points[start:]}
 
     @property
     def methods(self) -> list[str]:
         """Labels that were planned under every condition of the sweep."""
-        rows = [self.results.methods(condition) for _, condition in ((0.0, self.swept.before), *self.swept.points)]
+        rows = [self.results.methods(condition) for _, condition in self.points]
         return [label for label in rows[0] if all(label in others for others in rows)]
 
     def mean(self, label: str, condition: str) -> Estimate:
@@ -74,26 +74,21 @@ class Sweep:
     def worst(self, label: str) -> tuple[float | str, Estimate] | None:
         """The value that cost most, and what it cost."""
         losses = self.losses(label)
-        if not losses:
-            return None
-        condition = max(losses, key=lambda name: losses[name].mean)
-        return self.values[condition], losses[condition]
+        known = [(value, losses[condition]) for value, condition in self.swept.points if condition in losses]
+        return max(known, key=lambda point: point[1].mean, default=None)
 
     @property
     def sides(self) -> list[int]:
         """-1 and 1 where there are points below and above the nominal value; none for names and for factors."""
-        nominal = self.kind.nominal
-        if nominal is None or not self.kind.per:
-            return []
-        return [side for side in (-1, 1) if any(side * (float(v) - nominal) > 0 for v, _ in self.swept.points)]
+        return [side for side, way in self._ways.items() if len(way) > 1 and self.kind.per]
 
     def slope(self, label: str, side: int) -> Estimate | None:
         """Loss for ``kind.per`` of the change to one side: the least-squares line through zero, target by target."""
-        nominal = float(self.kind.nominal or 0.0)
-        points = [(abs(float(v) - nominal), name) for v, name in self.swept.points if side * (float(v) - nominal) > 0]
+        (nominal, _), *points = self._ways[side]
         if not points or any(self.loss(label, name) is None for _, name in points):
             return None
-        reach, lost = np.array([away for away, _ in points]), np.stack([self._lost(label, name) for _, name in points])
+        reach = np.array([abs(value - nominal) for value, _ in points])
+        lost = np.stack([self._lost(label, name) for _, name in points])
         return self.results.estimate(self.kind.per * (reach @ lost) / float(reach @ reach))
 
     def gain(self, label: str, condition: str) -> Estimate | None:
@@ -106,41 +101,31 @@ class Sweep:
     def break_even(self, label: str) -> list[float] | None:
         """Where a method that is above the baseline without a change falls to it, on either side of the nominal value,
         by straight lines between the points; empty where it never does. None where a difference is not known."""
-        if self.kind.nominal is None or any(self.gain(label, condition) is None for _, condition in self.points):
+        gains = {name: gained.mean for _, name in self.points if (gained := self.gain(label, name))}
+        if self.kind.nominal is None or len(gains) < len(self.points):
             return None
         crossings = []
-        for side in (-1, 1):
-            walk = sorted(
-                (side * (float(value) - self.kind.nominal), condition)
-                for value, condition in self.points
-                if side * (float(value) - self.kind.nominal) >= 0
-            )
-            gains = [(reach, gained.mean) for reach, name in walk if (gained := self.gain(label, name)) is not None]
-            for (near, above), (far, below) in itertools.pairwise(gains):
+        for way in self._ways.values():
+            for (near, before), (far, after) in itertools.pairwise(way):
+                above, below = gains[before], gains[after]
                 if above > 0 >= below:
-                    crossings.append(self.kind.nominal + side * (near + (far - near) * above / (above - below)))
+                    crossings.append(near + (far - near) * above / (above - below))
                     break
         return crossings
 
     def small_range(self, label: str) -> tuple[float, float] | None:
         """The values around the nominal one up to which the mean changes by at most ``SMALL``; None without numbers,
         and where the next value has no score."""
-        if self.kind.nominal is None:
-            return None
-        losses = self.losses(label)
-        ends = []
-        for side in (-1, 1):
-            reach = 0.0
-            for value, condition in sorted(self.swept.points, key=lambda point: abs(float(point[0]))):
-                away = side * (float(value) - self.kind.nominal)
-                if away > 0:
-                    if condition not in losses:
-                        return None
-                    if abs(losses[condition].mean) > SMALL:
-                        break
-                    reach = away
-            ends.append(self.kind.nominal + side * reach)
-        return ends[0], ends[1]
+        losses, ends = self.losses(label), []
+        for (end, _), *points in self._ways.values():
+            for value, condition in points:
+                if condition not in losses:
+                    return None
+                if abs(losses[condition].mean) > SMALL:
+                    break
+                end = value
+            ends.append(end)
+        return (ends[0], ends[1]) if ends else None
 
     def small_range_text(self, label: str) -> str | None:
         """``small_range`` with its unit: ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``."""

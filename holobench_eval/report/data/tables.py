@@ -20,7 +20,7 @@ from ...study.plan import FLOORS, REFERENCE, Plan
 from . import columns
 from .categories import FLOOR, ORACLE
 from .column import DONE as DONE
-from .column import Cells, Column, Record, always
+from .column import Cells, Column, Record
 from .layout import Layout
 from .scores import order_scores, parse
 from .statistics import mean_interval
@@ -63,7 +63,11 @@ def records_frame(records: Iterable[Record], layout: Layout) -> pd.DataFrame:
     frame = of_study(pd.DataFrame([_row(record, layout, listed) for record in records]), layout)
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(score_columns(frame)) or [parse(layout.headline).column]
-    kept = [column for column in listed if column.name in frame and column.kept(frame[column.name], layout)]
+    kept = [
+        column
+        for column in listed
+        if column.name in frame and (column.kept is None or column.kept(frame[column.name], layout))
+    ]
     first, last = ([column.name for column in part if column in kept] for part in (columns.CELL, columns.FIGURES))
     return _sorted(_whole(frame.reindex(columns=[*first, *scores, *last])), layout)
 
@@ -133,7 +137,7 @@ def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     for pair in row_order(frame, layout):
         cells, published = Cells(*pair, groups.get_group(pair), layout), layout.published(*pair)
         first, last = (
-            {column.name: column.table.value(cells, column.name) for column in part if column.table}
+            {column.name: column.table(cells, column.name) for column in part if column.table}
             for part in (
                 [column for column in part if column.name not in unknown] for part in (columns.CELL, columns.FIGURES)
             )
@@ -191,7 +195,7 @@ def read_records(text: str) -> pd.DataFrame:
     """The records frame from the text of records.csv."""
     frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     listed = columns.recorded()
-    lacking = sorted(column.name for column in listed if column.kept is always and column.name not in frame)
+    lacking = sorted(column.name for column in listed if column.kept is None and column.name not in frame)
     if lacking:
         raise UserError(f"records.csv lacks the columns {', '.join(lacking)}; it was written by another version")
     texts = [column.name for column in listed if column.kind == "text" and column.name in frame]

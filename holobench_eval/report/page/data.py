@@ -148,7 +148,7 @@ def _sweep(sweep: Sweep) -> Json:
         "words": sweep.kind.words,
         "unit": sweep.kind.unit,
         "numeric": sweep.kind.numeric,
-        "points": [{"value": value, "condition": condition} for value, condition in sweep.named_points],
+        "points": [{"value": value, "condition": condition} for value, condition in sweep.points],
         "ends": {name: {label: _ends(sweep, label, name) for label in sweep.methods} for name in changed},
     }
 

@@ -71,10 +71,10 @@ def scores(sweep: Sweep) -> Markdown:
     """Mean of the headline metric at every value."""
     score = sweep.results.headline
     rows = [
-        [_marked(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in sweep.named_points)]
+        [_marked(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in sweep.points)]
         for label in sweep.methods
     ]
-    return table(["method", *(_with_unit(sweep, value) for value, _ in sweep.named_points)], rows)
+    return table(["method", *(_with_unit(sweep, value) for value, _ in sweep.points)], rows)
 
 
 def _with_unit(sweep: Sweep, value: float | str) -> str:
@@ -253,7 +253,7 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _panel(sweep: Sweep) -> Panel:
-    kind, points = sweep.kind, sweep.named_points
+    kind, points = sweep.kind, sweep.points
     results, looked, curves = sweep.results, looks(sweep.results.names), []
     for label in sweep.methods:
         means = tuple(sweep.mean(label, condition).mean for _, condition in points)
@@ -282,7 +282,7 @@ def _reach(sweep: Sweep, label: str, condition: str) -> tuple[float, float]:
 
 def _rows(report: Report, sweep: Sweep, target: str) -> list[Row]:
     """A row of captures for each of the chosen methods."""
-    points = sweep.named_points
+    points = sweep.points
     if len(points) > MOST_VALUES:
         picks = np.linspace(0, len(points) - 1, MOST_VALUES).round().astype(int)
         points = tuple(points[index] for index in picks)
