@@ -127,7 +127,7 @@ def _range(results: Results, same: list[Sweep]) -> Iterator[str]:
     for sweep in same:
         ranges: dict[str, list[str]] = {}
         for label in sweep.methods:
-            if reach := sweep.small_range_text(label):
+            if reach := sweep.small_range(label):
                 ranges.setdefault(reach, []).append(label)
         if ranges:
             each = [f"{text} ({words(labels)})" for text, labels in ranges.items()]

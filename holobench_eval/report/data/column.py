@@ -21,8 +21,6 @@ _UNITS = {"px": "px", "s": "s", "mib": "MiB"}
 class Cells:
     """The cells behind a row of the table."""
 
-    label: str
-    condition: str
     cells: pd.DataFrame
     layout: Layout
 

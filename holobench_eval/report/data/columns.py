@@ -44,7 +44,7 @@ def _learned(record: Record, key: str, untrained: Any, unknown: Any) -> Any:
 
 
 def _changed(cells: Cells, name: str) -> Any:
-    return getattr(cells.layout.change(cells.condition), name)
+    return getattr(cells.layout.change(first(cells, "condition")), name)
 
 
 def _one_line(text: object) -> str:
@@ -118,7 +118,7 @@ def panel_width_px(row: Row, layout: Layout) -> float:
 @column(CELL, source=None)
 def parameters(cells: Cells, name: str) -> str:
     """Parameters of the method as JSON, defaults filled in."""
-    return json.dumps(cells.layout.params.get(cells.label, {}), sort_keys=True, ensure_ascii=False)
+    return json.dumps(cells.layout.params.get(first(cells, "label"), {}), sort_keys=True, ensure_ascii=False)
 
 
 _KINDS = ", ".join(f"`{kind}`" for kind in KINDS)

@@ -204,7 +204,6 @@ def layout_of(study: Study) -> Layout:
     names = {source: condition.name for source, condition in conditions.items()}
     traits = {entry.label: isolation.traits(entry.name, study.folder) for entry in study.methods}
     trained = frozenset(label for label, method in traits.items() if method.trains)
-    probe = study.holograms
     return Layout(
         title=study.title,
         pairs=tuple(
@@ -229,7 +228,7 @@ def layout_of(study: Study) -> Layout:
         note=study.note,
         measure=study.measure,
         metrics=study.protocol.metrics,
-        holograms=f"{probe.name} ({plain(probe.params)})" if study.predicts else "",
+        holograms=f"{study.holograms.name} ({plain(study.holograms.params)})" if study.predicts else "",
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,
         identities=frozenset(entry.label for entry in study.methods if network_of(entry.params) == "identity"),
@@ -292,6 +291,5 @@ def _drawn(before: Condition, points: tuple[tuple[float | str, str], ...]) -> tu
 
 def _training_set(study: Study) -> TrainingSet:
     chosen = study.training
-    dataset = plugins.build("datasets", chosen.dataset, dict(chosen.params), study.folder)
-    named = f"{chosen.dataset} ({plain(chosen.params)})"
-    return TrainingSet(named, len(dataset.items()), chosen.held_out, chosen.captures)
+    images = plugins.build("datasets", chosen.dataset, dict(chosen.params), study.folder).items()
+    return TrainingSet(f"{chosen.dataset} ({plain(chosen.params)})", len(images), chosen.held_out, chosen.captures)

@@ -101,7 +101,7 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
     if label not in layout.trained - layout.identities or not results.is_complete(label, condition):
         return []
     rows = [("the ideal image", name, condition) for name in layout.identities if name in results.methods(condition)]
-    if CONSTANT in results.floors and results.has_floor(condition):
+    if CONSTANT in results.floors and results.has_pictures(condition):
         rows.insert(0, ("the constant image", CONSTANT, REFERENCE))
     ours, better = results.values(label, condition).mean(), results.headline.better
     return [text for text, name, where in rows if better(results.values(name, where).mean(), ours)]

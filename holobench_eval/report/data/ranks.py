@@ -72,11 +72,6 @@ class Pair:
         """Share of such draws."""
         return share(self.flips, len(self.differences))
 
-    @property
-    def lead(self) -> Estimate:
-        """Mean difference over draws."""
-        return mean_interval(self.differences)
-
 
 @dataclass(frozen=True)
 class Ranks:

@@ -179,17 +179,11 @@ class Results:
         rows = (name for name in FLOORS if name in self.methods(REFERENCE))
         return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.column])]
 
-    def has_floor(self, condition: str) -> bool:
-        """Whether the reference rows were scored against the same images as the methods under ``condition``.
+    def has_pictures(self, condition: str) -> bool:
+        """Whether the reference rows were scored against the same images as the methods under ``condition``, and made
+        the pictures that stand for the targets there.
 
         Pictures are compared with targets, equal for all displays; predictions with the captures of one display.
-        """
-        return bool(self.floors) and self.has_pictures(condition)
-
-    def has_pictures(self, condition: str) -> bool:
-        """Whether the pictures that stand for the targets are what the methods under ``condition`` are scored against.
-
-        The reference rows make them: for predictions, captures of one display.
         """
         captured = self.frame.loc[self.frame["condition"] == REFERENCE, "display"]
         return not self.layout.predicts or condition in set(captured)
@@ -221,7 +215,7 @@ class Results:
 
     def above_floor(self, label: str, condition: str, floor: str = "floor_constant") -> Estimate | None:
         """Headline score minus that of a floor row of the same target; None without one, or without a target."""
-        if floor not in self.floors or not self.has_floor(condition):
+        if floor not in self.floors or not self.has_pictures(condition):
             return None
         found = self.estimate(self.values(label, condition) - self.values(floor, REFERENCE))
         return found if found.n else None

@@ -113,9 +113,10 @@ class Sweep:
                     break
         return crossings
 
-    def small_range(self, label: str) -> tuple[float, float] | None:
-        """The values around the nominal one up to which the mean changes by at most ``SMALL``; None without numbers,
-        and where the next value has no score."""
+    def small_range(self, label: str) -> str | None:
+        """The values around the nominal one up to which the mean changes by at most ``SMALL``, with their unit:
+        ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``. None without numbers, and where the next
+        value has no score."""
         losses, ends = self.losses(label), []
         for (end, _), *points in self._ways.values():
             for value, condition in points:
@@ -125,14 +126,8 @@ class Sweep:
                     break
                 end = value
             ends.append(end)
-        return (ends[0], ends[1]) if ends else None
-
-    def small_range_text(self, label: str) -> str | None:
-        """``small_range`` with its unit: ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``."""
-        if (ends := self.small_range(label)) is None:
-            return None
-        if ends[0] == ends[1]:
-            return "nowhere"
+        if not ends or ends[0] == ends[1]:
+            return "nowhere" if ends else None
         tested = [float(value) for value, _ in self.swept.points]
         low = f"{ends[0]:g}{' or less' * (ends[0] == min(tested))}"
         high = f"{ends[1]:g}{' or more' * (ends[1] == max(tested))}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -135,17 +135,17 @@ def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     means, none = per_target(frame), frame[score_columns(frame)].iloc[:0]
     rows = []
     for pair in row_order(frame, layout):
-        cells, published = Cells(*pair, groups.get_group(pair), layout), layout.published(*pair)
-        first, last = (
-            {column.name: column.table(cells, column.name) for column in part if column.table}
-            for part in (
-                [column for column in part if column.name not in unknown] for part in (columns.CELL, columns.FIGURES)
-            )
-        )
+        cells, published = Cells(groups.get_group(pair), layout), layout.published(*pair)
+        first, last = (_values(cells, part, unknown) for part in (columns.CELL, columns.FIGURES))
         scores = _statistics(cells, means.get(pair, none))
         reported = {f"{PUBLISHED}{parse(name).column}": published.get(name, np.nan) for name in layout.reported_metrics}
         rows.append(first | scores | last | reported)
     return _ranked(pd.DataFrame(rows), len({*layout.targets, *frame["target"]}), layout)
+
+
+def _values(cells: Cells, listed: Sequence[Column], unknown: Container[str]) -> dict[str, Any]:
+    known = [column for column in listed if column.name not in unknown]
+    return {column.name: column.table(cells, column.name) for column in known if column.table}
 
 
 def _statistics(cells: Cells, means: pd.DataFrame) -> dict[str, float]:

@@ -66,8 +66,8 @@ class Text:
     scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
     figures; each: what a method makes for one target. best, only: what the first of several, or the only, ranked method
     does; other: the same by another metric. procedure: what is done; caution: what the figures do not say;
-    displays: what the displays are; floor, instead: the reference images and the heading of their column. looked_at:
-    heading of the pictures; picture: what a tile of the comparison is. registered: what was done before any refinement
+    displays: what the displays are; floor, instead: the reference images and the heading of their column.
+    picture: what a tile of the comparison is. registered: what was done before any refinement
     of the geometry; drifted: what a large difference to the refined geometry means. blur, cost: first sentences of
     these sections. seeds: what is random. compared: in which values pictures are matched and blurred; domains: what the
     domains of metrics mean.
@@ -98,7 +98,6 @@ class Text:
         "Linear: light intensity in [0, 1], as the sensor measures it. Amplitude: its square root. sRGB: encoded "
         "for a monitor; perceptual metrics are defined on it."
     )
-    looked_at: str = "Captures to look at"
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
     registered: str = "Registration is frozen before any method's image is captured. "
     drifted: str = "the geometry drifted"
@@ -137,7 +136,6 @@ ON_A_NETWORK = replace(
     ),
     displays="The display is a trained, frozen network; there is no bench, no camera and no noise.",
     instead="in the place of a predicted capture",
-    looked_at="Predicted captures to look at",
     picture="Each predicted capture is matched in intensity and sRGB-encoded",
     registered="The network predicts in the frame of the target. ",
     drifted="the picture is displaced",
@@ -165,7 +163,6 @@ PREDICTION = replace(
     ),
     floor="Images that no method predicted, scored against the same captures with the same match and metrics.",
     instead="in the place of a prediction",
-    looked_at="Predictions to look at",
     picture=(
         'The column "capture" shows the capture of the hologram by {holograms}, registered and matched to the target; '
         "each prediction is matched to it in intensity; all are sRGB-encoded"

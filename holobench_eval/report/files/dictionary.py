@@ -39,9 +39,10 @@ _KEYS = {
     "error_of_ideal_image": ("Squared error of the ideal image against the target", _WHITE),
 }
 _VARIANTS = {
-    "refined": "after a rigid motion of at most 2 px and 0.1 degree",
-    "infocus": "of what is in focus at the plane",
-    "second": "by a second, independent registration",
+    "": "",
+    "refined": ", after a rigid motion of at most 2 px and 0.1 degree",
+    "infocus": ", of what is in focus at the plane",
+    "second": ", by a second, independent registration",
 }
 _INTERVAL = f"{100 * LEVEL:.0f} % interval over clusters of targets"
 _STATISTICS = {
@@ -75,14 +76,10 @@ def _score(score: Score, name: str, statistic: str) -> Column | None:
     """A score's column. statistic: over targets, empty for single cells."""
     if score.key in _KEYS:
         meaning, unit = _KEYS[score.key]
-    elif score.metric in METRICS and score.domain:
-        meaning, unit = f"{score.title} in {DOMAIN_NAMES[score.domain]}", score.unit
-        if score.blur is not None:
-            meaning += f", both pictures blurred by a Gaussian of standard deviation {score.blur:g} px"
-        elif score.variant in _VARIANTS:
-            meaning += f", {_VARIANTS[score.variant]}"
-        elif score.variant:
-            return None
+    elif score.metric in METRICS and score.domain and (score.blur is not None or score.variant in _VARIANTS):
+        blurred = f", both pictures blurred by a Gaussian of standard deviation {score.blur or 0:g} px"
+        variant = _VARIANTS.get(score.variant, blurred)
+        meaning, unit = f"{score.title} in {DOMAIN_NAMES[score.domain]}{variant}", score.unit
     else:
         return None
     return Column(name, f"{meaning}, {statistic}" if statistic else meaning, "number", unit)

@@ -50,7 +50,7 @@ def page_data(report: Report) -> Json:
             name: [
                 {"name": results.layout.text.floor_name(floor), "mean": _number(results.row(floor, REFERENCE)[column])}
                 for floor in results.floors
-                if results.has_floor(name)
+                if results.has_pictures(name)
             ]
             for column in [results.headline.column]
             for name in results.conditions

@@ -159,7 +159,7 @@ def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
     )
     baseline, oracle = results.layout.baseline, results.oracle(condition)
     known = baseline in results.methods(condition) and results.is_complete(str(baseline), condition)
-    has_constant = CONSTANT in results.floors and results.has_floor(condition)
+    has_constant = CONSTANT in results.floors and results.has_pictures(condition)
     return Frontier(
         condition,
         marks,

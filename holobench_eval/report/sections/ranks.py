@@ -12,7 +12,7 @@ from ..answers.ranks import table as methods
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
 from ..data.ranks import CIRCULAR, Cause, Feature, Pair, Ranks, share
-from ..data.statistics import SIGNIFICANCE
+from ..data.statistics import SIGNIFICANCE, mean_interval
 from ..data.text import p_value, percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
@@ -60,7 +60,7 @@ def _flip(ranks: Ranks, pair: Pair) -> list[str]:
         pair.first,
         pair.second,
         score.number(pair.nominal, signed=True),
-        score.estimate(pair.lead, signed=True),
+        score.estimate(mean_interval(pair.differences), signed=True),
         percent(pair.flipped),
         favours(pair, pair.cause) if pair.cause else NOTHING,
     ]

@@ -146,7 +146,7 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     floors = {
         text.floor_name(name): float(results.row(name, REFERENCE)[results.headline.column])
         for name in ("floor_constant", "floor_speckle")
-        if name in results.floors and all(map(results.has_floor, results.conditions))
+        if name in results.floors and all(map(results.has_pictures, results.conditions))
     }
     path = report.figures / "quality-by-target.png"
     draw_quality(path, results, floors)

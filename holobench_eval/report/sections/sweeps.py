@@ -145,7 +145,7 @@ def sentences(sweep: Sweep, sweeps: Sequence[Sweep]) -> list[str]:
 def _stated_range(sweep: Sweep) -> list[str]:
     ranges: dict[str, list[str]] = {}
     for label in sweep.methods:
-        if reach := sweep.small_range_text(label):
+        if reach := sweep.small_range(label):
             ranges.setdefault(reach, []).append(label)
     limit = f"{SMALL:g} {sweep.results.headline.unit}"
     return [
@@ -259,7 +259,7 @@ def _panel(sweep: Sweep) -> Panel:
         means = tuple(sweep.mean(label, condition).mean for _, condition in points)
         reaches = tuple(_reach(sweep, label, condition) for _, condition in points)
         curves.append(Curve(label, means, reaches, looked[label], dashed=label == results.layout.baseline))
-    has_floor = CONSTANT in results.floors and results.has_floor(sweep.swept.before)
+    has_floor = CONSTANT in results.floors and results.has_pictures(sweep.swept.before)
     return Panel(
         title=sweep.swept.before,
         axis=f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}",
