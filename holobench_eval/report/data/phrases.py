@@ -21,9 +21,7 @@ CONSTANT = "floor_constant"
 
 def difference(score: Score, estimate: Estimate) -> str:
     """``+1.20 dB [+0.80, +1.60]``."""
-    mean = score.with_unit(estimate.mean, signed=True)
-    ends = (score.number(end, signed=True) for end in (estimate.low, estimate.high))
-    return mean if np.isnan(estimate.low) else f"{mean} [{', '.join(ends)}]"
+    return score.estimate(estimate, signed=True, unit=True)
 
 
 def margin(score: Score, test: PairedTest) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -25,25 +25,23 @@ ENOUGH = 0.5
 # Parameters that are angles over a full turn: neither end of their range is more than the other.
 CIRCULAR = frozenset({"zero_phase"})
 
-
-@dataclass(frozen=True)
-class Feature:
-    """A number of every draw that a difference between two methods may go with.
-
-    parameter: its name in ``draws.PARAMETERS``; form: the value; its size, where the range has both signs; or the sine
-    or cosine of an angle; values: ``(draws,)``.
-    """
-
-    parameter: str
-    form: Literal["value", "size", "sine", "cosine"]
-    values: Array
+# In which forms a difference between two methods may go with a parameter.
+Form = Literal["value", "size", "sine", "cosine"]
+_FORMS: Mapping[Form, Callable[[Array], Array]] = {
+    "value": np.asarray,
+    "size": np.abs,
+    "sine": np.sin,
+    "cosine": np.cos,
+}
 
 
 @dataclass(frozen=True)
 class Cause:
-    """What a difference goes with: Spearman's rank correlation, and its p value times all that were tried."""
+    """What a difference goes with: a parameter of ``draws.PARAMETERS`` in a form, Spearman's rank correlation, and its
+    p value times all that were tried."""
 
-    feature: Feature
+    parameter: str
+    form: Form
     correlation: float
     p: float
 
@@ -168,12 +166,12 @@ class Ranks:
         return int((self.positions == self.nominal_positions).all(axis=1).sum())
 
     @cached_property
-    def features(self) -> list[Feature]:
-        """What was drawn, as the numbers that a difference may go with."""
+    def features(self) -> dict[tuple[str, Form], Array]:
+        """``(draws,)`` of what was drawn, by parameter and form: what a difference may go with."""
         if not self.swept.drawn:
-            return []
-        drawn = pd.DataFrame(self.swept.drawn).iloc[self.used]
-        return [feature for name in drawn for feature in _features(str(name), drawn[name].to_numpy())]
+            return {}
+        drawn = pd.DataFrame(self.swept.drawn).iloc[self.used].items()
+        return {(str(name), form): _FORMS[form](values) for name, values in drawn for form in _forms(str(name))}
 
     @cached_property
     def pairs(self) -> list[Pair]:
@@ -205,23 +203,22 @@ def share(count: int, total: int) -> Estimate:
     return Estimate(count / total, float(ends.low), float(ends.high), total, total)
 
 
-def _features(name: str, values: Array) -> list[Feature]:
+def _forms(name: str) -> tuple[Form, ...]:
+    """Of an angle its sine and cosine; else the value, and its size, too, where the range has both signs."""
     if name in CIRCULAR:
-        return [Feature(name, "sine", np.sin(values)), Feature(name, "cosine", np.cos(values))]
-    value = Feature(name, "value", values)
-    signed = PARAMETERS[name].low < 0 < PARAMETERS[name].high
-    return [value, Feature(name, "size", np.abs(values))] if signed else [value]
+        return "sine", "cosine"
+    return ("value", "size") if PARAMETERS[name].low < 0 < PARAMETERS[name].high else ("value",)
 
 
-def _causes(pair: Pair, features: Sequence[Feature]) -> Iterator[Cause]:
+def _causes(pair: Pair, features: Mapping[tuple[str, Form], Array]) -> Iterator[Cause]:
     """Every correlation of a pair that can be tested, by Spearman, with a two-sided p value of its own: of neither side
     constant, and of enough draws."""
     draws = len(pair.differences)
     least = 2 / math.factorial(min(draws, 100))  # of all orders: the approximation by Student's t goes down to zero
-    for feature in features:
-        if draws >= FEWEST and np.ptp(feature.values) > 0 and np.ptp(pair.differences) > 0:
-            test = stats.spearmanr(feature.values, pair.differences)
-            yield Cause(feature, float(test.statistic), max(float(test.pvalue), least))
+    for (parameter, form), values in features.items():
+        if draws >= FEWEST and np.ptp(values) > 0 and np.ptp(pair.differences) > 0:
+            test = stats.spearmanr(values, pair.differences)
+            yield Cause(parameter, form, float(test.statistic), max(float(test.pvalue), least))
 
 
 def _strongest(causes: Sequence[Cause], tried: int) -> Cause | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ...study.folders import FILES as FILES
@@ -121,10 +121,7 @@ class Text:
         }[name]
 
 
-PICTURE = Text()
-
-ON_A_NETWORK = replace(
-    PICTURE,
+ON_A_NETWORK = Text(
     scored="predicted capture",
     procedure=(
         "A method turns a target image into a phase pattern. No display shows it: a trained, frozen network predicts "
@@ -143,8 +140,7 @@ ON_A_NETWORK = replace(
     seeds="A learned display has no noise: repeats differ only by the methods' own random numbers.",
 )
 
-PREDICTION = replace(
-    PICTURE,
+PREDICTION = Text(
     scored="prediction",
     truth="capture",
     axis=", of predictions against captures",
@@ -178,8 +174,7 @@ PREDICTION = replace(
 )
 
 
-FOCUS = replace(
-    PICTURE,
+FOCUS = Text(
     procedure=(
         "The targets are focal stacks: pictures of a scene with depth, focused on one plane after another, with "
         "depth-of-field blur. A method turns the picture of a plane into a phase pattern for the display's own "
@@ -203,8 +198,7 @@ COMPARED = {
     "linear": "in linear light, for which targets were decoded from sRGB and captures taken as they are",
 }
 
-GIVEN = replace(
-    PICTURE,
+GIVEN = Text(
     best="ranks first of {count} methods with a capture of every target",
     only="is the only method with a capture of every target",
     procedure=(
@@ -236,4 +230,4 @@ REAL_SEEDS = (
 )
 
 
-BY_MEASURE = {"picture": PICTURE, "prediction": PREDICTION, "error_budget": PREDICTION, "focus": FOCUS, FILES: GIVEN}
+BY_MEASURE = {"picture": Text(), "prediction": PREDICTION, "error_budget": PREDICTION, "focus": FOCUS, FILES: GIVEN}
