@@ -93,16 +93,16 @@ class Ranks:
     @cached_property
     def methods(self) -> list[str]:
         """Those that are ranked, nominally best first: with every target nominally and in enough of the draws."""
-        known = np.isfinite(self.quality)
+        known = self.quality.map(np.isfinite)
         draws = known[1:]
         enough = draws.any() & (draws.sum() >= ENOUGH * draws.any(axis=1).sum())
-        kept = [label for label in known if known[label].iloc[0] and enough[label]]
+        kept = [label for label in map(str, known) if known[label].iloc[0] and enough[label]]
         return sorted(kept, key=lambda label: -self.quality[label].iloc[0])
 
     @property
     def _known(self) -> pd.DataFrame:
         """Which ranked method has a value for every target, a row a draw."""
-        return np.isfinite(self.quality[self.methods][1:])
+        return self.quality[self.methods][1:].map(np.isfinite)
 
     @cached_property
     def used(self) -> list[int]:
@@ -171,7 +171,9 @@ class Ranks:
         if not self.swept.drawn:
             return {}
         drawn = pd.DataFrame(self.swept.drawn).iloc[self.used].items()
-        return {(str(name), form): _FORMS[form](values) for name, values in drawn for form in _forms(str(name))}
+        return {
+            (str(name), form): _FORMS[form](values.to_numpy()) for name, values in drawn for form in _forms(str(name))
+        }
 
     @cached_property
     def pairs(self) -> list[Pair]:

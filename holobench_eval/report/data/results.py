@@ -121,7 +121,7 @@ class Results:
     def values(self, label: str, condition: str, key: str | None = None) -> Array:
         """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
         column = (parse(key) if key else self.headline).column
-        means = self._means.get((label, condition), {})
+        means = self._means.get((label, condition), pd.DataFrame())
         return means[column].to_numpy(np.float64) if column in means else np.full(len(self.targets), np.nan)
 
     @cached_property

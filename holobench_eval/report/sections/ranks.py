@@ -93,7 +93,7 @@ def sentences(ranks: Ranks) -> list[str]:
 def left_out(ranks: Ranks) -> list[str]:
     """Methods and draws that are in no number, and why."""
     lines = []
-    unranked = [label for label in ranks.quality if label not in ranks.methods]
+    unranked = [str(label) for label in ranks.quality if label not in ranks.methods]
     if unranked:
         lines.append(
             "Not ranked, because targets are missing on the nominal display or in more than half of the draws: "
