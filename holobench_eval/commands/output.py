@@ -62,7 +62,7 @@ def headline_table(results: Results, condition: str) -> Table:
     which were given as much of the camera, and named by them where there are several such categories.
     """
     from ..report.data.categories import CATEGORIES, ORACLE
-    from ..report.data.marks import counted
+    from ..report.data.phrases import counted
     from ..report.data.text import FILES, number
 
     score, layout = results.headline, results.layout

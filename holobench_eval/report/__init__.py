@@ -1,10 +1,9 @@
 """Reports: statistics over targets, tables, figures and texts, all computed from the records of a study."""
 
 from .build import build_report, recompute_files, write_report
-from .data.committed import committed_records, difference
 from .data.layout import Layout, layout_of
 from .data.results import Results
-from .data.tables import csv_text, read_records, records_frame, table_from_records
+from .data.tables import committed_records, csv_text, difference, read_records, records_frame, table_from_records
 from .description import Description
 from .sections.results import headline_rows
 

@@ -13,7 +13,7 @@ import pandas as pd
 
 from .charts.thumbnails import Thumbnails
 from .data.layout import Layout
-from .data.marks import marked
+from .data.phrases import marked
 from .data.ranks import Ranks, ranks
 from .data.results import Results
 from .data.sweeps import Sweep, sweeps

@@ -13,7 +13,7 @@ from holobench_eval.commands import _plain
 from holobench_eval.commands.output import MOST_REASONS, headline_table, print_answer, print_headline, print_holes
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.answers import kind_of
-from holobench_eval.report.data.marks import marked
+from holobench_eval.report.data.phrases import marked
 from tests.support.synthetic_study import cell, layout, record, study
 
 LONG = "a method whose label is as long as a label may ever be, sixty"

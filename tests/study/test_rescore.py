@@ -11,7 +11,7 @@ import pytest
 
 from holobench_eval.display import CalibratedBench
 from holobench_eval.report import layout_of, records_frame
-from holobench_eval.report.data.committed import difference
+from holobench_eval.report.data.tables import difference
 from holobench_eval.study import cost, provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.phases import phases_of

@@ -285,16 +285,16 @@ def _is_judged(cell: Cell, name: str) -> bool:
 
 def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Verdict) -> None:
     from ...report.data.scores import parse
-    from ...report.data.tables import format_number
+    from ...report.data.tables import rounded
 
     score = parse(name)
     then, now = float(each.row[name]), float(row.get(name, math.nan))
     if math.isnan(then):
         return
-    if format_number(then) == format_number(now):
+    if rounded(then) == rounded(now):
         verdict.reproduced += 1
     elif abs(then - now) <= (TOLERANCE_DB if score.unit == "dB" else TOLERANCE):
         verdict.close += 1
     else:
-        shown = f"{score.key}{f' [{score.unit}]' if score.unit else ''}"
-        verdict.faults.append(f"{each}: {shown} was {format_number(then)}, is {format_number(now) or 'missing'}")
+        found = "missing" if math.isnan(now) else f"{now:.6g}"
+        verdict.faults.append(f"{each}: {score.key}{score.brackets} was {then:.6g}, is {found}")

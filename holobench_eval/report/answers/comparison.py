@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 from ...study.plan import REFERENCE
-from ..data.categories import OFFLINE, ONLINE
-from ..data.marks import counted
-from ..data.phrases import difference, relation, tested, value, verdict
+from ..data.categories import CATEGORIES, OFFLINE, ONLINE
+from ..data.phrases import counted, difference, relation, tested, value, verdict
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES
 from ..data.text import number, p_value, percent, words
@@ -191,13 +190,8 @@ def rows(results: Results) -> Markdown | None:
 
 def _ordered(results: Results, condition: str) -> list[str]:
     """Methods with every target by their mean, then those that lack one."""
-    sign = -1 if results.headline.higher_is_better else 1
-
-    def place(label: str) -> tuple[bool, float]:
-        complete = results.is_complete(label, condition)
-        return not complete, sign * float(results.values(label, condition).mean()) if complete else 0.0
-
-    return sorted(results.methods(condition), key=place)
+    ranking = results.ranking(condition, categories=CATEGORIES)
+    return [*ranking, *(label for label in results.methods(condition) if label not in ranking)]
 
 
 def _compared(results: Results, label: str, condition: str) -> list[str]:

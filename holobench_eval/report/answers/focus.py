@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.marks import marked
-from ..data.phrases import relation, tested
+from ..data.phrases import marked, relation, tested
 from ..data.results import Results
 from ..data.text import number
 from ..markdown import Markdown, table

@@ -85,8 +85,8 @@ def _cause(each: Ranks) -> Iterator[str]:
     for pair in sorted((pair for pair in each.pairs if _is_apart(each, pair)), key=lambda pair: -pair.flips):
         if cause := pair.cause:
             gains, loses = (pair.first, pair.second) if cause.correlation > 0 else (pair.second, pair.first)
-            form = "" if cause.feature.form == "value" else f" ({cause.feature.form})"
-            favours = f"more {PARAMETERS[cause.feature.parameter].words}{form} favours {gains}"
+            form = "" if cause.form == "value" else f" ({cause.form})"
+            favours = f"more {PARAMETERS[cause.parameter].words}{form} favours {gains}"
             groups.setdefault(favours, []).append((loses, cause))
     if groups:
         parts = [

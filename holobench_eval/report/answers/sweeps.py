@@ -127,7 +127,7 @@ def _range(results: Results, same: list[Sweep]) -> Iterator[str]:
     for sweep in same:
         ranges: dict[str, list[str]] = {}
         for label in sweep.methods:
-            if reach := sweep.small_range_text(label):
+            if reach := sweep.small_range(label):
                 ranges.setdefault(reach, []).append(label)
         if ranges:
             each = [f"{text} ({words(labels)})" for text, labels in ranges.items()]
@@ -172,7 +172,6 @@ def _recovered(results: Results, same: list[Sweep], remedies: list[Sweep]) -> It
 def rows(results: Results) -> Markdown | None:
     """A row a change and method: the worst value, the loss there, and what is left above the baseline."""
     score, baseline = results.headline, results.layout.baseline
-    unit = f" [{score.unit}]" if score.unit else ""
     lines = []
     for sweep in sweeps(results):
         for label in sweep.methods:
@@ -190,8 +189,8 @@ def rows(results: Results) -> Markdown | None:
                     *([score.estimate(gained, signed=True) if gained else "–"] if baseline else []),
                 ]
             )
-    columns = ["change", "display", "method", "worst at", f"mean loss there{unit}"]
-    columns += [f"above {baseline} there{unit}"] if baseline else []
+    columns = ["change", "display", "method", "worst at", f"mean loss there{score.brackets}"]
+    columns += [f"above {baseline} there{score.brackets}"] if baseline else []
     return table(columns, lines) if lines else None
 
 

@@ -54,8 +54,7 @@ class Thumbnails:
         values = np.vstack([results.values(label, condition) for label in results.methods(condition)])
         known = np.isfinite(values)
         means = np.where(known, values, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-        sign = 1 if results.headline.higher_is_better else -1
-        quality = dict(zip(results.targets, sign * means, strict=True))
+        quality = dict(zip(results.targets, results.headline.sign * means, strict=True))
         return sorted(self.targets, key=lambda target: quality[target])
 
     def middle(self, condition: str) -> str:

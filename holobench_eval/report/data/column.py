@@ -21,8 +21,6 @@ _UNITS = {"px": "px", "s": "s", "mib": "MiB"}
 class Cells:
     """The cells behind a row of the table."""
 
-    label: str
-    condition: str
     cells: pd.DataFrame
     layout: Layout
 
@@ -30,16 +28,6 @@ class Cells:
     def done(self) -> pd.DataFrame:
         """Those with a score."""
         return self.cells[self.cells["state"] == DONE]
-
-
-@dataclass(frozen=True)
-class InTable:
-    """A column of table.csv. value: of a row, from its cells and the column's name; meaning, kind: where they are not
-    those of records.csv."""
-
-    value: Callable[[Cells, str], Any]
-    meaning: str = ""
-    kind: Kind | None = None
 
 
 def first(cells: Cells, name: str) -> Any:
@@ -55,11 +43,6 @@ def mean(cells: Cells, name: str) -> float:
 def median(cells: Cells, name: str) -> float:
     """Over the done cells."""
     return float(cells.done[name].median())
-
-
-def always(values: pd.Series, layout: Layout) -> bool:
-    """Whatever the values are."""
-    return True
 
 
 def if_known(values: pd.Series, layout: Layout) -> bool:
@@ -88,9 +71,11 @@ class Column:
         Whether it follows from the config: its source is given the row so far in the place of the record, and gives it
         anew where records.csv is read.
     kept
-        Whether a frame has the column, from its values; one that is always kept has to be in a file that is read.
+        Whether a frame has the column, from its values (None: always, and it has to be in a file that is read).
     table
-        Its value in table.csv (None: not there).
+        Its value in table.csv, from the cells of a row and the column's name (None: not there).
+    table_meaning
+        Of its values there, where it is not that of records.csv.
     heading
         In the tables of the report and the page that say what a row took, ``{each}`` being what a method makes for a
         target (empty: in none).
@@ -102,8 +87,9 @@ class Column:
     unit: str = ""
     source: Callable[..., Any] | None = None
     is_of_study: bool = False
-    kept: Callable[[pd.Series, Layout], bool] = always
-    table: InTable | None = None
+    kept: Callable[[pd.Series, Layout], bool] | None = None
+    table: Callable[[Cells, str], Any] | None = None
+    table_meaning: str = ""
     heading: str = ""
 
 
@@ -116,7 +102,7 @@ def column(columns: list[Column], kind: Kind = "text", **more: Any) -> Callable[
 
     def add(value: Callable[..., Any]) -> None:
         name, meaning = value.__name__, " ".join(str(value.__doc__).split()).removesuffix(".")
-        own = {"source": value} if "source" not in more else {"table": InTable(value)}
+        own = {"source": value} if "source" not in more else {"table": value}
         given = {"meaning": meaning, "unit": _UNITS.get(name.rpartition("_")[2], ""), **own, **more}
         columns.append(Column(name, kind=kind, **given))
 

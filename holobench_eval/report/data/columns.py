@@ -18,7 +18,7 @@ import pandas as pd
 from ...display.simulated.changes import KINDS
 from ...study.plan import REFERENCE
 from .categories import FLOOR
-from .column import DONE, Cells, Column, InTable, Record, column, first, if_known, if_trained, mean, median
+from .column import DONE, Cells, Column, Record, column, first, if_known, if_trained, mean, median
 from .layout import Layout
 from .text import FILES
 
@@ -27,27 +27,15 @@ CELL: list[Column] = []  # what a cell is, before the scores
 FIGURES: list[Column] = []  # what was measured beside scores, and its origin, after them
 
 
-def identity_of(record: Record) -> str:
-    """The name of a record, which names its row and its thumbnail, too."""
-    return str(record["id"])
+def _mean_alone(cells: Cells, name: str) -> float:
+    """Over the done cells whose seconds count: what was solved alone if anything was, else all."""
+    alone = cells.done[cells.done["timed_alone"] == 1] if "timed_alone" in cells.done else cells.done
+    return float((cells.done if alone.empty else alone)[name].mean())
 
 
-def timed(done: pd.DataFrame) -> pd.DataFrame:
-    """Of the done cells of a row those whose seconds count: what was solved alone if anything was, else all."""
-    alone = done[done["timed_alone"] == 1] if "timed_alone" in done else done
-    return done if alone.empty else alone
-
-
-def captures_behind(done: pd.DataFrame) -> float:
-    """Every capture behind the done cells of a row: those of the training once, and those of every target.
-
-    Repeats are averaged within a target, since only the measurement is repeated. NaN for no cells, and where no number
-    of captures is known.
-    """
-    if done.empty or done["captures"].isna().all():
-        return float("nan")
-    trained = done["training_captures"].mean() if "training_captures" in done else 0.0
-    return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())
+def _together(cells: Cells, name: str) -> str:
+    """The texts of the done cells, each once."""
+    return " ".join(sorted({*cells.done[name]} - {""}))
 
 
 def _learned(record: Record, key: str, untrained: Any, unknown: Any) -> Any:
@@ -56,53 +44,53 @@ def _learned(record: Record, key: str, untrained: Any, unknown: Any) -> Any:
 
 
 def _changed(cells: Cells, name: str) -> Any:
-    return getattr(cells.layout.change(cells.condition), name)
+    return getattr(cells.layout.change(first(cells, "condition")), name)
 
 
 def _one_line(text: object) -> str:
     return " ".join(str(text).split())
 
 
-@column(CELL, is_of_study=True, table=InTable(first))
+@column(CELL, is_of_study=True, table=first)
 def study(row: Row, layout: Layout) -> str:
     """File name of the config without its ending; of scored folders, the folder of the report."""
     return layout.study
 
 
-@column(CELL, is_of_study=True, table=InTable(first))
+@column(CELL, is_of_study=True, table=first)
 def measure(row: Row, layout: Layout) -> str:
     """What was scored: `picture` (captures against targets), `prediction` and `error_budget` (predictions against
     captures), `focus` (planes of focal stacks), `files` (pictures that were given)."""
     return layout.measure
 
 
-@column(CELL, table=InTable(first))
+@column(CELL, table=first)
 def display(record: Record, layout: Layout) -> str:
     """Name of the display: a profile, a bench, or a trained network. Rows of the floor have the display whose scored
     region they share."""
     return str(record["cell"].get("profile") or record["cell"]["condition"])
 
 
-@column(CELL, table=InTable(first))
+@column(CELL, table=first)
 def condition(record: Record, layout: Layout) -> str:
     """The display with what was changed on it, as report.md names it: the key that joins the three files. `reference`
     for rows of the floor."""
     return str(record["cell"]["condition"])
 
 
-@column(CELL, table=InTable(first))
+@column(CELL, table=first)
 def method(record: Record, layout: Layout) -> str:
     """Name of the method in configs."""
     return str(record["cell"]["method"])
 
 
-@column(CELL, table=InTable(first))
+@column(CELL, table=first)
 def label(record: Record, layout: Layout) -> str:
     """Name of the row in tables: a method with its parameters."""
     return str(record["label"])
 
 
-@column(CELL, table=InTable(first))
+@column(CELL, table=first)
 def category(record: Record, layout: Layout) -> str:
     """What the method knows of the display: `open loop`, `calibrated`, `online` (captures the scored image), `ceiling`
     (oracle), `given` (pictures from files); `floor`: an image that no method made."""
@@ -130,32 +118,32 @@ def panel_width_px(row: Row, layout: Layout) -> float:
 @column(CELL, source=None)
 def parameters(cells: Cells, name: str) -> str:
     """Parameters of the method as JSON, defaults filled in."""
-    return json.dumps(cells.layout.params.get(cells.label, {}), sort_keys=True, ensure_ascii=False)
+    return json.dumps(cells.layout.params.get(first(cells, "label"), {}), sort_keys=True, ensure_ascii=False)
 
 
 _KINDS = ", ".join(f"`{kind}`" for kind in KINDS)
 _SWEPT = f"What was changed after the display was calibrated, if anything: {_KINDS}; `plane` in focal stacks"
 
 
-@column(CELL, is_of_study=True, table=InTable(_changed), meaning=_SWEPT)
+@column(CELL, is_of_study=True, table=_changed, meaning=_SWEPT)
 def swept(row: Row, layout: Layout) -> str:
     """The kind of a change."""
     return layout.change(row["condition"], row["target"]).swept
 
 
-@column(CELL, "number", is_of_study=True, table=InTable(_changed), unit="that of `swept_unit`")
+@column(CELL, "number", is_of_study=True, table=_changed, unit="that of `swept_unit`")
 def swept_value(row: Row, layout: Layout) -> float:
     """The change as a number; empty where the values are names."""
     return layout.change(row["condition"], row["target"]).swept_value
 
 
-@column(CELL, is_of_study=True, table=InTable(_changed))
+@column(CELL, is_of_study=True, table=_changed)
 def swept_unit(row: Row, layout: Layout) -> str:
     """Unit of `swept_value`; `1` for a ratio, empty for the number of a draw or a panel."""
     return layout.change(row["condition"], row["target"]).swept_unit
 
 
-@column(CELL, is_of_study=True, table=InTable(_changed))
+@column(CELL, is_of_study=True, table=_changed)
 def swept_name(row: Row, layout: Layout) -> str:
     """The change where its values are names, such as a prescription."""
     return layout.change(row["condition"], row["target"]).swept_name
@@ -215,24 +203,20 @@ def clusters(cells: Cells, name: str) -> int:
     return int(cells.done["cluster"].nunique())
 
 
-_CAPTURES = InTable(mean, "Captures while solving, mean over cells", "number")
+_CAPTURES = "Captures while solving, mean over cells"
 _SOLVING = "Time to solve a target, mean over the cells timed alone, or over all"
-_TRAINING = InTable(mean, "Captures of the training, once for all targets", "number")
+_TRAINING = "Captures of the training, once for all targets"
+_SECONDS = "Time of the training"
 _LEARNED = "Digests of what was learned, with spaces between them"
 
 
-@column(FIGURES, "count", table=_CAPTURES, heading="captures per {each}")
+@column(FIGURES, "count", table=mean, table_meaning=_CAPTURES, heading="captures per {each}")
 def captures(record: Record, layout: Layout) -> int | None:
     """Captures that the method took while it solved the target, those of attempts that failed included."""
     return None if layout.measure == FILES else record.get("captures")  # of somebody else, it is not known
 
 
-@column(
-    FIGURES,
-    "number",
-    table=InTable(lambda row, name: timed(row.done)[name].mean(), _SOLVING),
-    heading="seconds per {each}",
-)
+@column(FIGURES, "number", table=_mean_alone, table_meaning=_SOLVING, heading="seconds per {each}")
 def solving_s(record: Record, layout: Layout) -> float | None:
     """Time to solve the target, of the solving that made the phase, in this run or an earlier one."""
     return record.get("seconds")
@@ -262,32 +246,36 @@ def timed_alone(record: Record, layout: Layout) -> bool | None:
     return record.get("alone")
 
 
-@column(FIGURES, "count", kept=if_trained, table=_TRAINING, heading="captures for training")
+@column(FIGURES, "count", kept=if_trained, table=mean, table_meaning=_TRAINING, heading="captures for training")
 def training_captures(record: Record, layout: Layout) -> int | None:
     """Captures that the method's training took, once for all targets."""
     return _learned(record, "captures", 0, None)
 
 
-@column(FIGURES, "number", kept=if_trained, table=InTable(mean, "Time of the training"), heading="seconds of training")
+@column(FIGURES, "number", kept=if_trained, table=mean, table_meaning=_SECONDS, heading="seconds of training")
 def training_s(record: Record, layout: Layout) -> float | None:
     """Time that the training took."""
     return _learned(record, "seconds", 0, None)
 
 
-@column(FIGURES, kept=if_trained, table=InTable(lambda row, name: " ".join(sorted({*row.done[name]} - {""})), _LEARNED))
+@column(FIGURES, kept=if_trained, table=_together, table_meaning=_LEARNED)
 def learned_sha256(record: Record, layout: Layout) -> str:
     """Digest of what was learned; empty for untrained methods."""
     return str(_learned(record, "sha256", "", ""))
 
 
 _MEMORY = "Memory of solving, median over cells"  # a method's first solution also loads libraries
-FIGURES.append(Column("memory_mib", _MEMORY, "number", "MiB", table=InTable(median), heading="memory [MiB]"))
+FIGURES.append(Column("memory_mib", _MEMORY, "number", "MiB", table=median, heading="memory [MiB]"))
 
 
 @column(FIGURES, "number", source=None, heading="captures in total")
 def total_captures(cells: Cells, name: str) -> float:
     """All captures behind the row: of the training, and of every target."""
-    return captures_behind(cells.done)
+    done = cells.done
+    if done.empty or done["captures"].isna().all():
+        return float("nan")
+    trained = done["training_captures"].mean() if "training_captures" in done else 0.0
+    return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())  # repeats: averaged
 
 
 @column(FIGURES, "count", source=None)
@@ -311,7 +299,7 @@ def fell_back(record: Record, layout: Layout) -> str:
 @column(FIGURES)
 def cell(record: Record, layout: Layout) -> str:
     """Name of the capture: the digest of all that it depends on."""
-    return identity_of(record)
+    return str(record["id"])
 
 
 @column(FIGURES)
@@ -339,11 +327,9 @@ def recorded() -> list[Column]:
 
 def tabled() -> list[Column]:
     """The columns of table.csv without the scores, with what they mean there."""
-    return [
-        replace(column, meaning=column.table.meaning or column.meaning, kind=column.table.kind or column.kind)
-        for column in (*CELL, *FIGURES)
-        if column.table
-    ]
+    listed = [column for column in (*CELL, *FIGURES) if column.table]
+    told = [replace(column, meaning=column.table_meaning or column.meaning) for column in listed]
+    return [replace(column, kind="number") if column.table is mean else column for column in told]
 
 
 def costs(table: pd.DataFrame, each: str) -> dict[str, str]:

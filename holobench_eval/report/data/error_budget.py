@@ -48,7 +48,6 @@ class Budget:
     ideal image first. All are means over targets."""
 
     condition: str
-    targets: int
     psnr: Estimate
     ideal_psnr: Estimate
     explained: tuple[Part, ...]
@@ -66,38 +65,27 @@ def budgets(results: Results) -> list[Budget]:
     if results.layout.measure != "error_budget":
         return []
     return [
-        budget(results, condition)
+        _budget(results, condition)
         for condition in results.conditions
         if all(results.is_complete(label, condition, scores.PREDICTION) for label in results.methods(condition))
     ]
 
 
-def budget(results: Results, condition: str) -> Budget:
+def _budget(results: Results, condition: str) -> Budget:
     """The budget of a display, see the module."""
-    methods = results.methods(condition)
-    interval = results.estimate
-
-    def of(label: str, key: str) -> Array:
-        return results.values(label, condition, key)
-
-    target, ideal, noise, algorithm = (
-        of(methods[0], key) for key in (scores.TARGET, scores.IDEAL, scores.NOISE, scores.ALGORITHM)
-    )
+    methods, interval = results.methods(condition), results.estimate
+    keys = scores.TARGET, scores.IDEAL, scores.NOISE, scores.ALGORITHM
+    target, ideal, noise, algorithm = (results.values(methods[0], condition, key) for key in keys)
     total, noisy = np.maximum(target, scores.SMALLEST), noise > scores.SMALLEST
-    alone = np.stack([target, ideal, *(of(label, scores.PREDICTION) for label in methods)]) / total
+    predicted = (results.values(label, condition, scores.PREDICTION) for label in methods)
+    alone = np.stack([target, ideal, *predicted]) / total
     links = np.minimum.accumulate(alone)
     return Budget(
         condition=condition,
-        targets=total.size,
         psnr=interval(-decibel(total)),
         ideal_psnr=interval(-decibel(algorithm)),
         explained=tuple(
-            Part(
-                label,
-                interval(links[k - 1] - links[k]),
-                interval(-decibel(links[k])),
-                interval(alone[k]),
-            )
+            Part(label, interval(links[k - 1] - links[k]), interval(-decibel(links[k])), interval(alone[k]))
             for k, label in enumerate([IDEAL_IMAGE, *methods], start=1)
         ),
         rest=Part(REST, interval(links[-1] - noise / total)),

@@ -20,7 +20,7 @@ from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
 from ...study.plan import REFERENCE
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
-from .text import FILES, Text, plain, text_of
+from .text import AS_STORED, BY_MEASURE, COMPARED, FILES, ON_A_NETWORK, REAL, REAL_SEEDS, Text, plain
 
 RATIO = "1"  # unit of a swept ratio
 
@@ -157,8 +157,15 @@ class Layout:
     @property
     def text(self) -> Text:
         """What is compared, in words."""
-        holograms = self.holograms.partition(" (")[0]
-        return text_of(self.measure, holograms, self.learned_display is not None, self.real, self.values)
+        on_a_network = self.learned_display is not None and self.measure == "picture"
+        text, holograms = ON_A_NETWORK if on_a_network else BY_MEASURE[self.measure], self.holograms.partition(" (")[0]
+        if self.measure == FILES:
+            stored = self.values == "stored"
+            text = replace(text, compared=COMPARED[self.values], domains=AS_STORED if stored else text.domains)
+        if self.real:
+            text = replace(text, displays=REAL, seeds=REAL_SEEDS)
+        procedure, picture = (words.replace("{holograms}", holograms) for words in (text.procedure, text.picture))
+        return replace(text, procedure=procedure, picture=picture)
 
     def marked(self, label: str) -> str:
         """A method's label, marked when it is the oracle."""
@@ -173,25 +180,15 @@ class Layout:
         """Method labels in the order of the config."""
         return tuple(dict.fromkeys(label for label, _ in self.pairs))
 
-    @property
-    def conditions(self) -> tuple[str, ...]:
-        """Conditions in the order of the config."""
-        return tuple(dict.fromkeys(condition for _, condition in self.pairs))
-
-    @property
-    def changed(self) -> frozenset[str]:
-        """Conditions that are a change of another."""
-        return frozenset(condition for sweep in self.sweeps for _, condition in sweep.points)
-
     @cached_property
-    def _changes(self) -> dict[str, Change]:
-        """By condition."""
+    def changed(self) -> dict[str, Change]:
+        """Conditions that are a change of another, with that change."""
         return {condition: sweep.change(value) for sweep in self.sweeps for value, condition in sweep.points}
 
     def change(self, condition: str, target: str = "") -> Change:
         """What was changed under a condition; the plane of a target of a focal stack is a change of its display."""
-        if condition in self._changes or condition == REFERENCE or target not in self.planes:
-            return self._changes.get(condition, Change())
+        if condition in self.changed or condition == REFERENCE or target not in self.planes:
+            return self.changed.get(condition, Change())
         return Change("plane", self.planes[target][1], "mm")
 
     @property
@@ -207,7 +204,6 @@ def layout_of(study: Study) -> Layout:
     names = {source: condition.name for source, condition in conditions.items()}
     traits = {entry.label: isolation.traits(entry.name, study.folder) for entry in study.methods}
     trained = frozenset(label for label, method in traits.items() if method.trains)
-    probe = study.holograms
     return Layout(
         title=study.title,
         pairs=tuple(
@@ -232,10 +228,10 @@ def layout_of(study: Study) -> Layout:
         note=study.note,
         measure=study.measure,
         metrics=study.protocol.metrics,
-        holograms=f"{probe.name} ({plain(probe.params)})" if study.predicts else "",
+        holograms=f"{study.holograms.name} ({plain(study.holograms.params)})" if study.predicts else "",
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,
-        identities=frozenset(entry.label for entry in study.methods if _network(entry.params) == "identity"),
+        identities=frozenset(entry.label for entry in study.methods if network_of(entry.params) == "identity"),
         training=_training_set(study) if trained or study.display.learned else None,
         camera=frozenset(label for label, method in traits.items() if method.camera),
         sweeps=tuple(_sweeps(study, conditions)),
@@ -267,10 +263,10 @@ def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
     return {name: " ".join(text.replace("`", "").split()) for name, text in (methods | profiles).items() if text}
 
 
-def _network(params: Mapping[str, Any]) -> str:
+def network_of(params: Any) -> str:
     """The name of a method's network, empty where it has none."""
-    network = params.get("network")
-    return str(network["name"]) if isinstance(network, Mapping) and "name" in network else ""
+    network = params.get("network") if isinstance(params, Mapping) else None
+    return str(network.get("name", "")) if isinstance(network, Mapping) else ""
 
 
 def _sweeps(study: Study, conditions: Mapping[str, Condition]) -> Iterator[Swept]:
@@ -295,6 +291,5 @@ def _drawn(before: Condition, points: tuple[tuple[float | str, str], ...]) -> tu
 
 def _training_set(study: Study) -> TrainingSet:
     chosen = study.training
-    dataset = plugins.build("datasets", chosen.dataset, dict(chosen.params), study.folder)
-    named = f"{chosen.dataset} ({plain(chosen.params)})"
-    return TrainingSet(named, len(dataset.items()), chosen.held_out, chosen.captures)
+    images = plugins.build("datasets", chosen.dataset, dict(chosen.params), study.folder).items()
+    return TrainingSet(f"{chosen.dataset} ({plain(chosen.params)})", len(images), chosen.held_out, chosen.captures)

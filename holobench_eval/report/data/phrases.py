@@ -1,20 +1,27 @@
-"""Differences in words, with all that belongs to them: interval, sample, p value, and whether a difference is shown."""
+"""Rows and differences in words, with all that belongs to them.
+
+A row of a table is marked where its method is an oracle, fell back, or learned too little; a difference has its
+interval, sample and p value, and says whether it is shown.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from ...study.plan import REFERENCE
 from .results import Results
 from .scores import Score
 from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
-from .text import p_value, sample
+from .text import p_value, sample, words
+
+CONSTANT = "floor_constant"
 
 
 def difference(score: Score, estimate: Estimate) -> str:
     """``+1.20 dB [+0.80, +1.60]``."""
-    mean = score.with_unit(estimate.mean, signed=True)
-    ends = (score.number(end, signed=True) for end in (estimate.low, estimate.high))
-    return mean if np.isnan(estimate.low) else f"{mean} [{', '.join(ends)}]"
+    return score.estimate(estimate, signed=True, unit=True)
 
 
 def margin(score: Score, test: PairedTest) -> str:
@@ -55,18 +62,44 @@ def relation(score: Score, test: PairedTest) -> str:
 
 def tested(results: Results, label: str, condition: str) -> PairedTest | None:
     """The comparison of a method with the baseline on a display; None where there is no complete pair of rows."""
+    if results.gain(label, condition) is None:
+        return None
     return next(
-        (
-            test
-            for test in results.against_baseline
-            if (test.condition, test.second) == (condition, label)
-            and results.is_complete(label, condition)
-            and results.is_complete(test.first, condition)
-        ),
-        None,
+        (test for test in results.against_baseline if (test.condition, test.second) == (condition, label)), None
     )
 
 
 def value(results: Results, label: str, condition: str) -> str:
     """The mean of the headline with its unit: ``20.62 dB``."""
     return results.headline.with_unit(float(results.values(label, condition).mean()))
+
+
+def marked(results: Results, label: str, condition: str) -> str:
+    """A method's label with what must be known of its row: an oracle, a fallback, a network that learned too little."""
+    return ", ".join([results.layout.marked(label), *_marks(results, label, condition)])
+
+
+def counted(results: Results, label: str, condition: str) -> str:
+    """``marked``, and how many targets have a score where that is not all: for tables without a column of that."""
+    scored, total = results.row(label, condition)["n"], len(results.targets)
+    return f"{marked(results, label, condition)}{f', {scored:.0f} of {total} targets' * bool(scored < total)}"
+
+
+def _marks(results: Results, label: str, condition: str) -> Iterator[str]:
+    cells = results.cells(label, condition)
+    if "fell_back" in cells and (cells["fell_back"] != "").any():
+        yield "fell back to Wirtinger"
+    if results.layout.measure == "prediction" and (below := _below(results, label, condition)):
+        yield f"not trained to convergence: below {words(below)}"
+
+
+def _below(results: Results, label: str, condition: str) -> list[str]:
+    """What predicts the captures better than a trained method though it takes no training."""
+    layout = results.layout
+    if label not in layout.trained - layout.identities or not results.is_complete(label, condition):
+        return []
+    rows = [("the ideal image", name, condition) for name in layout.identities if name in results.methods(condition)]
+    if CONSTANT in results.floors and results.has_pictures(condition):
+        rows.insert(0, ("the constant image", CONSTANT, REFERENCE))
+    ours, better = results.values(label, condition).mean(), results.headline.better
+    return [text for text, name, where in rows if better(results.values(name, where).mean(), ours)]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 from scipy import stats
 
 from ...display.simulated.changes.draws import PARAMETERS
@@ -24,25 +25,23 @@ ENOUGH = 0.5
 # Parameters that are angles over a full turn: neither end of their range is more than the other.
 CIRCULAR = frozenset({"zero_phase"})
 
-
-@dataclass(frozen=True)
-class Feature:
-    """A number of every draw that a difference between two methods may go with.
-
-    parameter: its name in ``draws.PARAMETERS``; form: the value; its size, where the range has both signs; or the sine
-    or cosine of an angle; values: ``(draws,)``.
-    """
-
-    parameter: str
-    form: Literal["value", "size", "sine", "cosine"]
-    values: Array
+# In which forms a difference between two methods may go with a parameter.
+Form = Literal["value", "size", "sine", "cosine"]
+_FORMS: Mapping[Form, Callable[[Array], Array]] = {
+    "value": np.asarray,
+    "size": np.abs,
+    "sine": np.sin,
+    "cosine": np.cos,
+}
 
 
 @dataclass(frozen=True)
 class Cause:
-    """What a difference goes with: Spearman's rank correlation, and its p value times all that were tried."""
+    """What a difference goes with: a parameter of ``draws.PARAMETERS`` in a form, Spearman's rank correlation, and its
+    p value times all that were tried."""
 
-    feature: Feature
+    parameter: str
+    form: Form
     correlation: float
     p: float
 
@@ -71,11 +70,6 @@ class Pair:
         """Share of such draws."""
         return share(self.flips, len(self.differences))
 
-    @property
-    def lead(self) -> Estimate:
-        """Mean difference over draws."""
-        return mean_interval(self.differences)
-
 
 @dataclass(frozen=True)
 class Ranks:
@@ -88,38 +82,37 @@ class Ranks:
     results: Results
 
     @cached_property
-    def quality(self) -> dict[str, Array]:
-        """``(1 + draws,)`` mean headline of every method, that on the nominal display first; turned so that larger is
+    def quality(self) -> pd.DataFrame:
+        """Mean headline, a column a method; a row for the nominal display, then one a draw. Turned so that larger is
         better, NaN where a target has no score."""
         results, conditions = self.results, [self.swept.before, *(name for _, name in self.swept.points)]
-        sign = 1 if results.headline.higher_is_better else -1
         labels = [label for label in results.methods(conditions[0]) if results.layout.category(label) in OFFLINE]
-        return {
-            label: sign * np.array([results.values(label, condition).mean() for condition in conditions])
-            for label in labels
-        }
+        means = {label: [results.values(label, name).mean() for name in conditions] for label in labels}
+        return results.headline.sign * pd.DataFrame(means, dtype=np.float64)
 
     @cached_property
     def methods(self) -> list[str]:
         """Those that are ranked, nominally best first: with every target nominally and in enough of the draws."""
-        known = {label: np.isfinite(quality) for label, quality in self.quality.items()}
-        usable = np.any([draws[1:] for draws in known.values()], axis=0) if known else np.zeros(0)
-        kept = [label for label, draws in known.items() if draws[0] and draws[1:].sum() >= ENOUGH * usable.sum() > 0]
-        return sorted(kept, key=lambda label: -self.quality[label][0])
+        known = self.quality.map(np.isfinite)
+        draws = known[1:]
+        enough = draws.any() & (draws.sum() >= ENOUGH * draws.any(axis=1).sum())
+        kept = [label for label in map(str, known) if known[label].iloc[0] and enough[label]]
+        return sorted(kept, key=lambda label: -self.quality[label].iloc[0])
+
+    @property
+    def _known(self) -> pd.DataFrame:
+        """Which ranked method has a value for every target, a row a draw."""
+        return self.quality[self.methods][1:].map(np.isfinite)
 
     @cached_property
     def used(self) -> list[int]:
         """Indices of the draws in which every ranked method has a value for every target."""
-        if not self.methods:
-            return []
-        values = np.stack([self.quality[label][1:] for label in self.methods])
-        return [int(index) for index in np.flatnonzero(np.isfinite(values).all(axis=0))]
+        return np.flatnonzero(self._known.all(axis=1)).tolist() if self.methods else []
 
     @property
     def empty(self) -> list[int]:
         """Indices of the draws in which no ranked method has a value for every target."""
-        values = np.stack([self.quality[label][1:] for label in self.methods]) if self.methods else np.zeros((0, 0))
-        return [int(index) for index in np.flatnonzero(~np.isfinite(values).any(axis=0))]
+        return np.flatnonzero(~self._known.any(axis=1)).tolist()
 
     @property
     def exists(self) -> bool:
@@ -129,12 +122,12 @@ class Ranks:
     @cached_property
     def nominal(self) -> Array:
         """``(methods,)`` quality on the nominal display."""
-        return np.array([self.quality[label][0] for label in self.methods])
+        return self.quality[self.methods].to_numpy()[0]
 
     @cached_property
     def drawn(self) -> Array:
         """``(draws, methods)`` quality in the draws that are used."""
-        return np.stack([self.quality[label][1:][self.used] for label in self.methods], axis=1)
+        return self.quality[self.methods].to_numpy()[1:][self.used]
 
     @cached_property
     def nominal_positions(self) -> Array:
@@ -173,29 +166,26 @@ class Ranks:
         return int((self.positions == self.nominal_positions).all(axis=1).sum())
 
     @cached_property
-    def features(self) -> list[Feature]:
-        """What was drawn, as the numbers that a difference may go with."""
+    def features(self) -> dict[tuple[str, Form], Array]:
+        """``(draws,)`` of what was drawn, by parameter and form: what a difference may go with."""
         if not self.swept.drawn:
-            return []
-        drawn = [self.swept.drawn[index] for index in self.used]
-        columns = {name: np.array([draw[name] for draw in drawn]) for name in drawn[0]}
-        return [feature for name, values in columns.items() for feature in _features(name, values)]
+            return {}
+        drawn = pd.DataFrame(self.swept.drawn).iloc[self.used].items()
+        return {
+            (str(name), form): _FORMS[form](values.to_numpy()) for name, values in drawn for form in _forms(str(name))
+        }
 
     @cached_property
     def pairs(self) -> list[Pair]:
         """Every pair of ranked methods, in the order of the nominal ranking."""
-        numbers = itertools.combinations(range(len(self.methods)), 2)
+        ranked = zip(self.methods, self.nominal, self.drawn.T, strict=True)
         pairs = [
-            Pair(
-                self.methods[first],
-                self.methods[second],
-                float(self.nominal[first] - self.nominal[second]),
-                self.drawn[:, first] - self.drawn[:, second],
-            )
-            for first, second in numbers
+            Pair(first, second, float(nominal - other), draws - others)
+            for (first, nominal, draws), (second, other, others) in itertools.combinations(ranked, 2)
         ]
-        causes = _causes([pair for pair in pairs if pair.flips], self.features)
-        return [replace(pair, cause=causes.get((pair.first, pair.second))) for pair in pairs]
+        tried = [list(_causes(pair, self.features)) if pair.flips else [] for pair in pairs]
+        made = sum(map(len, tried))
+        return [replace(pair, cause=_strongest(causes, made)) for pair, causes in zip(pairs, tried, strict=True)]
 
     @property
     def tests(self) -> int:
@@ -215,40 +205,30 @@ def share(count: int, total: int) -> Estimate:
     return Estimate(count / total, float(ends.low), float(ends.high), total, total)
 
 
-def _features(name: str, values: Array) -> list[Feature]:
+def _forms(name: str) -> tuple[Form, ...]:
+    """Of an angle its sine and cosine; else the value, and its size, too, where the range has both signs."""
     if name in CIRCULAR:
-        return [Feature(name, "sine", np.sin(values)), Feature(name, "cosine", np.cos(values))]
-    value = Feature(name, "value", values)
-    signed = PARAMETERS[name].low < 0 < PARAMETERS[name].high
-    return [value, Feature(name, "size", np.abs(values))] if signed else [value]
+        return "sine", "cosine"
+    return ("value", "size") if PARAMETERS[name].low < 0 < PARAMETERS[name].high else ("value",)
 
 
-def _causes(pairs: Sequence[Pair], features: Sequence[Feature]) -> Mapping[tuple[str, str], Cause]:
-    """The strongest significant correlation of each pair that has one; one family of tests over all of them."""
-    tried = [(pair, feature, *_spearman(feature.values, pair.differences)) for pair in pairs for feature in features]
-    made = sum(not math.isnan(p) for *_, p in tried)
-    causes: dict[tuple[str, str], Cause] = {}
-    for pair, feature, correlation, single in tried:
-        names, p = (pair.first, pair.second), single * made  # Bonferroni
-        if p < SIGNIFICANCE and (names not in causes or abs(correlation) > abs(causes[names].correlation)):
-            causes[names] = Cause(feature, correlation, p)
-    return causes
+def _causes(pair: Pair, features: Mapping[tuple[str, Form], Array]) -> Iterator[Cause]:
+    """Every correlation of a pair that can be tested, by Spearman, with a two-sided p value of its own: of neither side
+    constant, and of enough draws."""
+    draws = len(pair.differences)
+    least = 2 / math.factorial(min(draws, 100))  # of all orders: the approximation by Student's t goes down to zero
+    for (parameter, form), values in features.items():
+        if draws >= FEWEST and np.ptp(values) > 0 and np.ptp(pair.differences) > 0:
+            test = stats.spearmanr(values, pair.differences)
+            yield Cause(parameter, form, float(test.statistic), max(float(test.pvalue), least))
 
 
-def _spearman(a: Array, b: Array) -> tuple[float, float]:
-    """Spearman's correlation and its two-sided p value; NaN where one side is constant, or for too few draws."""
-    if len(a) < FEWEST or np.ptp(a) == 0 or np.ptp(b) == 0:
-        return math.nan, math.nan
-    test = stats.spearmanr(a, b)
-    least = 2 / math.factorial(min(len(a), 100))  # of all orders: the approximation by Student's t goes down to zero
-    return float(test.statistic), max(float(test.pvalue), least)
+def _strongest(causes: Sequence[Cause], tried: int) -> Cause | None:
+    """The strongest correlation of a pair that is significant after Bonferroni."""
+    adjusted = [replace(cause, p=cause.p * tried) for cause in causes if cause.p * tried < SIGNIFICANCE]
+    return max(adjusted, key=lambda cause: abs(cause.correlation), default=None)
 
 
 def ranks(results: Results) -> list[Ranks]:
-    """The rankings of every display of which a study has draws, those of all its sweeps together."""
-    merged: dict[str, Swept] = {}
-    for swept in results.layout.sweeps:
-        if swept.kind == "draw":
-            known = merged.get(swept.before, Swept("draw", swept.before, ()))
-            merged[swept.before] = replace(known, points=known.points + swept.points, drawn=known.drawn + swept.drawn)
-    return [Ranks(swept, results) for swept in merged.values()]
+    """The rankings of every display of which a study has draws."""
+    return [Ranks(swept, results) for swept in results.layout.sweeps if swept.kind == "draw"]

@@ -105,15 +105,6 @@ class Results:
         """Labels with a row under ``condition``, in the order of the table."""
         return [label for label, name in self._rows if name == condition]
 
-    def lost(self, label: str, before: str, condition: str) -> Estimate | None:
-        """Headline score before a change minus that after it, target by target, so that a loss is positive where higher
-        is better; None without a complete pair of rows."""
-        rows = [name for name in (before, condition) if label in self.methods(name) and self.is_complete(label, name)]
-        if len(rows) < 2:
-            return None
-        sign = 1 if self.headline.higher_is_better else -1
-        return self.estimate(sign * (self.values(label, before) - self.values(label, condition)))
-
     def row(self, label: str, condition: str) -> pd.Series:
         """A row of the table."""
         return self._rows[label, condition]
@@ -125,51 +116,32 @@ class Results:
 
     def cells(self, label: str, condition: str) -> pd.DataFrame:
         """The records of a method under a condition."""
-        found = self._groups.get((label, condition))
-        return self.frame.iloc[:0] if found is None else found
-
-    @cached_property
-    def _groups(self) -> dict[tuple[str, str], pd.DataFrame]:
-        return {(str(label), str(name)): rows for (label, name), rows in self.frame.groupby(["label", "condition"])}
+        return self.frame[(self.frame["label"] == label) & (self.frame["condition"] == condition)]
 
     def values(self, label: str, condition: str, key: str | None = None) -> Array:
         """``(targets,)`` values of a score (default: the headline), repeats averaged; NaN for holes."""
         column = (parse(key) if key else self.headline).column
-        found = self._means.get((label, condition), {}).get(column)
-        return np.full(len(self.targets), np.nan) if found is None else found
+        means = self._means.get((label, condition), pd.DataFrame())
+        return means[column].to_numpy(np.float64) if column in means else np.full(len(self.targets), np.nan)
 
     @cached_property
-    def _means(self) -> dict[tuple[str, str], dict[str, Array]]:
-        """Every number of a method under a condition, a value for each of ``targets``."""
-        return {
-            pair: {str(name): means[name].to_numpy(dtype=np.float64) for name in means}
-            for pair, rows in per_target(self.frame).items()
-            for means in [rows.reindex(self.targets)]
-        }
+    def _means(self) -> dict[tuple[str, str], pd.DataFrame]:
+        """Every number of a method under a condition, a row for each of ``targets``."""
+        return {pair: means.reindex(self.targets) for pair, means in per_target(self.frame).items()}
 
     def is_complete(self, label: str, condition: str, key: str | None = None) -> bool:
         """Whether a method has a value for every target: only then may its mean be compared."""
         return not np.isnan(self.values(label, condition, key)).any()
 
-    def complete(self, condition: str, key: str | None = None, categories: Sequence[str] = OFFLINE) -> list[str]:
-        """Methods of the categories with a value for every target: the only means that may be ranked together.
+    def ranking(self, condition: str, key: str | None = None, categories: Sequence[str] = OFFLINE) -> list[str]:
+        """Methods of the categories with a value for every target, the only means that may be compared, best first.
 
         Methods that see the camera for the scored image are not among the others, and are asked for by name.
         """
-        return [
-            label
-            for label in self.methods(condition)
-            if self.layout.category(label) in categories and self.is_complete(label, condition, key)
-        ]
-
-    def ranking(self, condition: str, key: str | None = None, categories: Sequence[str] = OFFLINE) -> list[str]:
-        """Complete methods of the categories, best mean first."""
         score = parse(key) if key else self.headline
-        sign = -1 if score.higher_is_better else 1
-        return sorted(
-            self.complete(condition, key, categories),
-            key=lambda label: sign * self.values(label, condition, key).mean(),
-        )
+        labels = [label for label in self.methods(condition) if self.layout.category(label) in categories]
+        complete = [label for label in labels if self.is_complete(label, condition, key)]
+        return sorted(complete, key=lambda label: -score.sign * self.values(label, condition, key).mean())
 
     @cached_property
     def categories(self) -> list[str]:
@@ -184,9 +156,7 @@ class Results:
     def gain(self, label: str, condition: str) -> Estimate | None:
         """Headline score minus that of the baseline, target by target; None without a complete pair of rows."""
         baseline = self.layout.baseline
-        if baseline not in self.methods(condition) or not self.is_complete(baseline, condition):
-            return None
-        if not self.is_complete(label, condition):
+        if baseline is None or not (self.is_complete(label, condition) and self.is_complete(baseline, condition)):
             return None
         return self.estimate(self.values(label, condition) - self.values(baseline, condition))
 
@@ -197,8 +167,7 @@ class Results:
         """
         oracle = self.oracle(condition)
         most = self.gain(oracle, condition) if oracle else None
-        sign = 1 if self.headline.higher_is_better else -1
-        if self.gain(label, condition) is None or most is None or sign * most.mean <= 0:
+        if self.gain(label, condition) is None or most is None or self.headline.sign * most.mean <= 0:
             return None
         names = (label, str(oracle), str(self.layout.baseline))
         method, best, baseline = (self.values(name, condition) for name in names)
@@ -210,17 +179,11 @@ class Results:
         rows = (name for name in FLOORS if name in self.methods(REFERENCE))
         return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.column])]
 
-    def has_floor(self, condition: str) -> bool:
-        """Whether the reference rows were scored against the same images as the methods under ``condition``.
+    def has_pictures(self, condition: str) -> bool:
+        """Whether the reference rows were scored against the same images as the methods under ``condition``, and made
+        the pictures that stand for the targets there.
 
         Pictures are compared with targets, equal for all displays; predictions with the captures of one display.
-        """
-        return bool(self.floors) and self.has_pictures(condition)
-
-    def has_pictures(self, condition: str) -> bool:
-        """Whether the pictures that stand for the targets are what the methods under ``condition`` are scored against.
-
-        The reference rows make them: for predictions, captures of one display.
         """
         captured = self.frame.loc[self.frame["condition"] == REFERENCE, "display"]
         return not self.layout.predicts or condition in set(captured)
@@ -234,29 +197,25 @@ class Results:
     def against_baseline(self) -> list[PairedTest]:
         """Every method against the baseline on every display: one family of tests, in which the oracle is not."""
         baseline = self.layout.baseline
-        if baseline is None:
-            return []
-        pairs = [
-            (condition, other)
+        rows = [
+            (condition, label, self.values(label, condition) - self.values(baseline, condition))
             for condition in self.conditions
-            if baseline in self.methods(condition)
-            for other in self.methods(condition)
-            if other != baseline
+            if baseline is not None and baseline in self.methods(condition)
+            for label in self.methods(condition)
+            if label != baseline
         ]
-        if not pairs:
+        if baseline is None or not rows:
             return []
-        differences = np.stack([self.values(other, name) - self.values(baseline, name) for name, other in pairs])
-        tested = np.array([other not in self.layout.privileged for _, other in pairs])
-        p = np.full(len(pairs), np.nan)
-        p[tested] = family_p(differences[tested], self.clusters)
+        holes = np.full(len(self.targets), np.nan)  # in the place of an oracle, which is not in the family
+        p = family_p(np.stack([holes if row[1] in self.layout.privileged else row[2] for row in rows]), self.clusters)
         return [
-            PairedTest(condition, baseline, other, found, self.estimate(found), float(value))
-            for (condition, other), found, value in zip(pairs, differences, p, strict=True)
+            PairedTest(condition, baseline, label, found, self.estimate(found), float(value))
+            for (condition, label, found), value in zip(rows, p, strict=True)
         ]
 
     def above_floor(self, label: str, condition: str, floor: str = "floor_constant") -> Estimate | None:
         """Headline score minus that of a floor row of the same target; None without one, or without a target."""
-        if floor not in self.floors or not self.has_floor(condition):
+        if floor not in self.floors or not self.has_pictures(condition):
             return None
         found = self.estimate(self.values(label, condition) - self.values(floor, REFERENCE))
         return found if found.n else None

@@ -73,10 +73,15 @@ class Score:
         return _WIDTH.sub(r"\1px", self.key) + end + self.suffix
 
     @property
+    def brackets(self) -> str:
+        """The unit as it ends a heading: `` [dB]``, empty for pure numbers."""
+        return f" [{self.unit}]" if self.unit else ""
+
+    @property
     def axis(self) -> str:
         """Title with domain and unit, for an axis or a sentence: ``PSNR, linear light [dB]``."""
         domain = f", {DOMAIN_NAMES[self.domain]}" if self.domain else ""
-        return f"{self.title}{domain}{f' [{self.unit}]' if self.unit else ''}"
+        return f"{self.title}{domain}{self.brackets}"
 
     @property
     def heading(self) -> str:
@@ -89,6 +94,11 @@ class Score:
         if self.metric in METRICS:
             return METRICS[self.metric].direction == "higher"
         return self.key != "speckle_contrast"
+
+    @property
+    def sign(self) -> int:
+        """1 where higher is better, else -1."""
+        return 1 if self.higher_is_better else -1
 
     @property
     def blur(self) -> float | None:
@@ -107,15 +117,11 @@ class Score:
         digits = METRICS[self.metric].digits if self.metric in METRICS else 3
         return f"{value:{'+' if signed else ''}z.{digits}f}"
 
-    def interval(self, mean: float, low: float, high: float, signed: bool = False) -> str:
-        """``17.62 [16.90, 18.31]``; the mean alone where there is no interval."""
-        if np.isnan(low):
-            return self.number(mean, signed)
-        return f"{self.number(mean, signed)} [{self.number(low, signed)}, {self.number(high, signed)}]"
-
-    def estimate(self, estimate: Estimate, signed: bool = False) -> str:
-        """An estimate with its interval."""
-        return self.interval(estimate.mean, estimate.low, estimate.high, signed)
+    def estimate(self, estimate: Estimate, signed: bool = False, unit: bool = False) -> str:
+        """``17.62 [16.90, 18.31]``; the mean alone where there is no interval. unit: of the mean."""
+        mean = (self.with_unit if unit else self.number)(estimate.mean, signed)
+        low, high = (self.number(value, signed) for value in (estimate.low, estimate.high))
+        return mean if np.isnan(estimate.low) else f"{mean} [{low}, {high}]"
 
     def mean_in(self, row: pd.Series) -> str:
         """Mean of the score in a row of the table."""
@@ -123,17 +129,17 @@ class Score:
 
     def in_row(self, row: pd.Series) -> str:
         """Mean and interval of the score in a row of the table."""
-        return self.interval(*self.ends(row))
+        return self.estimate(self.of(row))
 
     @property
     def columns(self) -> tuple[str, str, str]:
         """The columns of its mean in the table, and of the ends of the interval."""
         return self.column, self.statistic("_lo"), self.statistic("_hi")
 
-    def ends(self, row: pd.Series) -> tuple[float, float, float]:
-        """Mean of the score in a row of the table, and the ends of its interval."""
+    def of(self, row: pd.Series) -> Estimate:
+        """Mean of the score in a row of the table with its interval."""
         mean, low, high = (float(row[name]) for name in self.columns)
-        return mean, low, high
+        return Estimate(mean, low, high, int(row["n"]), int(row["clusters"]))
 
     def better(self, a: float, b: float) -> bool:
         """Is ``a`` better than ``b``?"""
@@ -159,12 +165,10 @@ def _parts(key: str) -> Score:
 
 def order_scores(keys: Iterable[str]) -> list[str]:
     """Scores in the order of tables: plain before variants, metrics as in their catalogue, linear light first."""
-    known = [metric.name for metric in catalogue()]
 
-    def rank(key: str) -> tuple[bool, bool, str, int, int, str]:
+    def rank(key: str) -> tuple[bool, str, int, int, str]:
         score = parse(key)
-        metric = known.index(score.metric) if score.metric in known else len(known)
-        domain = DOMAINS.index(score.domain) if score.domain else len(DOMAINS)
-        return not score.domain, bool(score.variant), score.variant, metric, domain, key
+        metric = [*METRICS, score.metric].index(score.metric)  # what the catalogue lacks comes last
+        return not score.domain, score.variant, metric, [*DOMAINS, score.domain].index(score.domain), key
 
     return sorted(set(keys), key=rank)

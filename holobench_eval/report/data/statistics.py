@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -43,6 +44,9 @@ class Estimate:
         return self.low > 0 or self.high < 0
 
 
+NONE = Estimate(np.nan, np.nan, np.nan, 0, 0)
+
+
 def _sums(values: Array, clusters: Clusters | None) -> Array:
     """Sums over each cluster of ``(..., n)`` values, ``(..., clusters)``; without clusters each value is one."""
     if clusters is None:
@@ -63,10 +67,10 @@ def mean_interval(values: Sequence[float] | Array, clusters: Clusters | None = N
     sample = np.asarray(values, dtype=np.float64)
     n = sample.size
     if n == 0:
-        return Estimate(np.nan, np.nan, np.nan, 0, 0)
+        return NONE
     mean = float(sample.mean())
     residuals = _sums(sample - mean, clusters)
-    half = _quantile(residuals.size) * np.sqrt(_products(residuals, residuals)) / n
+    half = _quantile(residuals.size) * np.sqrt(_products(residuals)) / n
     return Estimate(mean, float(mean - half), float(mean + half), n, residuals.size)
 
 
@@ -77,19 +81,13 @@ def ratio_interval(numerator: Array, denominator: Array, clusters: Clusters | No
     denominator itself is not. numerator, denominator: ``(n,)``.
     """
     above, below, n = float(numerator.mean()), float(denominator.mean()), numerator.size
-    residuals = [_sums(values - mean, clusters) for values, mean in ((numerator, above), (denominator, below))]
-    count = residuals[0].size
+    residuals = np.stack([_sums(numerator - above, clusters), _sums(denominator - below, clusters)])
+    count = residuals.shape[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = float(np.divide(above, below))
         scale = (_quantile(count) / n) ** 2
-    square, cross, zero = (
-        mean - scale * _products(*pair)
-        for mean, pair in (
-            (below**2, (residuals[1], residuals[1])),
-            (above * below, (residuals[0], residuals[1])),
-            (above**2, (residuals[0], residuals[0])),
-        )
-    )
+    means = np.array([above, below])
+    (zero, cross), (_, square) = np.outer(means, means) - scale * _products(residuals)
     if not square > 0:
         return Estimate(ratio, np.nan, np.nan, n, count)
     half = np.sqrt(max(cross**2 - square * zero, 0.0))
@@ -102,9 +100,10 @@ def _quantile(clusters: int) -> float:
     return float(stats.t.ppf((1 + LEVEL) / 2, clusters - 1)) if clusters >= FEWEST else np.nan
 
 
-def _products(a: Array, b: Array) -> float:
-    """Sum of products of ``(clusters,)`` residuals, for the degree of freedom that their mean took."""
-    return float(a @ b) * a.size / max(a.size - 1, 1)
+def _products(residuals: Array) -> Array:
+    """Sums of products of ``(..., clusters)`` residuals, for the degree of freedom that their mean took."""
+    count = residuals.shape[-1]
+    return residuals @ residuals.T * count / max(count - 1, 1)
 
 
 def family_p(differences: Array, clusters: Clusters | None = None) -> Array:
@@ -159,9 +158,13 @@ class PairedTest:
     p: float
 
     @property
-    def known(self) -> Array:
-        """The differences that there are."""
-        return self.differences[np.isfinite(self.differences)]
+    def median(self) -> float:
+        """Of the differences that there are; NaN for none."""
+        return float(pd.Series(self.differences).median())
+
+    def better(self, sign: int) -> int:
+        """Targets for which ``second`` is better. sign: of what is better, see ``scores.Score``."""
+        return int((sign * self.differences > 0).sum())
 
     @property
     def is_shown(self) -> bool:

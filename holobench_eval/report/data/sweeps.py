@@ -10,11 +10,9 @@ import numpy as np
 from ...display.simulated.changes import KINDS, Kind
 from .layout import Swept
 from .results import Results
-from .statistics import Estimate, mean_interval, ratio_interval
+from .statistics import Array, Estimate, mean_interval, ratio_interval
 
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
-# Kinds whose points are other benches: they are asked for rankings and not for losses.
-RANKS = frozenset({"draw"})
 
 
 @dataclass(frozen=True)
@@ -31,26 +29,26 @@ class Sweep:
 
     @property
     def points(self) -> tuple[tuple[float | str, str], ...]:
-        """(value, condition), by value, the unchanged display among numbers at its place."""
+        """(value, condition), by value, the unchanged display at its place; it leads as ``before`` where the values are
+        no numbers."""
         if self.kind.nominal is None:
-            return self.swept.points
+            return (("before", self.swept.before), *self.swept.points)
         numbers = [(self.kind.nominal, self.swept.before), *self.swept.points]
         return tuple(sorted(numbers, key=lambda point: float(point[0])))
 
     @property
-    def named_points(self) -> tuple[tuple[float | str, str], ...]:
-        """``points``, led by the unchanged display as ``before`` where the values are no numbers."""
-        return self.points if self.kind.numeric else (("before", self.swept.before), *self.points)
-
-    @property
-    def values(self) -> dict[str, float | str]:
-        """The value of every changed condition."""
-        return {condition: value for value, condition in self.swept.points}
+    def _ways(self) -> dict[int, list[tuple[float, str]]]:
+        """(value, condition) from the unchanged display down (-1) and up (1); none where the values are no numbers."""
+        if self.kind.nominal is None:
+            return {}
+        points = [(float(value), condition) for value, condition in self.points]
+        start = points.index((self.kind.nominal, self.swept.before))
+        return {-1: points[start::-1], 1: points[start:]}
 
     @property
     def methods(self) -> list[str]:
         """Labels that were planned under every condition of the sweep."""
-        rows = [self.results.methods(condition) for _, condition in ((0.0, self.swept.before), *self.swept.points)]
+        rows = [self.results.methods(condition) for _, condition in self.points]
         return [label for label in rows[0] if all(label in others for others in rows)]
 
     def mean(self, label: str, condition: str) -> Estimate:
@@ -58,8 +56,15 @@ class Sweep:
         return mean_interval(self.results.values(label, condition), self.results.clusters)
 
     def loss(self, label: str, condition: str) -> Estimate | None:
-        """What the change cost, target by target."""
-        return self.results.lost(label, self.swept.before, condition)
+        """What the change cost, target by target, positive where the score got worse; None without a complete pair of
+        rows."""
+        if not all(self.results.is_complete(label, name) for name in (self.swept.before, condition)):
+            return None
+        return self.results.estimate(self._lost(label, condition))
+
+    def _lost(self, label: str, condition: str) -> Array:
+        values = self.results.values
+        return self.results.headline.sign * (values(label, self.swept.before) - values(label, condition))
 
     def losses(self, label: str) -> dict[str, Estimate]:
         """What every change cost, by condition; without those that lack a target."""
@@ -69,30 +74,22 @@ class Sweep:
     def worst(self, label: str) -> tuple[float | str, Estimate] | None:
         """The value that cost most, and what it cost."""
         losses = self.losses(label)
-        if not losses:
-            return None
-        condition = max(losses, key=lambda name: losses[name].mean)
-        return self.values[condition], losses[condition]
+        known = [(value, losses[condition]) for value, condition in self.swept.points if condition in losses]
+        return max(known, key=lambda point: point[1].mean, default=None)
 
     @property
     def sides(self) -> list[int]:
         """-1 and 1 where there are points below and above the nominal value; none for names and for factors."""
-        nominal = self.kind.nominal
-        if nominal is None or not self.kind.per:
-            return []
-        return [side for side in (-1, 1) if any(side * (float(v) - nominal) > 0 for v, _ in self.swept.points)]
+        return [side for side, way in self._ways.items() if len(way) > 1 and self.kind.per]
 
     def slope(self, label: str, side: int) -> Estimate | None:
         """Loss for ``kind.per`` of the change to one side: the least-squares line through zero, target by target."""
-        nominal = float(self.kind.nominal or 0.0)
-        points = [(abs(float(v) - nominal), name) for v, name in self.swept.points if side * (float(v) - nominal) > 0]
+        (nominal, _), *points = self._ways[side]
         if not points or any(self.loss(label, name) is None for _, name in points):
             return None
-        sign = 1 if self.results.headline.higher_is_better else -1
-        reach = np.array([away for away, _ in points])
-        before = self.results.values(label, self.swept.before)
-        after = np.stack([self.results.values(label, condition) for _, condition in points])
-        return self.results.estimate(self.kind.per * (reach @ (sign * (before - after))) / float(reach @ reach))
+        reach = np.array([abs(value - nominal) for value, _ in points])
+        lost = np.stack([self._lost(label, name) for _, name in points])
+        return self.results.estimate(self.kind.per * (reach @ lost) / float(reach @ reach))
 
     def gain(self, label: str, condition: str) -> Estimate | None:
         """Headline score above the baseline under the same change, positive where it is better."""
@@ -104,48 +101,33 @@ class Sweep:
     def break_even(self, label: str) -> list[float] | None:
         """Where a method that is above the baseline without a change falls to it, on either side of the nominal value,
         by straight lines between the points; empty where it never does. None where a difference is not known."""
-        if self.kind.nominal is None or any(self.gain(label, condition) is None for _, condition in self.points):
+        gains = {name: gained.mean for _, name in self.points if (gained := self.gain(label, name))}
+        if self.kind.nominal is None or len(gains) < len(self.points):
             return None
         crossings = []
-        for side in (-1, 1):
-            walk = sorted(
-                (side * (float(value) - self.kind.nominal), condition)
-                for value, condition in self.points
-                if side * (float(value) - self.kind.nominal) >= 0
-            )
-            gains = [(reach, gained.mean) for reach, name in walk if (gained := self.gain(label, name)) is not None]
-            for (near, above), (far, below) in itertools.pairwise(gains):
+        for way in self._ways.values():
+            for (near, before), (far, after) in itertools.pairwise(way):
+                above, below = gains[before], gains[after]
                 if above > 0 >= below:
-                    crossings.append(self.kind.nominal + side * (near + (far - near) * above / (above - below)))
+                    crossings.append(near + (far - near) * above / (above - below))
                     break
         return crossings
 
-    def small_range(self, label: str) -> tuple[float, float] | None:
-        """The values around the nominal one up to which the mean changes by at most ``SMALL``; None without numbers,
-        and where the next value has no score."""
-        if self.kind.nominal is None:
-            return None
-        losses = self.losses(label)
-        ends = []
-        for side in (-1, 1):
-            reach = 0.0
-            for value, condition in sorted(self.swept.points, key=lambda point: abs(float(point[0]))):
-                away = side * (float(value) - self.kind.nominal)
-                if away > 0:
-                    if condition not in losses:
-                        return None
-                    if abs(losses[condition].mean) > SMALL:
-                        break
-                    reach = away
-            ends.append(self.kind.nominal + side * reach)
-        return ends[0], ends[1]
-
-    def small_range_text(self, label: str) -> str | None:
-        """``small_range`` with its unit: ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``."""
-        if (ends := self.small_range(label)) is None:
-            return None
-        if ends[0] == ends[1]:
-            return "nowhere"
+    def small_range(self, label: str) -> str | None:
+        """The values around the nominal one up to which the mean changes by at most ``SMALL``, with their unit:
+        ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``. None without numbers, and where the next
+        value has no score."""
+        losses, ends = self.losses(label), []
+        for (end, _), *points in self._ways.values():
+            for value, condition in points:
+                if condition not in losses:
+                    return None
+                if abs(losses[condition].mean) > SMALL:
+                    break
+                end = value
+            ends.append(end)
+        if not ends or ends[0] == ends[1]:
+            return "nowhere" if ends else None
         tested = [float(value) for value, _ in self.swept.points]
         low = f"{ends[0]:g}{' or less' * (ends[0] == min(tested))}"
         high = f"{ends[1]:g}{' or more' * (ends[1] == max(tested))}"
@@ -167,5 +149,5 @@ class Sweep:
 
 
 def sweeps(results: Results) -> list[Sweep]:
-    """The sweeps of a study, those of rankings aside."""
-    return [Sweep(swept, results) for swept in results.layout.sweeps if swept.kind not in RANKS]
+    """The sweeps of a study without draws, which are other benches and are asked for rankings, not for losses."""
+    return [Sweep(swept, results) for swept in results.layout.sweeps if swept.kind != "draw"]

@@ -7,24 +7,22 @@ the same bytes.
 
 from __future__ import annotations
 
-import csv
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ...core.errors import UserError
-from ...study.plan import FLOORS, REFERENCE
+from ...study.plan import FLOORS, REFERENCE, Plan
 from . import columns
 from .categories import FLOOR, ORACLE
 from .column import DONE as DONE
-from .column import Cells, Column, Record, always
-from .columns import identity_of as identity_of
+from .column import Cells, Column, Record
 from .layout import Layout
-from .scores import Score, order_scores, parse
+from .scores import order_scores, parse
 from .statistics import mean_interval
 
 PUBLISHED = "reported_"  # how columns of published figures begin
@@ -32,32 +30,28 @@ MEDIAN = "_median"  # the statistic of the headline beside its mean
 _EXACT = 2.0**53  # below it every whole number is a float
 # Text that a spreadsheet would run as a formula, after any apostrophes, which this module puts before it.
 _FORMULA = re.compile(r"'*\s*[=+\-@＝＋－＠]")
+GUARDED = rf"^'({_FORMULA.pattern})"
 
 
-def format_number(value: float) -> str:
-    """Six significant digits; empty for NaN."""
-    return "" if np.isnan(value) else f"{value:.6g}"
-
-
-def _rounded(value: Any) -> float:
+def rounded(value: Any) -> float:
+    """The number as the CSV files have it, with six significant digits; NaN for None."""
     return float("nan") if value is None else float(f"{float(value):.6g}")
 
 
 def _row(record: Record, layout: Layout, listed: Sequence[Column]) -> dict[str, Any]:
-    """A row from its record, or as it was written where the record is of a records.csv (``committed``)."""
+    """A row from its record, or as it was written where the record is one of ``committed_records``."""
     if "row" in record:
         return dict(record["row"])
-    sources = ((column, column.source) for column in listed if column.source and not column.is_of_study)
-    row = {column.name: _value(column, source(record, layout)) for column, source in sources}
+    row = {
+        column.name: (str if column.kind == "text" else rounded)(column.source(record, layout))
+        for column in listed
+        if column.source and not column.is_of_study
+    }
     scores = record.get("scores", {}) if record["state"] == DONE else {}
-    found = {parse(key).column: _rounded(value) for key, value in scores.items()}
+    found = {parse(key).column: rounded(value) for key, value in scores.items()}
     if clash := [column.name for column in listed if column.name in found]:
         raise UserError(f"record {row['cell']}: score named like a column of records.csv: {', '.join(clash)}")
     return row | found
-
-
-def _value(column: Column, value: Any) -> Any:
-    return str(value) if column.kind == "text" else _rounded(value)
 
 
 def records_frame(records: Iterable[Record], layout: Layout) -> pd.DataFrame:
@@ -69,7 +63,11 @@ def records_frame(records: Iterable[Record], layout: Layout) -> pd.DataFrame:
     frame = of_study(pd.DataFrame([_row(record, layout, listed) for record in records]), layout)
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(score_columns(frame)) or [parse(layout.headline).column]
-    kept = [column for column in listed if column.name in frame and column.kept(frame[column.name], layout)]
+    kept = [
+        column
+        for column in listed
+        if column.name in frame and (column.kept is None or column.kept(frame[column.name], layout))
+    ]
     first, last = ([column.name for column in part if column in kept] for part in (columns.CELL, columns.FIGURES))
     return _sorted(_whole(frame.reindex(columns=[*first, *scores, *last])), layout)
 
@@ -98,13 +96,10 @@ def row_order(frame: pd.DataFrame, layout: Layout) -> list[tuple[str, str]]:
 
 def _sorted(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     rank = {pair: index for index, pair in enumerate(row_order(frame, layout))}
-    target_rank = {target: index for index, target in enumerate(layout.targets)}
+    targets = {target: index for index, target in enumerate(layout.targets)}  # all others come last, by name
     pairs = zip(frame["label"], frame["condition"], strict=True)
-    ordered = frame.assign(
-        _row=[rank[pair] for pair in pairs],
-        _target=[target_rank.get(target, len(target_rank)) for target in frame["target"]],
-    )
-    ordered = ordered.sort_values(["_row", "_target", "target", "repeat", "cell"], kind="stable")
+    places = frame.assign(_row=[rank[pair] for pair in pairs], _target=frame["target"].map(targets))
+    ordered = places.sort_values(["_row", "_target", "target", "repeat", "cell"], kind="stable")
     return ordered.drop(columns=["_row", "_target"]).reset_index(drop=True)
 
 
@@ -136,41 +131,30 @@ def table_from_records(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     so that its mean always stands for the ``n`` beside it; figures that describe the capture, such as the speckle
     contrast of flat patches, are means over the targets that have them.
     """
-    groups = dict(list(frame.groupby(["label", "condition"], sort=False)))
-    unknown = {column.name for column in columns.recorded()} - set(frame)
-    parts = [[column for column in part if column.name not in unknown] for part in (columns.CELL, columns.FIGURES)]
-    scores, means = [parse(name) for name in score_columns(frame)], per_target(frame)
-    rows = [
-        _table_row(Cells(*pair, groups[pair], layout), means.get(pair), scores, *parts)
-        for pair in row_order(frame, layout)
-    ]
+    groups, unknown = frame.groupby(["label", "condition"]), {column.name for column in columns.recorded()} - set(frame)
+    means, none = per_target(frame), frame[score_columns(frame)].iloc[:0]
+    rows = []
+    for pair in row_order(frame, layout):
+        cells, published = Cells(groups.get_group(pair), layout), layout.published(*pair)
+        first, last = (_values(cells, part, unknown) for part in (columns.CELL, columns.FIGURES))
+        scores = _statistics(cells, means.get(pair, none))
+        reported = {f"{PUBLISHED}{parse(name).column}": published.get(name, np.nan) for name in layout.reported_metrics}
+        rows.append(first | scores | last | reported)
     return _ranked(pd.DataFrame(rows), len({*layout.targets, *frame["target"]}), layout)
 
 
-def _table_row(
-    cells: Cells, means: pd.DataFrame | None, scores: Sequence[Score], before: Sequence[Column], after: Sequence[Column]
-) -> dict[str, Any]:
-    first, last = (
-        {column.name: column.table.value(cells, column.name) for column in part if column.table}
-        for part in (before, after)
-    )
-    published = cells.layout.published(cells.label, cells.condition)
-    reported = {name: published.get(name, np.nan) for name in cells.layout.reported_metrics}
-    return {
-        **first,
-        **_statistics(cells, means, scores),
-        **last,
-        **{f"{PUBLISHED}{parse(name).column}": value for name, value in reported.items()},
-    }
+def _values(cells: Cells, listed: Sequence[Column], unknown: Container[str]) -> dict[str, Any]:
+    known = [column for column in listed if column.name not in unknown]
+    return {column.name: column.table(cells, column.name) for column in known if column.table}
 
 
-def _statistics(cells: Cells, means: pd.DataFrame | None, scores: Sequence[Score]) -> dict[str, float]:
-    """Mean of every score with its interval. means: of ``per_target``, None where no cell is done."""
+def _statistics(cells: Cells, means: pd.DataFrame) -> dict[str, float]:
+    """Mean of every score with its interval. means: of ``per_target``."""
     found: dict[str, float] = {}
     known = clusters_in(cells.done)
-    clusters = np.array([known[target] for target in means.index] if means is not None else [])
-    for score in scores:
-        values = np.full(0, np.nan) if means is None else means[score.column].to_numpy()
+    clusters = np.array([known[target] for target in means.index])
+    for score in map(parse, score_columns(cells.cells)):
+        values = means[score.column].to_numpy()
         held = ~np.isnan(values)
         if score.domain and not held.all():
             held[:] = False
@@ -199,32 +183,58 @@ def csv_text(frame: pd.DataFrame) -> str:
 
     Text that a spreadsheet would take for a formula has an apostrophe before it, which :func:`read_records` takes off.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(map(_cell, frame.columns))
-    for row in frame.itertuples(index=False):
-        writer.writerow(map(_cell, row))
-    return text.getvalue()
+    guarded = frame.rename(columns=_guarded).map(_guarded)
+    return str(guarded.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
 
 
-def _cell(value: Any) -> str:
-    if isinstance(value, str):
-        return f"'{value}" if _FORMULA.match(value) else value
-    return str(value) if isinstance(value, int | np.integer) else format_number(value)
+def _guarded(value: Any) -> Any:
+    return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value
 
 
 def read_records(text: str) -> pd.DataFrame:
     """The records frame from the text of records.csv."""
     frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     listed = columns.recorded()
-    lacking = sorted(column.name for column in listed if column.kept is always and column.name not in frame)
+    lacking = sorted(column.name for column in listed if column.kept is None and column.name not in frame)
     if lacking:
         raise UserError(f"records.csv lacks the columns {', '.join(lacking)}; it was written by another version")
     texts = [column.name for column in listed if column.kind == "text" and column.name in frame]
-    frame[texts] = frame[texts].replace(f"^'({_FORMULA.pattern})", r"\1", regex=True)
+    frame[texts] = frame[texts].replace(GUARDED, r"\1", regex=True)
     for name in frame.columns.drop(texts):
         try:
             frame[name] = [float(value) if value else np.nan for value in frame[name]]
         except ValueError as error:
             raise UserError(f"records.csv, column {name}: {error}") from error
     return _whole(frame)
+
+
+def difference(frame: pd.DataFrame, plan: Plan) -> str:
+    """How the cells of a records frame differ from those that are planned now, in words; empty where they do not."""
+    planned, measured = {cell.id for cell in plan.cells}, set(frame["cell"])
+    parts = [(len(planned - measured), f"of {len(planned)} planned cells are not in records.csv")]
+    parts += [(len(measured - planned), f"of {len(measured)} cells in records.csv are not planned")]
+    return ", ".join(f"{count} {text}" for count, text in parts if count)
+
+
+def committed_records(frame: pd.DataFrame, plan: Plan) -> list[dict[str, Any]]:
+    """A record for every cell of a plan, as ``Store.load`` gives them under the plan's labels.
+
+    frame: a records frame that has all of them, see ``difference``.
+    """
+    rows = {row["cell"]: row for row in frame.to_dict("records")}
+    scores = {parse(name).key: name for name in score_columns(frame)}
+    found = []
+    for label, cell in plan.labelled():
+        row = rows[cell.id]
+        found.append(
+            {
+                "id": cell.id,
+                "cell": cell.facts(),
+                "label": label,
+                "state": row["state"],
+                "scores": {key: row[name] for key, name in scores.items() if not pd.isna(row[name])},
+                "learned": {"sha256": row["learned_sha256"]} if row.get("learned_sha256") else None,
+                "row": {**row, "label": label},  # what the numbers of the tables come from
+            }
+        )
+    return found

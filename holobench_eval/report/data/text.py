@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ...study.folders import FILES as FILES
@@ -66,9 +66,10 @@ class Text:
     scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
     figures; each: what a method makes for one target. best, only: what the first of several, or the only, ranked method
     does; other: the same by another metric. procedure: what is done; caution: what the figures do not say;
-    displays: what the displays are; floor, instead: the reference images and the heading of their column. looked_at:
-    heading of the pictures; picture: what a tile of the comparison is. geometry, blur, cost: first sentences of these
-    sections. seeds: what is random. compared: in which values pictures are matched and blurred; domains: what the
+    displays: what the displays are; floor, instead: the reference images and the heading of their column.
+    picture: what a tile of the comparison is. registered: what was done before any refinement
+    of the geometry; drifted: what a large difference to the refined geometry means. blur, cost: first sentences of
+    these sections. seeds: what is random. compared: in which values pictures are matched and blurred; domains: what the
     domains of metrics mean.
     """
 
@@ -97,13 +98,9 @@ class Text:
         "Linear: light intensity in [0, 1], as the sensor measures it. Amplitude: its square root. sRGB: encoded "
         "for a monitor; perceptual metrics are defined on it."
     )
-    looked_at: str = "Captures to look at"
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
-    geometry: str = (
-        'Registration is frozen before any method\'s image is captured. "Refined" allows each capture a rigid motion '
-        "of at most 2 px and 0.1 degree, estimated by correlation and not by maximising the score. A large difference "
-        "means that the geometry drifted."
-    )
+    registered: str = "Registration is frozen before any method's image is captured. "
+    drifted: str = "the geometry drifted"
     blur: str = "The ranking can change between methods that trade speckle for sharpness."
     cost: str = "Captures are those that a method took to solve one target."
     seeds: str = (
@@ -124,10 +121,7 @@ class Text:
         }[name]
 
 
-PICTURE = Text()
-
-ON_A_NETWORK = replace(
-    PICTURE,
+ON_A_NETWORK = Text(
     scored="predicted capture",
     procedure=(
         "A method turns a target image into a phase pattern. No display shows it: a trained, frozen network predicts "
@@ -139,19 +133,14 @@ ON_A_NETWORK = replace(
     ),
     displays="The display is a trained, frozen network; there is no bench, no camera and no noise.",
     instead="in the place of a predicted capture",
-    looked_at="Predicted captures to look at",
     picture="Each predicted capture is matched in intensity and sRGB-encoded",
-    geometry=(
-        'The network predicts in the frame of the target. "Refined" allows each predicted capture a rigid motion of '
-        "at most 2 px and 0.1 degree, estimated by correlation and not by maximising the score. A large difference "
-        "means that the picture is displaced."
-    ),
+    registered="The network predicts in the frame of the target. ",
+    drifted="the picture is displaced",
     cost="There is no camera, so no method captures anything while it solves.",
     seeds="A learned display has no noise: repeats differ only by the methods' own random numbers.",
 )
 
-PREDICTION = replace(
-    PICTURE,
+PREDICTION = Text(
     scored="prediction",
     truth="capture",
     axis=", of predictions against captures",
@@ -170,16 +159,12 @@ PREDICTION = replace(
     ),
     floor="Images that no method predicted, scored against the same captures with the same match and metrics.",
     instead="in the place of a prediction",
-    looked_at="Predictions to look at",
     picture=(
         'The column "capture" shows the capture of the hologram by {holograms}, registered and matched to the target; '
         "each prediction is matched to it in intensity; all are sRGB-encoded"
     ),
-    geometry=(
-        'Captures are registered before anything is predicted. "Refined" allows each prediction a rigid motion of at '
-        "most 2 px and 0.1 degree, estimated by correlation and not by maximising the score. A large difference means "
-        "that predictions are displaced."
-    ),
+    registered="Captures are registered before anything is predicted. ",
+    drifted="predictions are displaced",
     blur="The ranking can change between predictions with and without speckle.",
     cost="A prediction takes no captures.",
     seeds=(
@@ -189,8 +174,7 @@ PREDICTION = replace(
 )
 
 
-FOCUS = replace(
-    PICTURE,
+FOCUS = Text(
     procedure=(
         "The targets are focal stacks: pictures of a scene with depth, focused on one plane after another, with "
         "depth-of-field blur. A method turns the picture of a plane into a phase pattern for the display's own "
@@ -208,14 +192,13 @@ FOCUS = replace(
 )
 
 
-_COMPARED = {
+COMPARED = {
     "stored": "in the values as stored",
     "srgb": "in linear light, for which captures and targets were decoded from sRGB",
     "linear": "in linear light, for which targets were decoded from sRGB and captures taken as they are",
 }
 
-GIVEN = replace(
-    PICTURE,
+GIVEN = Text(
     best="ranks first of {count} methods with a capture of every target",
     only="is the only method with a capture of every target",
     procedure=(
@@ -225,10 +208,8 @@ GIVEN = replace(
     ),
     floor="Images that nobody photographed, scored against the same targets with the same match and metrics.",
     picture="Each capture is aligned with its target and matched in intensity",
-    geometry=(
-        '"Refined" allows each aligned capture a rigid motion of at most 2 px and 0.1 degree, estimated by correlation '
-        "and not by maximising the score. A large difference means that the shared alignment does not fit the capture."
-    ),
+    registered="",
+    drifted="the shared alignment does not fit the capture",
     cost="The cost of the captures is unknown.",
     seeds="Only the speckle of the floor is random; it depends on the target's name alone.",
 )
@@ -249,21 +230,4 @@ REAL_SEEDS = (
 )
 
 
-_BY_MEASURE = {"picture": PICTURE, "prediction": PREDICTION, "error_budget": PREDICTION, "focus": FOCUS, FILES: GIVEN}
-
-
-def text_of(
-    measure: str, holograms: str = "", on_a_network: bool = False, real: bool = False, values: str = "stored"
-) -> Text:
-    """The words for a measure.
-
-    holograms: the method whose captures are predicted; real: whether the display exists; values: how pictures were read
-    that were given as files.
-    """
-    text = ON_A_NETWORK if on_a_network and measure == "picture" else _BY_MEASURE[measure]
-    if measure == FILES:
-        text = replace(text, compared=_COMPARED[values], domains=AS_STORED if values == "stored" else text.domains)
-    if real:
-        text = replace(text, displays=REAL, seeds=REAL_SEEDS)
-    procedure, picture = (words.replace("{holograms}", holograms) for words in (text.procedure, text.picture))
-    return replace(text, procedure=procedure, picture=picture)
+BY_MEASURE = {"picture": Text(), "prediction": PREDICTION, "error_budget": PREDICTION, "focus": FOCUS, FILES: GIVEN}

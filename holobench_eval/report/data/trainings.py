@@ -52,43 +52,26 @@ def trainings(layout: Layout, records: Sequence[Mapping[str, Any]], output: Path
 
     What a method needs is named first in a cell's ``prepared``, what the display needs last.
     """
-    known, rows, used = training_records(output), dict[str, list[str]](), dict[str, set[str]]()
-    conditions: dict[str, str] = {}
+    needed: dict[str, list[tuple[str, str, str]]] = {}  # by identity: label, condition, digest of what was learned
     for record in records:
         cell, prepared = record["cell"], record["cell"].get("prepared") or ()
-        if not prepared or cell["condition"] == REFERENCE:
-            continue
-        if record["label"] in layout.trained:
-            rows.setdefault(prepared[0], []).append(record["label"])
-            conditions.setdefault(prepared[0], cell["condition"])
-            if record["state"] == DONE and record.get("learned"):
-                used.setdefault(prepared[0], set()).add(str(record["learned"]["sha256"]))
-    if layout.learned_display is not None:
-        for identity in dict.fromkeys(
-            record["cell"]["prepared"][-1] for record in records if record["cell"]["prepared"]
-        ):
-            rows.setdefault(identity, []).append(DISPLAY)
-            conditions.setdefault(identity, layout.learned_display)
-    trained = [
-        Training(
-            words(list(dict.fromkeys(labels))),
-            tuple(dict.fromkeys(labels)),
-            _display(known.get(identity), conditions[identity]),
-            known.get(identity),
-            frozenset(used.get(identity, ())),
-        )
-        for identity, labels in rows.items()
-    ]
-    return _with_own_names(trained)
-
-
-def _display(record: TrainingRecord | None, condition: str) -> str:
-    return str(record.provenance["description"].get("profile", condition)) if record else condition
-
-
-def _with_own_names(trained: list[Training]) -> list[Training]:
+        if prepared and cell["condition"] != REFERENCE and record["label"] in layout.trained:
+            learned = record["learned"]["sha256"] if record["state"] == DONE and record.get("learned") else ""
+            needed.setdefault(prepared[0], []).append((record["label"], cell["condition"], learned))
+    for record in records if layout.learned_display is not None else ():
+        if prepared := record["cell"]["prepared"]:
+            needed.setdefault(prepared[-1], []).append((DISPLAY, str(layout.learned_display), ""))
+    known = training_records(output)
+    trained = [_training(known.get(identity), uses) for identity, uses in needed.items()]
     names = [item.name for item in trained]
     return [
         item if names.count(item.name) == 1 else replace(item, name=f"{item.name} on {item.display}")
         for item in trained
     ]
+
+
+def _training(record: TrainingRecord | None, uses: Sequence[tuple[str, str, str]]) -> Training:
+    labels, display = tuple(dict.fromkeys(label for label, _, _ in uses)), uses[0][1]
+    if record is not None:
+        display = str(record.provenance["description"].get("profile", display))
+    return Training(words(list(labels)), labels, display, record, frozenset(digest for _, _, digest in uses if digest))

@@ -8,10 +8,9 @@ import pandas as pd
 
 from ...core.io import write_atomically
 from ..data.comparisons import comparison_frame
-from ..data.meanings import File
 from ..data.results import Results
 from ..data.tables import csv_text
-from .dictionary import dictionary
+from .dictionary import File, dictionary
 from .latex import latex_tables
 from .parquet import is_available, write_parquet
 

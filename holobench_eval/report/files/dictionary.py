@@ -1,16 +1,88 @@
-"""columns.md: what every column of a report's files holds."""
+"""columns.md: what every column of a report's files holds, those of scores included, which no list has one by one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal
 
 import pandas as pd
 
 from ..data.column import Column
-from ..data.meanings import File, column
+from ..data.columns import recorded, tabled
+from ..data.comparisons import of_tests
+from ..data.scores import DOMAIN_NAMES, METRICS, Score, parse
+from ..data.statistics import LEVEL
+from ..data.tables import PUBLISHED
 from ..markdown import Markdown, blocks, code, heading, table
 
-_UNKNOWN = "Not described"
+File = Literal["records.csv", "table.csv", "tests.csv"]
+
+# Scores that are not image metrics: meaning, unit.
+_WHITE = "white^2"
+_KEYS = {
+    "brightness_ratio": ("Mean of the capture over mean of the target, before the intensity match", ""),
+    "efficiency": ("Light in the scored region over light on the panel", ""),
+    "refine_dx_px": ("Horizontal motion that the refinement found", "px"),
+    "refine_dy_px": ("Vertical motion that the refinement found", "px"),
+    "refine_theta_deg": ("Rotation that the refinement found", "deg"),
+    "scale_0": ("Factor of the intensity match, red", ""),
+    "scale_1": ("Factor of the intensity match, green", ""),
+    "scale_2": ("Factor of the intensity match, blue", ""),
+    "second_aligner_px": ("Most that a corner of the target lies elsewhere in the capture by a second aligner", "px"),
+    "share_scored": ("Share of the target that is scored, which all its captures show", ""),
+    "share_seen": ("Share of the target that its capture shows", ""),
+    "speckle_contrast": ("Standard deviation over mean of intensity in flat patches of the target", ""),
+    "unexplained_by_target": ("Squared error of the capture that the target leaves, white being 1", _WHITE),
+    "unexplained_by_ideal_image": ("The same that the ideal image of the hologram leaves", _WHITE),
+    "unexplained": ("The same that the method's prediction leaves", _WHITE),
+    "unexplained_but_noise": ("The same that the picture without temporal noise would leave", _WHITE),
+    "error_of_ideal_image": ("Squared error of the ideal image against the target", _WHITE),
+}
+_VARIANTS = {
+    "": "",
+    "refined": ", after a rigid motion of at most 2 px and 0.1 degree",
+    "infocus": ", of what is in focus at the plane",
+    "second": ", by a second, independent registration",
+}
+_INTERVAL = f"{100 * LEVEL:.0f} % interval over clusters of targets"
+_STATISTICS = {
+    "": "mean over targets",
+    "_lo": f"lower end of the {_INTERVAL}",
+    "_hi": f"upper end of the {_INTERVAL}",
+    "_median": "median over targets",
+}
+
+
+def column(file: File, name: str) -> Column | None:
+    """What a column of a file holds; None for one that nothing is known of."""
+    if file == "tests.csv":
+        listed = [column for metric in METRICS for column in of_tests(Score(metric, metric))]
+    else:
+        listed = recorded() if file == "records.csv" else tabled()
+    found = next((column for column in listed if column.name == name), None)
+    if found or file == "tests.csv":
+        return found
+    if file == "table.csv" and name.startswith(PUBLISHED):
+        unit = parse(name.removeprefix(PUBLISHED)).unit
+        return Column(name, "Published figure of the metric, of other hardware and images", "number", unit)
+    for end, meaning in (_STATISTICS if file == "table.csv" else {"": ""}).items():
+        score = parse(name.replace(end, ""))
+        if score.statistic(end) == name and (found := _score(score, name, meaning)):
+            return found
+    return None
+
+
+def _score(score: Score, name: str, statistic: str) -> Column | None:
+    """A score's column. statistic: over targets, empty for single cells."""
+    if score.key in _KEYS:
+        meaning, unit = _KEYS[score.key]
+    elif score.metric in METRICS and score.domain and (score.blur is not None or score.variant in _VARIANTS):
+        blurred = f", both pictures blurred by a Gaussian of standard deviation {score.blur or 0:g} px"
+        variant = _VARIANTS.get(score.variant, blurred)
+        meaning, unit = f"{score.title} in {DOMAIN_NAMES[score.domain]}{variant}", score.unit
+    else:
+        return None
+    return Column(name, f"{meaning}, {statistic}" if statistic else meaning, "number", unit)
 
 
 def dictionary(files: Mapping[File, pd.DataFrame]) -> Markdown:
@@ -30,5 +102,5 @@ def dictionary(files: Mapping[File, pd.DataFrame]) -> Markdown:
 
 
 def _row(file: File, name: str) -> list[object]:
-    found = column(file, name) or Column(name, _UNKNOWN, "number")
+    found = column(file, name) or Column(name, "Not described", "number")
     return [code(name), Markdown(found.meaning), Markdown(found.unit), found.kind]

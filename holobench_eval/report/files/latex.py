@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
-from ..data.marks import marked
+from ..data.phrases import marked
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES, Score
-from ..data.statistics import LEVEL, SIGNIFICANCE, PairedTest
-from ..data.tables import format_number
+from ..data.statistics import LEVEL, NONE, SIGNIFICANCE, Estimate, PairedTest
+from ..data.tables import rounded
 from ..data.text import FILES, words
 
 _HEAD = """% The headline table of every display, with the numbers of table.csv and tests.csv.
@@ -20,6 +19,9 @@ _HEAD = """% The headline table of every display, with the numbers of table.csv 
 _LABEL_MM = 27  # room for a method's label, which is broken into lines
 _LONGEST, _PIECE = 24, 8  # letters of a word that fit into a line, and between breaks of one that does not
 _NONE = "{--}"
+# A column of a table, or two or three that share a heading: specification, heading, and a text a row with & between the
+# columns.
+_Column = tuple[str, str, Sequence[str]]
 _SPECIAL = {
     "\\": r"\textbackslash{}",
     "^": r"\textasciicircum{}",
@@ -33,15 +35,6 @@ _SPECIAL = {
     **{character: f"{{{character}}}" for character in "[]*"},  # after \\\\ they would belong to it
 }
 _LIGATURE = re.compile(r"([-,'`])(?=\1)|[!?](?=`)")  # signs that the next one would change
-
-
-@dataclass(frozen=True)
-class _Column:
-    """A column of a table, or two or three that share a heading. cells: a text a row, with & between the columns."""
-
-    spec: str
-    heading: str
-    cells: Sequence[str]
 
 
 def escape(text: object) -> str:
@@ -60,19 +53,18 @@ def latex_tables(results: Results) -> str:
 
 
 def _table(results: Results, condition: str) -> str:
-    columns = list(_columns(results, condition))
-    lines = zip(*(column.cells for column in columns), strict=True)
+    specs, headings, columns = zip(*_columns(results, condition), strict=True)
     return "\n".join(
         [
             r"\begin{table}",
             r"  \centering\scriptsize\setlength{\tabcolsep}{2pt}\setlength{\belowcaptionskip}{4pt}",
             f"  \\caption{{{' '.join(_caption(results, condition))}}}",
             f"  \\label{{tab:{_slug(results.layout.study)}-{_slug(condition)}}}",
-            f"  \\begin{{tabular}}{{@{{}}{' '.join(column.spec for column in columns)}@{{}}}}",
+            f"  \\begin{{tabular}}{{@{{}}{' '.join(specs)}@{{}}}}",
             r"    \toprule",
-            f"    {' & '.join(column.heading for column in columns)} \\\\",
+            f"    {' & '.join(headings)} \\\\",
             r"    \midrule",
-            *(f"    {' & '.join(cells)} \\\\" for cells in lines),
+            *(f"    {' & '.join(cells)} \\\\" for cells in zip(*columns, strict=True)),
             r"    \bottomrule",
             r"  \end{tabular}",
             r"\end{table}",
@@ -85,54 +77,41 @@ def _columns(results: Results, condition: str) -> Iterator[_Column]:
     labels, score, ssim = _complete(results, condition), results.headline, _ssim(results)
     rows = [results.row(label, condition) for label in labels]
     unit = f" [{escape(score.unit)}]" if score.unit else ""
-    yield _Column(
-        rf">{{\raggedright\arraybackslash}}p{{{_LABEL_MM}mm}}",
-        "method",
-        [_label(marked(results, label, condition)) for label in labels],
-    )
-    means = [score.ends(row) for row in rows]
-    yield _pair(score, f"{escape(score.title)}{unit}", means)
-    if tests := _tests(results, condition):
-        estimates = {label: test.estimate for label, test in tests.items()}
-        changes = [
-            (estimates[label].mean, estimates[label].low, estimates[label].high) if label in tests else (math.nan,) * 3
-            for label in labels
-        ]
-        pairs = _pair(score, rf"$\Delta${unit}", changes, "+")
-        stars = ["*" if label in tests and tests[label].is_shown else "" for label in labels]
-        yield _Column(
-            rf"{pairs.spec}@{{}}l",
-            pairs.heading.replace("{2}", "{3}", 1),
-            [f"{cell} & {star}" for cell, star in zip(pairs.cells, stars, strict=True)],
+    names = [" ".join(map(_breakable, marked(results, label, condition).split())) for label in labels]
+    yield rf">{{\raggedright\arraybackslash}}p{{{_LABEL_MM}mm}}", "method", names
+    yield _pair(score, f"{escape(score.title)}{unit}", [score.of(row) for row in rows])
+    if known := _tests(results, condition):
+        tests = [known.get(label) for label in labels]
+        spec, heading, cells = _pair(
+            score, rf"$\Delta${unit}", [test.estimate if test else NONE for test in tests], "+"
         )
+        stars = ["*" if test and test.is_shown else "" for test in tests]
+        shown = [f"{cell} & {star}" for cell, star in zip(cells, stars, strict=True)]
+        yield rf"{spec}@{{}}l", heading.replace("{2}", "{3}", 1), shown
     if ssim:
         yield _single(escape(ssim.title), [_digits(ssim, row[ssim.column]) for row in rows])
     if _counts_captures(results, condition):
         yield _single("captures", [f"{row['total_captures']:.0f}" for row in rows])
 
 
-def _label(text: str) -> str:
-    """A label that can be broken between its words, and within a word that is longer than a line."""
-    return " ".join(map(_breakable, text.split()))
-
-
 def _breakable(word: str) -> str:
+    """A word that can be broken within, where it is longer than a line."""
     length = _PIECE if len(word) > _LONGEST else len(word)
     return r"\allowbreak{}".join(escape(word[start : start + length]) for start in range(0, len(word), length))
 
 
 def _single(heading: str, cells: list[str]) -> _Column:
-    return _Column(_numeric(cells), f"{{{heading}}}", cells)
+    return _numeric(cells), f"{{{heading}}}", cells
 
 
-def _pair(score: Score, heading: str, estimates: Sequence[tuple[float, float, float]], sign: str = "") -> _Column:
-    """Means and half of their intervals in two columns; estimates: mean, low, high."""
-    means = [_digits(score, mean, bool(sign)) for mean, _, _ in estimates]
-    halves = [_digits(score, (_rounded(high) - _rounded(low)) / 2) for _, low, high in estimates]
+def _pair(score: Score, heading: str, estimates: Sequence[Estimate], sign: str = "") -> _Column:
+    """Means and half of their intervals in two columns."""
+    means = [_digits(score, each.mean, bool(sign)) for each in estimates]
+    halves = [_digits(score, (rounded(each.high) - rounded(each.low)) / 2) for each in estimates]
     none = rf"\multicolumn{{2}}{{c}}{_NONE}"
     cells = [none if mean == _NONE else f"{mean} & {half}" for mean, half in zip(means, halves, strict=True)]
     spec = rf"{_numeric(means, sign)}@{{$\,\pm\,$}}{_numeric(halves)}"
-    return _Column(spec, rf"\multicolumn{{2}}{{c}}{{{heading}}}", cells)
+    return spec, rf"\multicolumn{{2}}{{c}}{{{heading}}}", cells
 
 
 def _numeric(cells: Sequence[str], sign: str = "") -> str:
@@ -144,13 +123,8 @@ def _numeric(cells: Sequence[str], sign: str = "") -> str:
     return f"S[table-format={sign}{whole}.{digits},retain-explicit-plus]"
 
 
-def _rounded(value: float) -> float:
-    """The number as the CSV files have it."""
-    return float(format_number(value) or math.nan)
-
-
 def _digits(score: Score, value: float, signed: bool = False) -> str:
-    return _NONE if math.isnan(value) else score.number(_rounded(value), signed)
+    return _NONE if math.isnan(value) else score.number(rounded(value), signed)
 
 
 def _complete(results: Results, condition: str) -> list[str]:
@@ -160,8 +134,7 @@ def _complete(results: Results, condition: str) -> list[str]:
 
 def _tests(results: Results, condition: str) -> dict[str, PairedTest]:
     """The tests against the baseline on a display, by the tested method; empty without a baseline."""
-    tests = results.against_baseline if results.layout.baseline else ()
-    return {test.second: test for test in tests if test.condition == condition}
+    return {test.second: test for test in results.against_baseline if test.condition == condition}
 
 
 def _ssim(results: Results) -> Score | None:
@@ -171,8 +144,8 @@ def _ssim(results: Results) -> Score | None:
 
 def _counts_captures(results: Results, condition: str) -> bool:
     """Whether the captures behind every row are known."""
-    rows = [results.row(label, condition) for label in _complete(results, condition)]
-    return all(not math.isnan(row.get("total_captures", math.nan)) for row in rows)
+    captures = (results.row(label, condition)["total_captures"] for label in _complete(results, condition))
+    return not any(map(math.isnan, captures))
 
 
 def _caption(results: Results, condition: str) -> Iterator[str]:

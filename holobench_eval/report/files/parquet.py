@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from ...core.io import write_atomically
-from ..data.meanings import column
+from .dictionary import column
 
 
 def is_available() -> bool:
@@ -28,18 +28,12 @@ def write_parquet(path: Path, records: pd.DataFrame) -> None:
     import pyarrow
     from pyarrow import parquet
 
+    types = {"text": pyarrow.string(), "count": pyarrow.int64(), "number": pyarrow.float64()}
     columns = {}
     for name in records:
         found = column("records.csv", str(name))
         kind = found.kind if found else "number"
-        values = records[name].tolist()
-        if kind == "text":
-            columns[name] = pyarrow.array(values, pyarrow.string())
-        elif kind == "count":
-            whole = [None if pd.isna(value) else int(value) for value in values]
-            columns[name] = pyarrow.array(whole, pyarrow.int64())
-        else:
-            columns[name] = pyarrow.array(values, pyarrow.float64())
+        columns[name] = pyarrow.array(records[name].to_numpy(), types[kind], from_pandas=kind == "count")
     file = io.BytesIO()
     parquet.write_table(pyarrow.table(columns), file, compression="zstd")
     write_atomically(path, file.getvalue())

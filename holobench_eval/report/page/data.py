@@ -9,7 +9,7 @@ from typing import Any
 from ...study.plan import REFERENCE
 from ..charts.look.methods import looks
 from ..data.columns import costs
-from ..data.marks import counted
+from ..data.phrases import counted
 from ..data.ranks import Ranks
 from ..data.results import Results
 from ..data.scores import Score
@@ -50,7 +50,7 @@ def page_data(report: Report) -> Json:
             name: [
                 {"name": results.layout.text.floor_name(floor), "mean": _number(results.row(floor, REFERENCE)[column])}
                 for floor in results.floors
-                if results.has_floor(name)
+                if results.has_pictures(name)
             ]
             for column in [results.headline.column]
             for name in results.conditions
@@ -96,8 +96,7 @@ def _columns(results: Results) -> Iterator[Json]:
     for score in results.leading:
         yield {"key": score.key, "heading": score.heading, "higher": score.higher_is_better}
         if score == results.headline and results.layout.baseline is not None:
-            unit = f" [{score.unit}]" if score.unit else ""
-            heading = f"difference to {results.layout.baseline}{unit}"
+            heading = f"difference to {results.layout.baseline}{score.brackets}"
             yield {"key": GAIN, "heading": heading, "higher": score.higher_is_better}
             yield {"key": P, "heading": "adjusted p", "higher": False}
     for key, heading in costs(results.table, results.layout.text.each).items():
@@ -107,10 +106,10 @@ def _columns(results: Results) -> Iterator[Json]:
 def _row(results: Results, label: str, condition: str) -> Json:
     """A row of the table: of every column the value, the interval where there is one, and the text."""
     row = results.row(label, condition)
-    cells = {score.key: _cell(score.in_row(row), *score.ends(row)) for score in results.leading}
+    cells = {score.key: _estimate(score, score.of(row)) for score in results.leading}
     gain = results.gain(label, condition)
     if gain is not None and label != results.layout.baseline:
-        cells[GAIN] = _estimate(results.headline, gain)
+        cells[GAIN] = _estimate(results.headline, gain, signed=True)
         for test in results.against_baseline:
             if (test.condition, test.second) == (condition, label) and not math.isnan(test.p):
                 cells[P] = _cell(p_value(test.p).removeprefix("p ").removeprefix("= "), test.p)
@@ -124,8 +123,8 @@ def _row(results: Results, label: str, condition: str) -> Json:
     }
 
 
-def _estimate(score: Score, estimate: Estimate) -> Json:
-    return _cell(score.estimate(estimate, signed=True), estimate.mean, estimate.low, estimate.high)
+def _estimate(score: Score, estimate: Estimate, signed: bool = False) -> Json:
+    return _cell(score.estimate(estimate, signed), estimate.mean, estimate.low, estimate.high)
 
 
 def _cell(text: str, value: float, low: float = math.nan, high: float = math.nan) -> Json:
@@ -149,7 +148,7 @@ def _sweep(sweep: Sweep) -> Json:
         "words": sweep.kind.words,
         "unit": sweep.kind.unit,
         "numeric": sweep.kind.numeric,
-        "points": [{"value": value, "condition": condition} for value, condition in sweep.named_points],
+        "points": [{"value": value, "condition": condition} for value, condition in sweep.points],
         "ends": {name: {label: _ends(sweep, label, name) for label in sweep.methods} for name in changed},
     }
 

@@ -22,7 +22,7 @@ ABSENT_NAMED = 6
 
 def _render(report: Report, figures: Figures) -> Blocks:
     text, absent = report.layout.text, sorted(report.thumbnails.absent)
-    yield heading(text.looked_at)
+    yield heading(f"{text.scored.capitalize()}s to look at")
     yield from figures
     if not figures:
         yield f"There is no comparison figure: thumbnails of {text.scored}s are missing."

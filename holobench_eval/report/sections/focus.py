@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data.marks import marked
+from ..data.phrases import marked
 from ..data.results import Results
 from ..data.statistics import Array, Estimate, mean_interval
 from ..data.text import number, words

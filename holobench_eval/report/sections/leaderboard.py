@@ -12,10 +12,9 @@ from ...study.plan import REFERENCE
 from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
 from ..charts.look.methods import looks
 from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
-from ..data.columns import captures_behind, costs
-from ..data.marks import CONSTANT, marked
+from ..data.columns import costs
+from ..data.phrases import CONSTANT, marked
 from ..data.results import Results
-from ..data.tables import DONE
 from ..data.text import number, percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
@@ -126,8 +125,7 @@ def draw(results: Results, folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _captures(results: Results, name: str, condition: str) -> float:
-    cells = results.cells(name, condition)
-    return captures_behind(cells[cells["state"] == DONE])
+    return float(results.row(name, condition)["total_captures"])
 
 
 def _seconds(results: Results, name: str, condition: str) -> float:
@@ -161,7 +159,7 @@ def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
     )
     baseline, oracle = results.layout.baseline, results.oracle(condition)
     known = baseline in results.methods(condition) and results.is_complete(str(baseline), condition)
-    has_constant = CONSTANT in results.floors and results.has_floor(condition)
+    has_constant = CONSTANT in results.floors and results.has_pictures(condition)
     return Frontier(
         condition,
         marks,
@@ -176,8 +174,8 @@ def _ends(results: Results, name: str, condition: str) -> dict[str, float]:
     """Ends of the bar of a method: of its mean difference to the baseline, moved to its mean; else of the mean."""
     gained = results.gain(name, condition)
     if gained is None:
-        _, low, high = results.headline.ends(results.row(name, condition))
-        return {"low": low, "high": high}
+        own = results.headline.of(results.row(name, condition))
+        return {"low": own.low, "high": own.high}
     mean = float(results.values(name, condition).mean())
     if name == results.layout.baseline:
         return {"low": float("nan"), "high": float("nan")}

@@ -29,11 +29,15 @@ def _other_metrics(results: Results, condition: str) -> Markdown | None:
 
 
 def _geometry(report: Report, _: Figures) -> Blocks:
-    layout = report.layout
+    layout, text = report.layout, report.layout.text
     network, files = layout.learned_display is not None, layout.measure == FILES
     kind = "as predicted" if network else "as aligned" if files else "registration only"
     yield heading(f"Geometry: {kind}, and refined")
-    yield layout.text.geometry
+    yield (
+        f'{text.registered}"Refined" allows each {"aligned " * files}{text.scored} a rigid motion of at most 2 px and '
+        "0.1 degree, estimated by correlation and not by maximising the score. A large difference means that "
+        f"{text.drifted}."
+    )
     yield report.by_display(_refined, instead="Only one of the two was recorded.")
 
 

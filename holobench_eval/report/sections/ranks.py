@@ -11,8 +11,8 @@ from ...display.simulated.changes.draws import MODEL, PARAMETERS
 from ..answers.ranks import table as methods
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
-from ..data.ranks import CIRCULAR, Cause, Feature, Pair, Ranks, share
-from ..data.statistics import SIGNIFICANCE
+from ..data.ranks import CIRCULAR, Cause, Pair, Ranks, share
+from ..data.statistics import SIGNIFICANCE, mean_interval
 from ..data.text import p_value, percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
@@ -49,8 +49,7 @@ def flips(ranks: Ranks) -> Markdown | None:
     if not flipping:
         return None
     score = ranks.results.headline
-    unit = f" [{score.unit}]" if score.unit else ""
-    columns = ["nominally better", "than", f"nominally by{unit}", f"over draws by{unit}"]
+    columns = ["nominally better", "than", f"nominally by{score.brackets}", f"over draws by{score.brackets}"]
     columns += ["other way in [% of draws]", "goes with"]
     return table(columns, [_flip(ranks, pair) for pair in flipping])
 
@@ -61,7 +60,7 @@ def _flip(ranks: Ranks, pair: Pair) -> list[str]:
         pair.first,
         pair.second,
         score.number(pair.nominal, signed=True),
-        score.estimate(pair.lead, signed=True),
+        score.estimate(mean_interval(pair.differences), signed=True),
         percent(pair.flipped),
         favours(pair, pair.cause) if pair.cause else NOTHING,
     ]
@@ -70,15 +69,15 @@ def _flip(ranks: Ranks, pair: Pair) -> list[str]:
 def favours(pair: Pair, cause: Cause) -> str:
     """``more crosstalk favours sgd (rho 0.81, p < 0.001)``."""
     gains = pair.first if cause.correlation > 0 else pair.second
-    return f"{more(cause.feature)} favours {gains} (rho {abs(cause.correlation):.2f}, {p_value(cause.p)})"
+    return f"{more(cause)} favours {gains} (rho {abs(cause.correlation):.2f}, {p_value(cause.p)})"
 
 
-def more(feature: Feature) -> str:
+def more(cause: Cause) -> str:
     """More of a parameter, in words."""
-    parameter, counted = PARAMETERS[feature.parameter], feature.parameter in COUNTED
-    if feature.form in ("sine", "cosine"):
-        return f"a larger {feature.form} of the {parameter.words}"
-    if feature.form == "size":
+    parameter, counted = PARAMETERS[cause.parameter], cause.parameter in COUNTED
+    if cause.form in ("sine", "cosine"):
+        return f"a larger {cause.form} of the {parameter.words}"
+    if cause.form == "size":
         return f"{'more' if counted else 'a larger'} {parameter.words} of either sign"
     signed = " positive" if parameter.low < 0 else ""
     return f"{'more' if counted else 'a more' if signed else 'a larger'}{signed} {parameter.words}"
@@ -94,7 +93,7 @@ def sentences(ranks: Ranks) -> list[str]:
 def left_out(ranks: Ranks) -> list[str]:
     """Methods and draws that are in no number, and why."""
     lines = []
-    unranked = [label for label in ranks.quality if label not in ranks.methods]
+    unranked = [str(label) for label in ranks.quality if label not in ranks.methods]
     if unranked:
         lines.append(
             "Not ranked, because targets are missing on the nominal display or in more than half of the draws: "

@@ -103,15 +103,14 @@ def headline_rows(results: Results, condition: str) -> tuple[list[str], list[lis
 def _beside_the_mean(results: Results, condition: str) -> list[Column]:
     """The headline's median over targets, and its mean above a constant image of the same target."""
     score = results.headline
-    unit = f" [{score.unit}]" if score.unit else ""
     above = {name: results.above_floor(name, condition) for name in results.methods(condition)}
 
     def difference(row: pd.Series) -> str:
         found = above[row["label"]]
         return score.estimate(found, signed=True) if found else "–"
 
-    columns = [(f"median{unit}", lambda row: score.number(row[score.statistic(MEDIAN)]))]
-    return [*columns, (f"above a constant image{unit}", difference)] if any(above.values()) else columns
+    columns = [(f"median{score.brackets}", lambda row: score.number(row[score.statistic(MEDIAN)]))]
+    return [*columns, (f"above a constant image{score.brackets}", difference)] if any(above.values()) else columns
 
 
 def stopped(results: Results, condition: str) -> list[str]:
@@ -147,7 +146,7 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     floors = {
         text.floor_name(name): float(results.row(name, REFERENCE)[results.headline.column])
         for name in ("floor_constant", "floor_speckle")
-        if name in results.floors and all(map(results.has_floor, results.conditions))
+        if name in results.floors and all(map(results.has_pictures, results.conditions))
     }
     path = report.figures / "quality-by-target.png"
     draw_quality(path, results, floors)

@@ -12,7 +12,7 @@ from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..charts.sweeps import Curve, Panel, draw_sweep
 from ..data.categories import OFFLINE, ONLINE
-from ..data.marks import CONSTANT
+from ..data.phrases import CONSTANT
 from ..data.results import Results
 from ..data.statistics import Estimate
 from ..data.sweeps import SMALL, Sweep
@@ -71,10 +71,10 @@ def scores(sweep: Sweep) -> Markdown:
     """Mean of the headline metric at every value."""
     score = sweep.results.headline
     rows = [
-        [_marked(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in sweep.named_points)]
+        [_marked(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in sweep.points)]
         for label in sweep.methods
     ]
-    return table(["method", *(_with_unit(sweep, value) for value, _ in sweep.named_points)], rows)
+    return table(["method", *(_with_unit(sweep, value) for value, _ in sweep.points)], rows)
 
 
 def _with_unit(sweep: Sweep, value: float | str) -> str:
@@ -90,11 +90,10 @@ def _marked(results: Results, name: str) -> str:
 def losses(sweep: Sweep) -> Markdown | None:
     """What the worst change cost each method, the slope, and what is left above the baseline."""
     score, kind, baseline = sweep.results.headline, sweep.kind, sweep.results.layout.baseline
-    unit = f" [{score.unit}]" if score.unit else ""
     sides = {-1: " below", 1: " above"} if len(sweep.sides) > 1 else {-1: "", 1: ""}
-    per = [f"loss per {kind.per:g} {kind.unit}{sides[side]}{unit}" for side in sweep.sides]
-    columns = ["method", "worst at", f"loss there{unit}", *per]
-    columns += [f"above {baseline} there{unit}", *([f"falls to {baseline} at"] if kind.numeric else [])]
+    per = [f"loss per {kind.per:g} {kind.unit}{sides[side]}{score.brackets}" for side in sweep.sides]
+    columns = ["method", "worst at", f"loss there{score.brackets}", *per]
+    columns += [f"above {baseline} there{score.brackets}", *([f"falls to {baseline} at"] if kind.numeric else [])]
     rows = []
     for label in sweep.methods:
         worst, slopes = sweep.worst(label), [sweep.slope(label, side) for side in sweep.sides]
@@ -146,7 +145,7 @@ def sentences(sweep: Sweep, sweeps: Sequence[Sweep]) -> list[str]:
 def _stated_range(sweep: Sweep) -> list[str]:
     ranges: dict[str, list[str]] = {}
     for label in sweep.methods:
-        if reach := sweep.small_range_text(label):
+        if reach := sweep.small_range(label):
             ranges.setdefault(reach, []).append(label)
     limit = f"{SMALL:g} {sweep.results.headline.unit}"
     return [
@@ -201,7 +200,7 @@ def _claim(sweep: Sweep, label: str) -> str:
     where = f"{sweep.kind.words}, {value_text(value)} {sweep.kind.unit}".rstrip(" ,")
     sentence = (
         f'"{claim}" {verdict} for {label} on {sweep.swept.before}: its largest loss ({where}) is '
-        f"{score.interval(loss.mean, loss.low, loss.high)} {score.unit}"
+        f"{score.estimate(loss)} {score.unit}"
     )
     if label == baseline:
         return f"{sentence}."
@@ -254,13 +253,13 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _panel(sweep: Sweep) -> Panel:
-    kind, points = sweep.kind, sweep.named_points
+    kind, points = sweep.kind, sweep.points
     results, looked, curves = sweep.results, looks(sweep.results.names), []
     for label in sweep.methods:
         means = tuple(sweep.mean(label, condition).mean for _, condition in points)
         reaches = tuple(_reach(sweep, label, condition) for _, condition in points)
         curves.append(Curve(label, means, reaches, looked[label], dashed=label == results.layout.baseline))
-    has_floor = CONSTANT in results.floors and results.has_floor(sweep.swept.before)
+    has_floor = CONSTANT in results.floors and results.has_pictures(sweep.swept.before)
     return Panel(
         title=sweep.swept.before,
         axis=f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}",
@@ -283,7 +282,7 @@ def _reach(sweep: Sweep, label: str, condition: str) -> tuple[float, float]:
 
 def _rows(report: Report, sweep: Sweep, target: str) -> list[Row]:
     """A row of captures for each of the chosen methods."""
-    points = sweep.named_points
+    points = sweep.points
     if len(points) > MOST_VALUES:
         picks = np.linspace(0, len(points) - 1, MOST_VALUES).round().astype(int)
         points = tuple(points[index] for index in picks)

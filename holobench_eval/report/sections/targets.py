@@ -33,21 +33,20 @@ def _paired_tests(report: Report, _: Figures) -> Blocks:
 
 def _tests(results: Results, tests: Sequence[PairedTest]) -> Markdown:
     score, name = results.headline, results.layout.marked
-    unit = f" [{score.unit}]" if score.unit else ""
     rows = [
         [
             f"{name(test.second)} – {name(test.first)}",
             test.condition,
             sample(test.estimate, len(results.targets)),
             score.estimate(test.estimate, signed=True),
-            score.number(float(np.median(test.known)) if test.known.size else np.nan, signed=True),
-            f"{sum(score.better(float(value), 0.0) for value in test.known)} of {test.known.size}",
+            score.number(test.median, signed=True),
+            f"{test.better(score.sign)} of {test.estimate.n}",
             "no test" if np.isnan(test.p) else f"{test.p:.4f}",
             "–" if np.isnan(test.p) else "shown" if test.is_shown else "not shown",
         ]
         for test in tests
     ]
-    columns = [f"mean difference{unit}", f"median{unit}", "better on", "p", "difference"]
+    columns = [f"mean difference{score.brackets}", f"median{score.brackets}", "better on", "p", "difference"]
     return table(["comparison", "display", "complete pairs", *columns], rows)
 
 

@@ -113,8 +113,7 @@ def _group(group: Group, names: Names, kept: set[int] | None) -> Markup:
 def _row(row: Row, group: Group, names: Names) -> Markup:
     studies = " ".join(source.name for source in row.sources)
     words = " ".join((row.marked, row.method, row.category, group.display.marked, studies, row.whose)).lower()
-    sign = 1 if row.metric.higher_is_better else -1  # sorting is by what is better
-    gain = 0.0 if row.is_baseline else math.nan
+    sign, gain = row.metric.sign, 0.0 if row.is_baseline else math.nan  # sorting is by what is better
     values = {
         "method": row.marked.lower(),
         "display": group.display.marked,

@@ -14,10 +14,10 @@ import pandas as pd
 from ...core.errors import UserError
 from ...study import provenance
 from ..data.categories import CATEGORIES, FLOOR, OPEN_LOOP
-from ..data.meanings import column
 from ..data.scores import METRICS, parse
 from ..data.tables import DONE, score_columns
 from ..data.text import FILES
+from ..files.dictionary import column
 
 RECORDS: Final = "records.csv"
 LONGEST = 300  # characters of a name

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +21,10 @@ from ...study import provenance
 from ...study.plan import REFERENCE
 from ..compare.runs import records_of
 from ..data.categories import CALIBRATED, CATEGORIES, ONLINE, ORACLE
-from ..data.layout import Layout
+from ..data.layout import Layout, network_of
 from ..data.results import Results
 from ..data.scores import METRICS, Score, parse
-from ..data.tables import clusters_in, score_columns
+from ..data.tables import GUARDED, clusters_in, score_columns
 from . import checks
 from .checks import LONGEST, NAMES, RECORDS, folded
 
@@ -35,8 +34,6 @@ MOST_BYTES, MOST_FACTS = 64_000_000, 2_000_000  # of a file of numbers, and of a
 BY = "by"  # the key of a provenance that says whose results they are
 OWN = "own"  # how the site calls results of whoever makes it
 TEXTS = ("measure", "parameters", *NAMES)
-
-_FORMULA = re.compile(r"^'('*\s*[=+\-@＝＋－＠])")
 
 
 @dataclass(frozen=True)
@@ -161,7 +158,7 @@ def _raw(path: Path, text: str) -> pd.DataFrame:
     if frame.empty:
         raise UserError(f"{path}: no rows; write it with 'holoeval report'")
     texts = [name for name in TEXTS if name in frame]
-    frame[texts] = frame[texts].replace(_FORMULA.pattern, r"\1", regex=True)
+    frame[texts] = frame[texts].replace(GUARDED, r"\1", regex=True)
     return frame
 
 
@@ -203,7 +200,7 @@ def _tested(folder: Path, frame: pd.DataFrame) -> tuple[Score, str | None]:
     _check_file(path)
     try:
         tests = pd.read_csv(io.StringIO(_text(path)), dtype=str, keep_default_na=False)
-        tests = tests.replace(_FORMULA.pattern, r"\1", regex=True)
+        tests = tests.replace(GUARDED, r"\1", regex=True)
         pairs = {(str(a), str(b)) for a, b in zip(tests["metric"], tests["baseline"], strict=True)}
     except (ValueError, KeyError) as error:
         raise UserError(f"{path}: not the table of tests ({error}); write it with 'holoeval report'") from None
@@ -241,10 +238,9 @@ def _layout(
 
 def _network(parameters: str) -> str:
     try:
-        network = json.loads(parameters or "{}").get("network")
-    except (ValueError, AttributeError):
+        return network_of(json.loads(parameters or "{}"))
+    except ValueError:
         return ""
-    return str(network.get("name", "")) if isinstance(network, dict) else ""
 
 
 def _panels(frame: pd.DataFrame) -> dict[str, str]:

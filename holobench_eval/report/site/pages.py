@@ -134,7 +134,7 @@ def _budgets(display: Display, groups: Sequence[Group], names: Names) -> Markup:
         parts.append(
             Markup(
                 "<h2>Error budget</h2><p>From {}, over {} targets: what the error of the captures is made of.</p>{}"
-            ).format(names.study(source), budget.targets, table("Error budget", headings, rows))
+            ).format(names.study(source), budget.psnr.n, table("Error budget", headings, rows))
         )
     return joined(parts)
 

@@ -14,12 +14,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ...study.plan import REFERENCE
 from ...study.versions import HARNESS
 from ..data.categories import ORACLE
-from ..data.marks import CONSTANT, marked
+from ..data.phrases import CONSTANT, marked
 from ..data.scores import Score
 from ..data.statistics import Estimate, mean_interval
 from ..data.tables import DONE
@@ -207,7 +206,7 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
                     metric=results.headline,
                     values={t: float(v) for t, v in zip(results.targets, values, strict=True) if np.isfinite(v)},
                     planned=len(results.targets),
-                    score=_estimate(results.row(label, condition), results.headline),
+                    score=results.headline.of(results.row(label, condition)),
                     above=results.above_floor(label, condition),
                     table={str(name): value for name, value in results.row(label, condition).items()},
                     cells=frozenset(cells["cell"]) if (cells["state"] == DONE).all() else frozenset(),
@@ -215,11 +214,6 @@ def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list
                 )
             )
     return rows
-
-
-def _estimate(row: pd.Series, score: Score) -> Estimate:
-    """The mean of table.csv with its interval."""
-    return Estimate(*score.ends(row), int(row["n"]), int(row["clusters"]))
 
 
 def _group(rows: Sequence[Row]) -> Group:
@@ -277,8 +271,7 @@ def _ranked(rows: Sequence[Row]) -> list[Row]:
     for row in rows:
         if row.is_complete and row.category != ORACLE:
             ranked.setdefault(row.contestant, row)
-    sign = -1 if rows[0].metric.higher_is_better else 1
-    ordered = sorted(rows, key=lambda row: (not row.values, sign * row.score.mean if row.values else 0.0))
+    ordered = sorted(rows, key=lambda row: (not row.values, -row.metric.sign * row.score.mean if row.values else 0.0))
     placed = []
     for row in ordered:
         first = ranked.get(row.contestant)

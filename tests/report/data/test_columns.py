@@ -11,11 +11,11 @@ import pytest
 from holobench_eval.metrics.catalogue import catalogue
 from holobench_eval.report import Description, Layout, write_report
 from holobench_eval.report.data import columns
-from holobench_eval.report.data.column import Column, InTable, Record, column, if_known, mean
-from holobench_eval.report.data.meanings import File
-from holobench_eval.report.data.meanings import column as described
+from holobench_eval.report.data.column import Column, Record, column, if_known, mean
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.tables import read_records, records_frame
+from holobench_eval.report.files.dictionary import File
+from holobench_eval.report.files.dictionary import column as described
 from holobench_eval.report.page.data import page_data
 from holobench_eval.report.section import Report
 from holobench_eval.report.sections.leaderboard import leaderboard
@@ -88,9 +88,9 @@ def test_an_entry_says_what_a_difference_is_a_difference_of() -> None:
 def energy(monkeypatch: pytest.MonkeyPatch) -> None:
     """A figure of a run more: one entry."""
     figures: list[Column] = []
-    table = InTable(mean, "Energy of solving, mean over cells")
+    told = "Energy of solving, mean over cells"
 
-    @column(figures, "number", unit="J", kept=if_known, table=table, heading="energy per {each} [J]")
+    @column(figures, "number", unit="J", kept=if_known, table=mean, table_meaning=told, heading="energy per {each} [J]")
     def energy_j(record: Record, layout: Layout) -> float | None:
         """Energy that solving took."""
         return record.get("energy")

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.report.data.marks import marked
+from holobench_eval.report.data.phrases import marked
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import csv_text, read_records, records_frame
 from holobench_eval.report.sections.results import headline_rows

@@ -1,6 +1,7 @@
 import pytest
 
 from holobench_eval.report.data.scores import order_scores, parse
+from holobench_eval.report.data.statistics import Estimate
 
 
 def test_a_key_is_read_as_metric_domain_and_variant():
@@ -30,8 +31,8 @@ def test_similarities_are_better_when_higher():
 def test_values_carry_unit_and_digits_of_their_metric():
     assert parse("psnr_linear").with_unit(17.618) == "17.62 dB"
     assert parse("psnr_linear").with_unit(1.2, signed=True) == "+1.20 dB"
-    assert parse("ssim_linear").interval(0.4751, 0.41, 0.52) == "0.475 [0.410, 0.520]"
-    assert parse("ssim_linear").interval(0.4751, float("nan"), float("nan")) == "0.475"
+    assert parse("ssim_linear").estimate(Estimate(0.4751, 0.41, 0.52, 8, 8)) == "0.475 [0.410, 0.520]"
+    assert parse("ssim_linear").estimate(Estimate(0.4751, float("nan"), float("nan"), 2, 2)) == "0.475"
     assert parse("psnr_linear").number(float("nan")) == "–"
     assert parse("psnr_linear").number(-0.0001, signed=True) == "+0.00"
 

@@ -201,7 +201,7 @@ def test_records_of_another_version_are_refused():
 
 
 def test_published_figures_stand_beside_the_display_they_belong_to(records):
-    layout = synthetic.layout(reported_beside=synthetic.layout().conditions[0])
+    layout = synthetic.layout(reported_beside="leto-aged")
     table = table_from_records(records_frame(records, layout), layout)
     beside = table[table["reported_psnr_db"].notna()]
-    assert set(beside["condition"]) == {layout.conditions[0]}
+    assert set(beside["condition"]) == {"leto-aged"}

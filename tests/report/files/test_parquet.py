@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from holobench_eval.report import csv_text
-from holobench_eval.report.data.meanings import column
 from holobench_eval.report.files import parquet, write_files
+from holobench_eval.report.files.dictionary import column
 from tests.report.files.test_csv import results
 
 FILE = "records.parquet"

@@ -12,7 +12,7 @@ import pytest
 from holobench_eval.report import Description, Results, records_frame
 from holobench_eval.report.charts.thumbnails import noted
 from holobench_eval.report.data.scores import parse
-from holobench_eval.report.data.text import text_of
+from holobench_eval.report.data.text import BY_MEASURE
 from holobench_eval.report.section import Report
 from holobench_eval.report.sections.comparison import pages_of_targets
 from holobench_eval.report.sections.focus import SECTIONS, by_plane, sentences
@@ -116,4 +116,4 @@ def test_a_sheet_shows_every_plane_of_a_scene(tmp_path: Path) -> None:
 
 
 def test_the_words_say_what_the_display_does() -> None:
-    assert "adds the phase of a lens" in text_of("focus").procedure
+    assert "adds the phase of a lens" in BY_MEASURE["focus"].procedure

@@ -51,7 +51,7 @@ def reading(budget: Budget, holograms: str) -> Markdown:
     shares = [f"{100 * part.share.mean:z.0f} % {part.label}" for part in budget.parts]
     return Markdown("**{}.** {}").format(
         budget.condition,
-        f"The captures of {holograms} holograms have {_decibel(budget.psnr)} over {budget.targets} targets. The ideal "
+        f"The captures of {holograms} holograms have {_decibel(budget.psnr)} over {budget.psnr.n} targets. The ideal "
         f"images of these holograms have {_decibel(budget.ideal_psnr)}, and what they explain of the captures' error "
         f"is worth {_decibel(ideal.gain)}: a better algorithm for the ideal display cannot gain more. By removing what "
         f"they explain, {words(bounds)}. {_limit(budget)} By parts: {words(shares)}.",
@@ -62,7 +62,7 @@ def _limit(budget: Budget) -> str:
     gain = budget.noise.gain
     if gain is None:
         return "There is no temporal noise."
-    some = f" over the {gain.n} of {budget.targets} targets that have any" if gain.n < budget.targets else ""
+    some = f" over the {gain.n} of {budget.psnr.n} targets that have any" if gain.n < budget.psnr.n else ""
     return f"Temporal noise allows no more than {_decibel(gain)}{some}."
 
 

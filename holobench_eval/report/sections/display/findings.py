@@ -9,7 +9,7 @@ import numpy as np
 
 from ....study.plan import REFERENCE
 from ...data.categories import CALIBRATED, ONLINE
-from ...data.phrases import difference, margin
+from ...data.phrases import difference, margin, verdict
 from ...data.results import Results
 from ...data.scores import DOMAIN_NAMES
 from ...data.statistics import FEWEST, SIGNIFICANCE
@@ -171,9 +171,8 @@ def _significant(results: Results, condition: str) -> list[str]:
     family = sum(np.isfinite(test.p) for test in results.against_baseline)
     verdicts: dict[str, list[str]] = {}
     for test in tested:
-        better = "better" if results.headline.better(test.estimate.mean, 0.0) else "worse"
-        verdicts.setdefault(better if test.is_shown else "not shown to differ", []).append(test.second)
-    told = "; ".join(f"{verdict}: {words(labels)}" for verdict, labels in sorted(verdicts.items()))
+        verdicts.setdefault(verdict(results.headline, test), []).append(test.second)
+    told = "; ".join(f"{found}: {words(labels)}" for found, labels in sorted(verdicts.items()))
     clusters = max(test.estimate.clusters for test in tested)
     smallest = 2.0 ** (1 - clusters)
     caution = f" With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown."
@@ -193,9 +192,9 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
     unclear = [label for label, above in known.items() if label not in below and not above.is_clear]
     verdicts = [f"not better on average: {words(below)}"] if below else []
     verdicts += [f"better on average, without an interval clear of zero: {words(unclear)}"] if unclear else []
-    verdict = "; ".join(verdicts) or f"all scored methods ({len(known)}) are better"
+    told = "; ".join(verdicts) or f"all scored methods ({len(known)}) are better"
     named, row = results.layout.text.floor_name(floor), results.row(floor, REFERENCE)
-    return [f"Floor: {named} scores {score.with_unit(row[score.column])}; {verdict}."]
+    return [f"Floor: {named} scores {score.with_unit(row[score.column])}; {told}."]
 
 
 def _blur_sensitivity(results: Results, condition: str) -> list[str]:
