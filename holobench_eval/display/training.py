@@ -161,8 +161,7 @@ class TrainingBench:
         self._account.resume(int(known["captures"]), int(known["total"]))
         if known["seconds"] > self.seconds:
             self._spent += known["seconds"] - self.seconds
-        value: Value = moved(dict(known["value"]), self.device)
-        return value
+        return moved(dict(known["value"]), self.device)
 
     def save(self, name: str, value: Value) -> None:
         """Keep a value under ``name``, in the place of an older one; what is kept does not depend on the device."""
