@@ -7,8 +7,6 @@ brings along, `SILENT` announces such functions. Neither are files whose names a
 
 from __future__ import annotations
 
-import functools
-import importlib
 import importlib.util
 import os
 import site
@@ -18,7 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache, wraps
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -99,7 +97,7 @@ def recorded() -> Iterator[Seen]:
         _recorder = before
 
 
-@functools.cache
+@cache
 def _install() -> None:
     sys.addaudithook(_hook)  # it stays for good
 
@@ -131,7 +129,7 @@ def _announced() -> Iterator[None]:
     """Let functions that open files in C say so."""
 
     def announced(function: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(function)
+        @wraps(function)
         def announce(file: Any, *args: Any, **named: Any) -> Any:
             sys.audit("open", file, "r", os.O_RDONLY)
             return function(file, *args, **named)

@@ -112,8 +112,9 @@ def import_file(path: Path) -> ModuleType:
     parent = ModuleType(package)  # for what the file imports relatively
     parent.__path__ = [folder]
     sys.modules[package] = parent
-    loader = _FromSource(f"{package}.{path.stem.replace('.', '_')}", str(path), folder)
-    module = importlib.util.module_from_spec(ModuleSpec(loader.name, loader, origin=str(path)))
+    loader = _FromSource(f"{package}.{path.stem.replace('.', '_')}", str(path))
+    spec = ModuleSpec(loader.name, loader, origin=str(path), loader_state=folder)
+    module = importlib.util.module_from_spec(spec)
     module.__file__ = str(path)
     sys.modules[loader.name] = module  # dataclasses look their module up
     _mains.add(loader.name)
@@ -188,11 +189,7 @@ def _forget(files: Iterable[Path], folder: str) -> None:
 
 
 class _FromSource(SourceFileLoader):
-    """Compiles a file anew for every import. folder: of the user's file."""
-
-    def __init__(self, name: str, path: str, folder: str) -> None:
-        super().__init__(name, path)
-        self.folder = folder
+    """Compiles a file anew for every import. The state in its specification is the folder of the user's file."""
 
     def get_code(self, fullname: str) -> CodeType:
         return self.source_to_code(self.get_data(self.path), self.path)
@@ -216,7 +213,7 @@ class _Beside:
         if spec.loader is None and path is None and PathFinder.find_spec(name) is not None:
             return None  # a folder without code, such as one of results, is no package where another one is
         if type(spec.loader) is SourceFileLoader:
-            spec.loader = _FromSource(spec.loader.name, spec.loader.path, folder)
+            spec.loader, spec.loader_state = _FromSource(spec.loader.name, spec.loader.path), folder
         _served.add(name)
         return spec
 
@@ -235,8 +232,8 @@ def _importer(frame: FrameType | None) -> str | None:
     machinery = ("importlib", "_frozen_importlib", __name__)
     while frame is not None and str(frame.f_globals.get("__name__")).startswith(machinery):
         frame = frame.f_back
-    loader = getattr(frame.f_globals.get("__spec__"), "loader", None) if frame is not None else None
-    return loader.folder if isinstance(loader, _FromSource) else None
+    spec: Any = frame and frame.f_globals.get("__spec__")
+    return spec.loader_state if isinstance(getattr(spec, "loader", None), _FromSource) else None
 
 
 def _reach(files: Iterable[Path], folder: str, limit: str = "") -> set[Path]:

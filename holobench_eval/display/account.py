@@ -79,6 +79,6 @@ class Account:
         """Go on from what an earlier attempt kept; an older count changes nothing."""
         self.captures, self.total = max(self.captures, captures), max(self.total, total)
 
-    def left(self, wanted: int) -> int:
-        """How many of the wanted captures may be taken."""
-        return wanted if self.budget is None else min(wanted, max(0, self.budget - self.captures))
+    def left(self) -> int | None:
+        """How many captures may be taken, None for no limit."""
+        return None if self.budget is None else max(0, self.budget - self.captures)

@@ -214,7 +214,7 @@ class MeteredDisplay:
         A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
         """
         if self._camera:
-            self._opened_camera.announce(phases[: self._account.left(len(phases))])
+            self._opened_camera.announce(phases[: self._account.left()])
 
     def keep(self, phase: Tensor) -> None:
         """Hand in the best hologram so far, in the place of an earlier one.

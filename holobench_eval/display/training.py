@@ -124,7 +124,8 @@ class TrainingBench:
         """
         given = [known.target for known in (*self.images, *self.held_out) if known.item == image.item]
         own = any(known is image.target or torch.equal(known, image.target) for known in given)
-        if not own and not _is_even(image.target):
+        is_even = bool((image.target == image.target[:, :1, :1]).all())
+        if not own and not is_even:
             raise CellError(f"{self._label} photographed '{image.item}', which is no image it may be trained with")
         check_phase(phase, self.spec, self._label)
         camera = self._camera(image, *names)
@@ -136,8 +137,7 @@ class TrainingBench:
 
         A bench whose photographs are taken elsewhere then asks for all of them at once; others need no notice.
         """
-        left = None if self._account.budget is None else self._account.left(self._account.budget)
-        for phase, image, names in itertools.islice(photographs, left):
+        for phase, image, names in itertools.islice(photographs, self._account.left()):
             self._camera(image, *names).announce([phase.detach()])
 
     def _camera(self, image: TrainingImage, *names: object) -> Camera:
@@ -159,8 +159,7 @@ class TrainingBench:
         self._account.resume(int(known["captures"]), int(known["total"]))
         if known["seconds"] > self.seconds:
             self._spent += known["seconds"] - self.seconds
-        value: Value = moved(dict(known["value"]), self.device)
-        return value
+        return moved(dict(known["value"]), self.device)
 
     def save(self, name: str, value: Value) -> None:
         """Keep a value under ``name``, in the place of an older one; what is kept does not depend on the device."""
@@ -173,7 +172,3 @@ class TrainingBench:
         It gets all captures up to now, those that an interruption cost included.
         """
         self._memory.log({**row, "captures": self._account.total, "seconds": round(self.seconds, 1)})
-
-
-def _is_even(image: Tensor) -> bool:
-    return bool((image == image[:, :1, :1]).all())

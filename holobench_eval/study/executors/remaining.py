@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping
@@ -36,15 +37,14 @@ class Remaining:
         self._waiting = Counter(kinds)
         self._known, self._workers, self._clock = known, workers, clock
         self._begun: dict[Hashable, tuple[Kind, float, bool]] = {}
-        self._count = 0
+        self._numbers = itertools.count()
         self._first: dict[Kind, list[float]] = {}
         self._taken: dict[Kind, list[float]] = {}
 
     def begins(self, task: Hashable, kind: Kind, alone: bool) -> None:
         """A worker takes up a task, named in any way."""
         self._waiting[kind, alone] -= 1
-        self._begun[task] = kind, self._clock(), self._count < self._workers
-        self._count += 1
+        self._begun[task] = kind, self._clock(), next(self._numbers) < self._workers
 
     def ends(self, task: Hashable) -> None:
         """A task that began has ended."""

@@ -159,11 +159,8 @@ def solver(name: str, params: Mapping[str, Any], folder: Path, isolation: Isolat
 
 def imports(names: Iterable[str], folder: Path) -> dict[str, float]:
     """Seconds that the import of methods that do not ship with the package took, outside the clock of their cells."""
-    return {
-        name: round(process.process_of(name, folder).facts.seconds, 2)
-        for name in dict.fromkeys(names)
-        if not plugins.is_shipped("methods", name)
-    }
+    users = [name for name in dict.fromkeys(names) if not plugins.is_shipped("methods", name)]
+    return {name: round(process.process_of(name, folder).facts.seconds, 2) for name in users}
 
 
 def runs_inside(name: str, folder: Path, isolation: Isolation) -> bool:

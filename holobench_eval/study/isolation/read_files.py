@@ -31,13 +31,12 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
     try:
         found: dict[str, Mapping[str, str]] = {target: files(method, target) for target in targets}
         taken = external(method)
+        if hasattr(method, "refuse_shared"):
+            method.refuse_shared(targets)
     except (CellError, OSError) as error:
         raise UserError(f"method '{entry.name}' does not say which files it reads: {error}") from error
-    if hasattr(method, "refuse_shared"):
-        try:
-            method.refuse_shared(targets)
-        except UserError as error:
-            raise UserError(f"method '{entry.name}': {error}") from None
+    except UserError as error:
+        raise UserError(f"method '{entry.name}': {error}") from None
     read = [(target, path, sha256) for target, digests in found.items() for path, sha256 in digests.items()]
     if read and all(sha256 == ABSENT for *_, sha256 in read):
         target, path, _ = read[0]
