@@ -22,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import cv2
 import torch
 
 from ... import display
@@ -46,6 +47,7 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.chdir(home)
     torch.set_num_threads(1)
+    cv2.setNumThreads(1)  # it looks for libraries when it is first called, which is here once for all calls
     current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # else a method could start no process
     channel = Channel(control)
     began = time.perf_counter()
