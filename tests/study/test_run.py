@@ -98,7 +98,7 @@ def test_a_tensor_with_a_class_of_its_own_is_no_phase(tmp_path: Path) -> None:
     config = write_config(tmp_path, ('{name: "plugins.py:Disguised"}',), count=1)
     outcome = compute(config, tmp_path / "out")
     assert outcome.records[-1]["state"] == "failed"
-    assert "solve returned Target, not a phase" in outcome.records[-1]["reason"]
+    assert "what solve returned: a value is Target" in outcome.records[-1]["reason"]
 
 
 @pytest.mark.parametrize("executor", [Serial(), Local(2)], ids=["here", "workers"])

@@ -6,6 +6,8 @@ import os
 import sys
 import time
 import types
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -59,7 +61,7 @@ class Training(Gray):
 
 @dataclass(frozen=True)
 class Toy:
-    """A fake method: a constant phase, and a line in a file for every solution."""
+    """A fake method: a constant phase, and a line in a file for every solution; it waits while a test holds it."""
 
     value: float = 1.0
     pause: float = 0.0
@@ -71,6 +73,8 @@ class Toy:
         with LOG.open("a") as log:
             log.write(f"{type(self).__name__} {self.value} {float(target.mean()):.1f}\\n")
         time.sleep(self.pause)
+        while LOG.with_name(f"hold {float(target.mean()):.1f}").exists():
+            time.sleep(0.01)
         if self.fail and abs(float(target.mean()) - 0.2) < 1e-3:
             raise ValueError(self.fail)
         shape = (*target.shape[:2], *bench.spec.shape)
@@ -138,6 +142,15 @@ def write_config(
     privileged = any("Following" in method for method in methods)
     path.write_text(f"{text}isolation: none\n" if privileged else text)
     return path
+
+
+@contextmanager
+def held(folder: Path, index: int) -> Iterator[None]:
+    """Within the context, `Toy` does not come to an end with the target of this index."""
+    hold = folder / f"hold {(1 + index) / 10:.1f}"
+    hold.touch()
+    yield
+    hold.unlink()
 
 
 def solves(folder: Path) -> list[str]:

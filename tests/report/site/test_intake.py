@@ -129,7 +129,7 @@ def linked(name: str) -> Callable[[Path], None]:
         (lambda folder: (folder / "records.csv").write_text(""), ("records.csv: not a table",)),
         (lambda folder: (folder / "tests.csv").write_text("a\n1\n"), ("tests.csv: not the table of tests",)),
         (lambda folder: (folder / "provenance.json").write_text("[" * 10**5), ("provenance.json",)),
-        (lambda folder: (folder / "provenance.json").write_text("[]"), ("not a mapping",)),
+        (lambda folder: (folder / "provenance.json").write_text("[]"), ("not the provenance of a run",)),
         (lambda folder: told(folder, cpu="\ud800"), ("not Unicode",)),
         (lambda folder: told(folder, profiles=[], files={}), ("lacks profiles",)),
         (lambda folder: told(folder, package=None), ("lacks package", "holoeval run")),
