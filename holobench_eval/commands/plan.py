@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import mean
 from typing import TYPE_CHECKING, Any
@@ -65,8 +66,9 @@ def plan(
     folder = output_folder(study, output)
     workers = executor("auto", None, is_small(study.display.panel), gpus=gpus(device)).workers
     grid, many = plan_cells(study), thread_count(threads, workers, study)
-    console.print(table(study, preview(study, grid, Store(folder), many, workers, gpu_name(find(device)))))
     artifacts = learned_folder(artifacts, grid)
+    networks = Artifacts(artifacts).networks(grid.preparations().values())
+    console.print(table(study, preview(study, grid, Store(folder), many, workers, gpu_name(find(device)), networks)))
     if learning := trainings(grid, Artifacts(artifacts)):
         console.print(training_table(learning))
         if not artifacts.is_dir():
@@ -115,12 +117,21 @@ class TrainingRow:
     reason: str = ""
 
 
-def preview(study: Study, plan: Plan, store: Store, threads: int, workers: int, gpu: str = "") -> list[Row]:
-    """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``cost.key``."""
+def preview(
+    study: Study,
+    plan: Plan,
+    store: Store,
+    threads: int,
+    workers: int,
+    gpu: str = "",
+    networks: Mapping[str, str] | None = None,
+) -> list[Row]:
+    """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``cost.key``; networks:
+    as in ``Store.states``."""
     from ..study import cost, isolation
 
     limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
-    states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder)
+    states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder, networks)
     rows = []
     for label in dict.fromkeys(task.label for task in plan.tasks):
         tasks = [task for task in plan.tasks if task.label == label]

@@ -23,11 +23,14 @@ def rescore(config: Config, output: Output = None, metric: Metrics = None, threa
     from ..study.plan import plan
     from ..study.progress import watching
     from ..study.run import run as compute
+    from ..study.store import Store
 
     console = open_console()
     changes = recorded(provenance.read(output)) if output else None
     study = load_study(config, changes)
     folder, grid = output_folder(study, output), plan(study)
+    if not Store(folder).folder.is_dir():
+        raise UserError(f"{folder} has no captures; holoeval run {config} takes them")
     for name in metric or ():
         if name not in grid.metrics:
             raise UserError(f"--metric {name}: the study has no such metric; {suggest(name, grid.metrics)}")

@@ -109,7 +109,7 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
     if not sources.is_fresh(found):  # from elsewhere, and the same one for all files that name it
         derive: Any = type(found)
         found = derive(found.__name__, (found,), {"__module__": module.__name__, "__doc__": found.__doc__})
-    sources.remember(found, replace(code, bases=sources.bases_of(found)))
+    sources.remember(found, replace(code, bases=(*code.bases, *sources.bases_of(found))))
     return found
 
 

@@ -31,6 +31,7 @@ STARTED = "what programs and processes read that it starts"
 SILENT = {"cv2": ("imread", "imreadmulti"), "torch": ("from_file",), "torch.jit": ("load",)}
 OURS = tuple(f"{PACKAGE}.{part}" for part in ("display", "lab"))  # what they open, a method does not read
 SYSTEM = ("/proc", "/dev", "/sys", "/usr", "/etc", "/lib", "/lib64", "/bin", "/run")
+PEOPLES = ("/dev/shm/", "/run/media/", "/usr/local/share/")  # what lies there below the system's folders is not its own
 
 
 @dataclass
@@ -160,6 +161,8 @@ def is_installed(path: str, folder: str = "") -> bool:
 
     folder: of a study or a method, which may itself lie below such a folder; what is beside it, is not installed.
     """
+    if path.startswith(PEOPLES):
+        return False
     return any(path.startswith(f"{place}/") and not within(folder, place) for place in _installed())
 
 

@@ -31,8 +31,9 @@ class Code:
     """The code of a class that does not ship with this package.
 
     name: of the class in its file; files: sha256 by path, seen from the folder of its file; bases: versions of the
-    classes of this package that it derives from; folder: of its file; uncovered: what else was read for its import;
-    study: folder of the study that names it, empty where there is none.
+    classes of this package that it derives from or that its files have imported; folder: of its file; uncovered: what
+    else was read for its import; study: folder of the study that names it, empty where there is none; installed:
+    whether it is that of a package.
     """
 
     name: str
@@ -41,11 +42,15 @@ class Code:
     folder: str
     uncovered: tuple[str, ...] = ()
     study: str = ""
+    installed: bool = False
 
     @property
     def sha256(self) -> str:
-        """Another one for any other byte in any of the files."""
-        return digest({"name": self.name, "files": dict(self.files), "bases": list(self.bases)})
+        """Another one for any other byte in any of the files, and for another place seen from the study: the same code
+        may read other files there."""
+        place = "" if self.installed or not self.study else self.folder
+        place = os.path.relpath(place, self.study) if place and within(place, self.study) else place
+        return digest({"name": self.name, "files": dict(self.files), "bases": list(self.bases), "place": place})
 
     @property
     def paths(self) -> list[str]:
@@ -123,7 +128,7 @@ def import_file(path: Path) -> ModuleType:
 
 
 def import_class(path: Path, name: str, study: Path | None) -> tuple[ModuleType, Code]:
-    """Import a file, and tell what the code of its class ``name`` is, but for ``bases``.
+    """Import a file, and tell what the code of its class ``name`` is, but for what it derives from.
 
     study: the folder of the study; files that are read for the import and lie there are part of the code. UserError
     for a file that changes meanwhile, and whatever the file raises.
@@ -144,7 +149,14 @@ def import_class(path: Path, name: str, study: Path | None) -> tuple[ModuleType,
     _read.update(map(str, loaded))
     uncovered = [file for file, state in sorted(read.items()) if state and file not in files]
     uncovered += [STARTED] if seen.starts else []
-    return module, Code(name, _digests(files, folder), (), folder, tuple(uncovered), home)
+    return module, Code(name, _digests(files, folder), _used(module), folder, tuple(uncovered), home)
+
+
+def _used(module: ModuleType) -> tuple[str, ...]:
+    """The versions of the methods of this package that a user's module, or one from its folder, has imported."""
+    modules = [module, *filter(None, map(sys.modules.get, _served))]
+    values = [value for each in modules for value in vars(each).values() if isinstance(value, type)]
+    return tuple(sorted({declared_version(cls) for cls in values if ships(cls) and hasattr(cls, "solve")}))
 
 
 def lies_in(file: str, folder: str) -> bool:
@@ -157,7 +169,8 @@ def _digests(files: Iterable[str], folder: str) -> dict[str, str]:
 
 
 def _of_module(cls: type[Any]) -> Code:
-    """The code of a class of an installed package, or of a test: its file, and what that imports of its package."""
+    """The code of a class of an installed package, or of a test: all files of the package, since an import that has
+    happened is no longer seen."""
     own = [sys.modules.get(base.__module__) for base in cls.__mro__ if not ships(base)]
     files = [Path(file) for file in (getattr(module, "__file__", None) for module in own) if file]
     if not files:
@@ -165,9 +178,9 @@ def _of_module(cls: type[Any]) -> Code:
     folder = str(files[0].parent)
     depth = cls.__module__.count(".") - (files[0].name == "__init__.py")
     package = str(files[0].parents[depth - 1]) if depth > 0 else folder
-    start = str(Path(package).parent) if depth > 0 else folder  # names begin with that of the package
-    reached = _reach([file for file in files if within(str(file), package)], start, package)
-    return Code(cls.__qualname__, _digests(map(str, reached), package), bases_of(cls), package)
+    below = Path(package).rglob("*") if depth > 0 else files
+    contents = [str(file) for file in below if file.is_file() and file.parent.name != "__pycache__"]
+    return Code(cls.__qualname__, _digests(contents, package), bases_of(cls), package, installed=True)
 
 
 def bases_of(cls: type[Any]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import json
 import math
 import shutil
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -34,7 +34,11 @@ UNFINISHED = "unfinished"
 RECORDS = "training"
 FORMAT = 1
 ROUND = ("round", "captures", "seconds", "predicted_psnr", "captured_psnr", "fidelity_psnr")  # columns of a log
-OTHER = {"version": "other code", "external": "other files beside the code"}  # by the entry of a description
+OTHER = {  # by the entry of a description
+    "version": "other code",
+    "external": "other files beside the code",
+    "images_version": "other code of its images",
+}
 
 
 @dataclass(frozen=True)
@@ -66,13 +70,22 @@ class Artifacts:
         is_current = not isinstance(reads, dict) or not changed(reads, preparation.folder)
         return (folder / PROVENANCE).is_file() and is_current
 
+    def networks(self, preparations: Iterable[Preparation]) -> dict[str, str]:
+        """The sha256 of the states that are there, by ``Preparation.id``; empty for one whose training read a file that
+        has changed."""
+        return {
+            each.id: str(known.get("sha256")) if self.has(each) else ""
+            for each in preparations
+            if (known := provenance_of(self.folder_of(each)))
+        }
+
     def outdated(self, preparation: Preparation) -> str:
         """In words, the artifact that would do, were it not of other code or other files; empty where there is none."""
         wanted, stem = preparation.description(), preparation.name.rpartition("-")[0]
         for folder in sorted(self.folder.glob(f"{file_name(stem)}-*")):
             trained = (provenance_of(folder) or {}).get("description", {})
             differing = {key for key in {*wanted, *trained} if trained.get(key) != wanted.get(key)}
-            if trained and differing and differing <= {"version", "external"}:
+            if trained and differing and differing <= OTHER.keys():
                 of = " and ".join(OTHER[key] for key in sorted(differing, reverse=True))
                 return f"{folder} was learned with {of}"
         return ""

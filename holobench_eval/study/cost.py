@@ -16,7 +16,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -47,14 +47,11 @@ class Cost:
     seconds: float
     memory_mib: float | None = None
 
-    def after(self, before: Sequence[Cost]) -> Cost:
+    def after(self, before: Iterable[Cost]) -> Cost:
         """The same with what was begun with and is from before: all of its time, and the peak, if each is known."""
-        if not before:
-            return self
-        peaks = [each.memory_mib for each in (self, *before)]
-        known = [peak for peak in peaks if peak is not None]
-        seconds = self.seconds + sum(each.seconds for each in before)
-        return Cost(seconds, max(known) if len(known) == len(peaks) else None)
+        costs = [self, *before]
+        known = [each.memory_mib for each in costs if each.memory_mib is not None]
+        return Cost(sum(each.seconds for each in costs), max(known) if len(known) == len(costs) else None)
 
 
 @dataclass(frozen=True)
@@ -196,11 +193,11 @@ def recorded(name: str) -> float | None:
 
 def keep(name: str, seconds: float) -> None:
     """Keep a time for estimates; at most one a name in ``APART`` seconds, since a study may have thousands."""
-    now = time.monotonic()
-    if now - _kept.get(name, -math.inf) >= APART:
-        _kept[name] = now
+    now, file = time.monotonic(), folder() / name
+    if now - _kept.get(file, -math.inf) >= APART:
+        _kept[file] = now
         with suppress(StorageError):  # a cache, which a run can do without
-            write_atomically(folder() / name, repr(seconds).encode(), lasting=False)
+            write_atomically(file, repr(seconds).encode(), lasting=False)
 
 
-_kept: dict[str, float] = {}  # when [s] this process kept a time last, by its name
+_kept: dict[Path, float] = {}  # when [s] this process wrote each file last

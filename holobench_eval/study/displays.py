@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ..core import plugins
 from ..core.hashing import digest
 from ..display import DisplaySpec, load_profile
 from ..display.simulated.changes import KINDS, Value, altered
@@ -16,7 +17,7 @@ from ..lab.session import read_manifest
 from . import isolation
 from .definition import LEARNED, Study, Training
 from .isolation.read_files import external
-from .versions import method_version
+from .versions import dataset_version, method_version
 
 Panel = tuple[int, int]
 
@@ -81,8 +82,8 @@ class Preparation:
 
     method, params: as in a cell; version: of the method's code (``versions.method_version``); folder: the config's
     folder; display: the one it is trained on; training: the study's, with the source of the images; images: name and
-    digest of each; seed: the study's; external: digests of files that the method takes where a machine has them (empty:
-    it takes none).
+    digest of each; images_version: of the code of a user's dataset (``versions.dataset_version``); seed: the study's;
+    external: digests of files that the method takes where a machine has them (empty: it takes none).
     """
 
     method: str
@@ -94,6 +95,7 @@ class Preparation:
     images: tuple[tuple[str, str], ...]
     seed: int
     external: Mapping[str, str] = field(default_factory=dict)
+    images_version: str = ""
 
     def description(self) -> dict[str, Any]:
         """Everything that the learned state depends on, as plain JSON values.
@@ -120,6 +122,7 @@ class Preparation:
             "captures": self.training.captures,
             "seed": self.seed,
             **({"external": dict(self.external)} if self.external else {}),
+            **({"images_version": self.images_version} if self.images_version else {}),
             **({"session": self.display.real.session} if self.display.real else {}),
         }
 
@@ -141,7 +144,7 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], display: C
 
     For a learned display, a method is trained on the display that the network was trained on.
     """
-    traits = isolation.traits(method, study.folder)
+    traits, dataset = isolation.traits(method, study.folder), study.training.dataset
     if not traits.trains:
         return None
     return Preparation(
@@ -153,6 +156,7 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], display: C
         training=study.training,
         images=study.training_images,
         seed=study.seed,
+        images_version=dataset_version(dataset, plugins.find("datasets", dataset, study.folder)),
         external=external(isolation.build(method, params, study.folder)) if "external" in traits.functions else {},
     )
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -53,29 +55,38 @@ class Solution:
 
 @dataclass(frozen=True)
 class Phases:
-    """The phases of a results folder."""
+    """The phases of a results folder. study: the folder of the study that asks, from which paths of files start."""
 
     folder: Path
+    study: Path = Path()
 
     def path(self, identity: str) -> Path:
         """The file of a phase."""
         return self.folder / f"{identity}.pt"
 
-    def read(self, identity: str, learned: str | None = "", folder: Path = Path()) -> Solution | None:
+    def read(self, identity: str, learned: str | None = "") -> Solution | None:
         """The solution of a name; None where there is none that is whole, one by another training of the method, or one
         whose method read a file that has changed.
 
-        learned: sha256 of what the method has learned, None for any; folder: of the study, where paths of such files
-        start.
+        learned: sha256 of what the method has learned, None for any.
         """
         path = self.path(identity)
         file = unsealed(path.read_bytes(), identity) if path.is_file() else None
         if file is None:
             return None
         content = read_tensors(path, io.BytesIO(file))
-        if learned not in (None, content["learned"]) or isolation.changed(content["covered"], folder):
+        if learned not in (None, content["learned"]) or isolation.changed(content["covered"], self.study):
             return None
         return Solution(**content | {"cost": Cost(**content["cost"])}, reused=True)
+
+    @contextmanager
+    def locked(self, identity: str) -> Iterator[None]:
+        """Let others that want a phase wait, here and in other studies, so that its captures are taken and counted
+        once."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with (self.folder / f"{identity}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
 
     def journal(self, identity: str) -> Journal:
         """The captures that a phase takes, in all attempts, until it is kept."""
@@ -105,14 +116,16 @@ class Phases:
 class Starts:
     """The phases of one target that other methods begin with, each by a method that knows the nominal optics alone.
 
-    basis: what such a phase depends on besides its method, see ``identity.phase``; device: where it is needed; before:
-    what those took that are from before, which is part of what a method costs that begins with them.
+    basis: what such a phase depends on besides its method, see ``identity.phase``; device: where it is needed; covered:
+    what was read for the target; before: those that are from before: what they took is part of what a method costs that
+    begins with them.
     """
 
     phases: Phases
     basis: Mapping[str, Any]
     device: torch.device
-    before: list[Cost] = field(default_factory=list)
+    covered: Mapping[str, str] = field(default_factory=dict)
+    before: list[Solution] = field(default_factory=list)
 
     def __call__(self, method: Solver, solve: Callable[[], Tensor]) -> Tensor:
         """The phase ``(1, C, H, W)`` of a method: kept from before, or solved now and kept.
@@ -124,19 +137,20 @@ class Starts:
             return solve()
         identity = digest({**self.basis, "code": method_version(type(method)), "params": plugins.params_of(method)})
         if (known := self.phases.read(identity)) is not None:
-            self.before.append(known.cost)
+            self.before.append(known)
             return known.phase[None].to(self.device)
         began, earlier = time.perf_counter(), len(self.before)
         phase = solve()
-        cost = Cost(time.perf_counter() - began).after(self.before[earlier:])
-        self.phases.keep(identity, Solution(phase.detach().cpu()[0], 0, cost, alone=False))
+        cost = Cost(time.perf_counter() - began).after(known.cost for known in self.before[earlier:])
+        solved = Solution(phase.detach().cpu()[0], 0, cost, alone=False, covered=dict(self.covered))
+        self.phases.keep(identity, solved)
         return phase
 
 
-def phases_of(output: Path) -> Phases:
+def phases_of(output: Path, study: Path = Path()) -> Phases:
     """The phases that a study with this output folder shares: with all of ``holoeval-results``, else with none."""
     beside = output.absolute().parent
-    return Phases((beside if beside.name == RESULTS else output) / "solved")
+    return Phases((beside if beside.name == RESULTS else output) / "solved", study)
 
 
 def start_of(phase: Tensor) -> Tensor:

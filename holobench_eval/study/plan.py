@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..core import plugins
 from ..core.errors import UserError
 from ..core.hashing import canonical, digest
 from ..display.api import Exposure
@@ -20,7 +19,7 @@ from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
 from .focal_stacks import Showing, Target, offset, planes_a_scene, planes_of, showings
 from .isolation import read_files
-from .versions import method_version
+from .versions import dataset_version, method_version
 
 REFERENCE = "reference"  # the condition of the floor cells
 PATHS = ("path", "manifest")  # parameters of datasets that say where images lie; each image has its digest
@@ -214,8 +213,8 @@ class _Ground:
         """What every target's pixels depend on besides its source: the dataset, wherever its images lie."""
         dataset, chosen = self.study.dataset, self.study.targets
         params = {name: value for name, value in chosen.params.items() if name not in PATHS}
-        own = {} if plugins.is_shipped("datasets", chosen.dataset) else {"code": method_version(type(dataset))}
-        return {"dataset": chosen.dataset.rpartition(":")[2], "params": params, **own}
+        code = dataset_version(chosen.dataset, type(dataset))
+        return {"dataset": chosen.dataset.rpartition(":")[2], "params": params, **({"code": code} if code else {})}
 
     def cell(self, phase: Mapping[str, Any], shown_on: Condition | None, display: Condition, **further: Any) -> Cell:
         """A cell; ``display``: gives the size of the scored region, also of a floor image that needs no display."""

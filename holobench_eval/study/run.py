@@ -30,6 +30,7 @@ from .progress import Lines
 from .scoring import starts
 from .scoring.cell import work
 from .scoring.job import Job, Setting
+from .scoring.scores import kept_capture
 from .store import Record, Store, appears, late
 from .training import TrainingJob, train
 
@@ -114,7 +115,7 @@ def run(
     UserError
         The folder is in use by another run, or holds a damaged record.
     """
-    store, phases = Store(output), phases_of(output)
+    store, phases = Store(output), phases_of(output, study.folder)
     with store.locked():
         if retrain:
             refuse_unscored(study)
@@ -122,7 +123,8 @@ def run(
             forget(plan, store, phases, Artifacts(artifacts))
         timed = cost.timed(study, plan)
         metrics = {name: plan.metrics[name] for name in rescore or plan.metrics}
-        states = store.states(plan.cells, timed, metrics, study.folder)
+        networks = Artifacts(artifacts).networks(plan.preparations().values())
+        states = store.states(plan.cells, timed, metrics, study.folder, networks)
         again = ("missing", "untimed", *(("failed",) if retry_failed else ()))
         missing = frozenset(name for name, state in states.items() if state in again and not rescore)
         missing, outdated = starts.affected(plan, missing, states, phases)
@@ -168,7 +170,7 @@ def run(
 def _is_scorable(cell: Cell, store: Store, phases: Phases, solves: bool) -> bool:
     """Whether a captured cell can be scored again: from its kept capture, or on a display that is no real one from its
     phase, since a real photograph is never taken again for a metric. solves: whether a phase may be solved again."""
-    if store.capture(cell.id).is_file():
+    if kept_capture(store.capture(cell.id)):
         return True
     if cell.shown_on is not None and cell.shown_on.real:
         return False

@@ -180,19 +180,26 @@ class Store:
         timed: frozenset[str] = frozenset(),
         metrics: Mapping[str, str] | None = None,
         folder: Path = Path(),
+        networks: Mapping[str, str] | None = None,
     ) -> dict[str, State]:
-        """State of every cell's record, by the cell's id. Missing is also one whose method read a changed file.
+        """State of every cell's record, by the cell's id. Missing is also one whose method read a changed file, or has
+        learned something else since.
 
-        timed: cells to be timed alone; metrics: versions by name; folder: of the study.
+        timed: cells to be timed alone; metrics: versions by name; folder: of the study; networks: see
+        ``Artifacts.networks``.
         """
         recorded = {path.stem for path in self.folder.glob("*.json")}  # faster than trying to open each missing file
 
         def state(cell: Cell) -> State:
             record = self.read(cell.id) if cell.id in recorded else None
-            if record is not None and isolation.changed(record.reads, folder):
+            if (
+                record is None
+                or isolation.changed(record.reads, folder)
+                or _has_unlearned(cell, record, networks or {})
+            ):
                 return "missing"
-            if record is None or record.state != "done":
-                return "missing" if record is None else record.state
+            if record.state != "done":
+                return record.state
             if cell.id in timed and not record.alone:
                 return "untimed"
             return "unscored" if identity.lacking(record.scores, metrics or {}) else "done"
@@ -213,6 +220,12 @@ class Store:
             for left in self.folder.glob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
+
+
+def _has_unlearned(cell: Cell, record: Record, networks: Mapping[str, str]) -> bool:
+    """Whether the method of a record had learned something else than it has now; not so where nothing is there now."""
+    learned = (record.learned or {}).get("sha256")
+    return learned is not None and networks.get(cell.prepared[0], learned) != learned
 
 
 def late() -> float:

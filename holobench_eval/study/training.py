@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from ..core.device import CPU, find, gpu_name, moved, repeatable
 from ..core.errors import CellError, Pending, StopError, reason
 from ..core.installed import __version__
 from ..core.io import now, write_atomically
+from ..core.reads import Seen, recorded
 from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
 from ..display.simulated.ground_truth import truth
@@ -28,11 +30,12 @@ from .artifacts import LOG, RECORDS, Artifacts, provenance_of
 from .displays import Preparation
 from .identity import basis
 from .isolation.read_files import external
+from .isolation.reads import reads_of_dataset
 from .phases import Starts, phases_of
 from .plan import Plan
 from .scoring.job import Setting
 from .scoring.reference import guarded
-from .versions import HARNESS, gate, method_version
+from .versions import AGAIN, HARNESS, dataset_version, gate, method_version
 
 WAITS = "waits for photographs"  # in place of the reason of a failure
 
@@ -68,13 +71,17 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     limits = replace(setting.limits, seconds=math.inf)  # that of time is for cells
     method = isolation.solver(preparation.method, preparation.params, preparation.folder, setting.isolation, limits)
     gate(method, preparation.method, preparation.version, external(method), preparation.external)
-    images = _images(preparation, device)
+    with recorded() if preparation.images_version else nullcontext(Seen()) as seen:
+        dataset, images = _images(preparation, device)
+    read = reads_of_dataset(dataset, seen).covered
     split = len(images) - preparation.training.held_out
     display_bench = opening.open_display(preparation.display, preparation.seed, device)
     source = {"dataset": preparation.training.dataset, "params": dict(preparation.training.params)}
+    source |= {"code": preparation.images_version} if preparation.images_version else {}
     draw, spec = ("training", preparation.seed), preparation.display.spec
+    phases = phases_of(setting.output, setting.folder)
     shared = {
-        item: Starts(phases_of(setting.output), basis({**source, "sha256": sha256}, spec, draw), device)
+        item: Starts(phases, basis({**source, "sha256": sha256}, spec, draw), device, read)
         for item, sha256 in preparation.images
     }
     # Photographs in the folder of a session are found again by each import, and so are no new captures.
@@ -98,17 +105,17 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     if not isinstance(state, Mapping):
         raise CellError(f"{preparation.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
     state = moved(state, CPU)
-    outdated = artifacts.outdated(preparation)
+    outdated, before = artifacts.outdated(preparation), [known for start in shared.values() for known in start.before]
     facts: dict[str, Any] = {
         **({"in_the_place_of": outdated} if outdated else {}),
         "captures": bench.captures if journal is None else journal.captures,
-        "seconds": round(bench.seconds + sum(cost.seconds for start in shared.values() for cost in start.before), 1),
+        "seconds": round(bench.seconds + sum(known.cost.seconds for known in before), 1),
         "threads": setting.threads,
         **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),
         "package": __version__,
         "method_sha256": method_version(type(method)),
-        "reads": dict(ready.reads.covered),
+        "reads": {**read, **ready.reads.covered},
         "harness_sha256": HARNESS,
         "made": now(),
     }
@@ -136,17 +143,19 @@ def diagnosis(method: Any, state: Mapping[str, Any], display_bench: CalibratedBe
     return findings
 
 
-def _images(preparation: Preparation, device: torch.device) -> list[TrainingImage]:
-    """The training images at the size of the scored region, on a device."""
+def _images(preparation: Preparation, device: torch.device) -> tuple[Any, list[TrainingImage]]:
+    """The dataset, and its training images at the size of the scored region, on a device."""
     given = preparation.training
     dataset = plugins.build("datasets", given.dataset, dict(given.params), preparation.folder)
     spec, images = preparation.display.spec, []
+    if dataset_version(given.dataset, type(dataset)) != preparation.images_version:
+        raise CellError(f"the code of dataset '{given.dataset}' {AGAIN}")
     for item, sha256 in preparation.images:
         if dataset.digest(item) != sha256:
-            raise CellError(f"training image '{item}' has changed since the study was planned; start the run again")
+            raise CellError(f"training image '{item}' {AGAIN}")
         target = dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))
         images.append(TrainingImage(item, target.to(device)))
-    return images
+    return dataset, images
 
 
 def keep_training_records(plan: Plan, artifacts: Artifacts, output: Path) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..core import sources
+from ..core import plugins, sources
 from ..core.errors import CellError
 
 # What a method is given: the pixels of its target, nominal optics, random numbers. A new version is any new text; every
@@ -34,6 +34,12 @@ def method_version(cls: type[Any]) -> str:
     class says of its version is a label for people.
     """
     return sources.declared_version(cls) if sources.ships(cls) else sources.code_of(cls).sha256
+
+
+def dataset_version(name: str, cls: type[Any]) -> str:
+    """The version of the code of a dataset that does not ship with the package; empty for one that does, whose pixels
+    the digests of its images tell."""
+    return "" if plugins.is_shipped("datasets", name) else method_version(cls)
 
 
 def gate(

@@ -18,12 +18,14 @@ from holobench_eval.study.run import run
 from holobench_eval.study.versions import gate
 from tests.support.trained_study import write
 
-PREDICTION = "seed: 3\nmeasure: prediction\nholograms: {name: 'trained.py:Even'}"
+PREDICTION = "seed: 3\nmeasure: prediction\nholograms: {name: 'other.py:Even'}"
 METHODS = 'methods: ["trained.py:Gain"]'
+OTHER = (METHODS, METHODS.replace("trained", "other"))  # in a file beside that of the images
 
 
-def reasons(config: Path, edit: Callable[[str], str], file: str = "trained.py") -> set[str]:
-    """Why a study's methods fail whose file is edited between plan and run."""
+def reasons(config: Path, edit: Callable[[str], str], file: str = "other.py") -> set[str]:
+    """Why a study's methods fail where a file is edited between plan and run; ``other.py`` is a copy of the first."""
+    (config.parent / "other.py").write_text((config.parent / "trained.py").read_text())
     study = load_study(config)
     planned = plan(study)
     path = config.parent / file
@@ -39,31 +41,30 @@ def edited(text: str) -> str:
 
 @pytest.mark.parametrize("isolation", ["files", "none"])
 def test_code_that_was_edited_is_not_trained(tmp_path: Path, isolation: str) -> None:
-    config = write(tmp_path, ("seed: 3", f"seed: 3\nisolation: {isolation}"))
+    config = write(tmp_path, OTHER, ("seed: 3", f"seed: 3\nisolation: {isolation}"))
     assert reasons(config, edited) == {
-        "not trained: the code of trained.py:Gain has changed since the study was planned; start the run again"
+        "not trained: the code of other.py:Gain has changed since the study was planned; start the run again"
     }
     assert not list((tmp_path / "artifacts").rglob("learned.pt"))
 
 
 @pytest.mark.parametrize("isolation", ["files", "none"])
 def test_code_that_was_edited_solves_nothing(tmp_path: Path, isolation: str) -> None:
-    config = write(tmp_path, (METHODS, 'methods: ["trained.py:Even"]'), ("seed: 3", f"isolation: {isolation}"))
+    config = write(tmp_path, (METHODS, 'methods: ["other.py:Even"]'), ("seed: 3", f"isolation: {isolation}"))
     (why,) = reasons(config, edited)
-    assert "the code of trained.py:Even has changed since the study was planned" in why
+    assert "the code of other.py:Even has changed since the study was planned" in why
 
 
 def test_code_that_was_edited_predicts_nothing(tmp_path: Path) -> None:
-    even = (METHODS, 'methods: ["trained.py:Even"]')
+    even = (METHODS, 'methods: ["other.py:Even"]')
     (why,) = reasons(write(tmp_path, even, ("seed: 3", PREDICTION.partition("\nholograms")[0])), edited)
-    assert "the code of trained.py:Even has changed since the study was planned" in why
+    assert "the code of other.py:Even has changed since the study was planned" in why
 
 
 def test_code_that_was_edited_gives_no_hologram_to_predict(tmp_path: Path) -> None:
-    config = write(tmp_path, (METHODS, 'methods: ["other.py:Even"]'), ("seed: 3", PREDICTION))
-    (tmp_path / "other.py").write_text((tmp_path / "trained.py").read_text())
+    config = write(tmp_path, (METHODS, 'methods: ["trained.py:Even"]'), ("seed: 3", PREDICTION))
     (why,) = reasons(config, edited)
-    assert "the code of trained.py:Even has changed since the study was planned" in why
+    assert "the code of other.py:Even has changed since the study was planned" in why
 
 
 def test_a_file_that_is_another_one_is_refused() -> None:

@@ -51,7 +51,7 @@ def shop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_the_code_of_an_installed_method_is_what_is_imported_of_its_package(shop: Path) -> None:
     method = importlib.import_module("shop.plug.method").Method
-    names = {name.removeprefix("shop/") for name in PACKAGE} - {"unused.py"}
+    names = {name.removeprefix("shop/") for name in PACKAGE}
     assert set(code_of(method).files) == names
 
 

@@ -10,12 +10,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ...core import sources
 from ...core.errors import CellError, UserError
 from ...core.hashing import ABSENT, file_digest
 from ...core.io import file_name
 from ...display.traits import traits_of
 from ..definition import MethodEntry
-from . import build
+from . import build, params_of
+from .reads import named_files
 
 
 def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str]) -> dict[str, Mapping[str, str]]:
@@ -25,12 +27,12 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
     lack are holes of the table.
     """
     targets = list(targets)
-    if traits_of(cls).functions.isdisjoint(("files", "external")):
+    if sources.ships(cls) and traits_of(cls).functions.isdisjoint(("files", "external")):
         return {target: {} for target in targets}
     method = build(entry.name, entry.params, folder)
     try:
         found: dict[str, Mapping[str, str]] = {target: files(method, target) for target in targets}
-        taken = external(method)
+        taken = external(method) | _named(method)
         if hasattr(method, "refuse_shared"):
             method.refuse_shared(targets)
     except (CellError, OSError) as error:
@@ -49,8 +51,14 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
 
 
 def digests(method: Any, target: str) -> dict[str, str]:
-    """``files`` and ``external`` of a method: all that its phase of a target depends on beside its code."""
-    return {**files(method, target), **external(method)}
+    """All files that a method's phase of a target is known to depend on, beside its code: ``files``, ``external`` and,
+    of a user's method, those that parameters name."""
+    return {**files(method, target), **external(method), **_named(method)}
+
+
+def _named(method: Any) -> dict[str, str]:
+    cls = type(method)
+    return {} if sources.ships(cls) else named_files(params_of(method), sources.code_of(cls))
 
 
 def files(method: Any, target: str) -> dict[str, str]:

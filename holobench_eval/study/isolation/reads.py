@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ...core.hashing import ABSENT, file_digest, file_state
+from ...core.plugins import params_of
 from ...core.reads import STARTED, Seen, within
-from ...core.sources import Code, lies_in
+from ...core.sources import Code, code_of, lies_in, ships
 
 LARGEST = 2**36  # bytes of a file that is hashed
 CHANGED = "changed while it was read"  # in place of a digest
@@ -53,18 +54,42 @@ def reads_of(seen: Seen, params: Any, code: Code) -> Reads:
     return Reads(dict(sorted(covered.items())), tuple(sorted(uncovered)))
 
 
+def reads_of_dataset(dataset: Any, seen: Seen) -> Reads:
+    """What a user's dataset has read for its images; nothing for one of this package, which has a digest for each."""
+    if ships(type(dataset)):
+        return Reads({}, ())
+    code = code_of(type(dataset))
+    return reads_of(seen.of_the_method(code.folder), params_of(dataset), code)
+
+
 def changed(covered: Mapping[str, str], folder: Path) -> str:
     """The first path of ``Reads.covered`` that has another digest now; empty for none. folder: of the study."""
     return next((path for path, sha256 in covered.items() if file_digest(folder / path) != sha256), "")
 
 
+def named_files(params: Any, code: Code) -> dict[str, str]:
+    """sha256 of the files that parameters name, by the parameter's text; of both, where the working directory and the
+    study's folder have one each."""
+    digests = {
+        text: [file_digest(path) for path in paths if file_state(path)]
+        for text, paths in _places(params, Path(code.study).absolute()).items()
+    }
+    return {text: " ".join(found) for text, found in digests.items() if found}
+
+
 def _named(params: Any, study: Path) -> list[str]:
-    """The files and folders that parameters name, from the working directory or from the study's folder."""
+    """The files and folders that parameters name."""
+    return [path for paths in _places(params, study).values() for path in paths]
+
+
+def _places(params: Any, study: Path) -> dict[str, list[str]]:
+    """What each text among the parameters names that is there, from the working directory or the study's folder."""
     if isinstance(params, Mapping):
         params = list(params.values())
     if isinstance(params, list | tuple):
-        return [path for value in params for path in _named(value, study)]
+        return {text: paths for value in params for text, paths in _places(value, study).items()}
     if not isinstance(params, str) or not params or "\0" in params:
-        return []
+        return {}
     paths = (Path(place, Path(params).expanduser()).absolute() for place in (Path.cwd(), study))
-    return list(dict.fromkeys(os.path.normpath(path) for path in paths if os.access(path, os.F_OK)))
+    there = dict.fromkeys(os.path.normpath(path) for path in paths if os.access(path, os.F_OK))
+    return {params: list(there)} if there else {}

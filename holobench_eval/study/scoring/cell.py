@@ -17,6 +17,7 @@ from ..store import Record
 from . import error_budget, focus, picture, prediction
 from .job import Job, Measure, Measured
 from .reference import guarded
+from .scores import kept_capture
 
 MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
     "picture": picture.picture,
@@ -41,7 +42,7 @@ def work(job: Job) -> list[Record]:
     kept capture; where none is kept, its phase is photographed again.
     """
     with repeatable(job.setting.threads, job.device):
-        kept = {identity for identity in job.unscored if job.store.capture(identity).is_file()}
+        kept = {identity for identity in job.unscored if kept_capture(job.store.capture(identity))}
         records = [
             _recorded(job, cell, display, partial(picture.rescored, job))
             for cell, display in job.cells
@@ -70,7 +71,8 @@ def _added(job: Job, measured: Measured, cell: Cell, display: Condition) -> Reco
     before = job.store.read(cell.id) if cell.id in job.unscored else None
     if before is None or _training(before) != _training(record):
         return record
-    return replace(before, scores=before.scores | record.scores)
+    again = 0 if record.reused else record.captures  # its phase was not kept
+    return replace(before, scores=before.scores | record.scores, captures=before.captures + again)
 
 
 def _training(record: Record) -> str:

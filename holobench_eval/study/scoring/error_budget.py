@@ -21,7 +21,7 @@ def error_budget(job: Job) -> Measured:
     def scores(seen: Foreseen) -> dict[str, float]:
         _, again = shown(job, cell, display, again=True)
         refuse_saturated(again)
-        ideal, capture = ideal_image(seen.phase, display.spec), seen.capture.image
+        ideal, capture = ideal_image(seen.hologram.phase, display.spec), seen.capture.image
         return {
             budget.TARGET: budget.unexplained(capture, seen.target, seen.target),
             budget.IDEAL: budget.unexplained(capture, ideal, seen.target),

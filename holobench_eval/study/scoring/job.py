@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -16,6 +17,7 @@ from ...core import plugins
 from ...core.device import find, gpu_name, moved
 from ...core.errors import CellError, Pending, reason
 from ...core.hashing import canonical
+from ...core.reads import Seen, recorded
 from ...display import CalibratedBench
 from ...display.learned import LearnedBench
 from ...lab.real import RealBench
@@ -23,15 +25,17 @@ from .. import cost, isolation, opening
 from ..artifacts import Artifact, Artifacts
 from ..definition import Isolation, Limits, Save
 from ..displays import Condition, Preparation
+from ..isolation.reads import Reads, reads_of_dataset
 from ..phases import Phases, phases_of
 from ..plan import Cell, Task
 from ..store import Record, State, Store
-from ..versions import gate
+from ..versions import AGAIN, dataset_version, gate
 
 TARGETS_KEPT = 16  # targets that a process keeps in memory; 25 MB each on a panel of 1080 x 1920 pixels
 
-# Dataset, its parameters as JSON, folder of the config, name of the image and its digest.
-TargetSource = tuple[str, str, Path, str, str]
+# Dataset, version of its code (empty for one that ships), parameters as JSON, folder of the config, name of the image
+# and its digest.
+TargetSource = tuple[str, str, str, Path, str, str]
 
 Measured = Callable[[Cell, Condition], Record]  # makes the record of a cell on its display
 Measure = Callable[["Job"], Measured]  # does the work that all cells of a job share
@@ -88,7 +92,7 @@ class Job:
     @property
     def phases(self) -> Phases:
         """Where phases are kept."""
-        return phases_of(self.setting.output)
+        return phases_of(self.setting.output, self.setting.folder)
 
     @property
     def kind(self) -> tuple[str, str]:
@@ -113,6 +117,8 @@ class Job:
     def record(self, cell: Cell, state: State = "done", **further: Any) -> Record:
         """The record of a cell, with these further entries."""
         label = cell.method if self.task.is_floor else self.task.label
+        if state == "done":
+            further["reads"] = {**self.target_reads(), **further.get("reads", {})}
         return Record(cell.description(), state, label, cell.condition, cell.target, **further)
 
     def failed(self, cell: Cell, error: BaseException) -> Record:
@@ -147,11 +153,17 @@ class Job:
     def source(self, cell: Cell) -> TargetSource:
         """Where the target of a cell comes from."""
         params = canonical(dict(cell.dataset_params))
-        return cell.dataset, params, self.setting.folder, cell.target, cell.target_sha256
+        code = cell.phase["target"].get("code", "")
+        return cell.dataset, code, params, self.setting.folder, cell.target, cell.target_sha256
 
     def target(self, cell: Cell, display: Condition) -> Tensor:
         """The target of a cell at the size of the scored region; see ``load_target``."""
         return load_target(self.source(cell), display)
+
+    def target_reads(self) -> dict[str, str]:
+        """What a user's dataset has read for the task's targets, see ``isolation.Reads``."""
+        reads = (_current(self.source(cell), self.task.conditions[0])[1] for cell in self.task.cells)
+        return {path: sha256 for read in reads for path, sha256 in read.covered.items()}
 
 
 def load_target(source: TargetSource, display: Condition) -> Tensor:
@@ -159,15 +171,25 @@ def load_target(source: TargetSource, display: Condition) -> Tensor:
 
     CellError for a source that has changed since the study was planned.
     """
-    return _target(source, display.spec.region.shape, len(display.spec.wavelengths)).clone()
+    return _current(source, display)[0].clone()
+
+
+def _current(source: TargetSource, display: Condition) -> tuple[Tensor, Reads]:
+    wanted = source, display.spec.region.shape, len(display.spec.wavelengths)
+    if isolation.changed(_target(*wanted)[1].covered, source[3]):
+        _target.cache_clear()
+    return _target(*wanted)
 
 
 @lru_cache(maxsize=TARGETS_KEPT)
-def _target(source: TargetSource, shape: tuple[int, int], channels: int) -> Tensor:
-    """A target, loaded once in a process for all methods and repeats."""
-    name, params, folder, item, sha256 = source
-    dataset = plugins.build("datasets", name, json.loads(params), folder)
-    if dataset.digest(item) != sha256:
-        raise CellError(f"target '{item}' has changed since the study was planned; start the run again")
-    target: Tensor = dataset.load(item, shape, channels=channels)
-    return target
+def _target(source: TargetSource, shape: tuple[int, int], channels: int) -> tuple[Tensor, Reads]:
+    """A target and what was read for it, loaded once in a process for all methods and repeats."""
+    name, code, params, folder, item, sha256 = source
+    with recorded() if code else nullcontext(Seen()) as seen:
+        dataset = plugins.build("datasets", name, json.loads(params), folder)
+        if dataset_version(name, type(dataset)) != code:
+            raise CellError(f"the code of dataset '{name}' {AGAIN}")
+        if dataset.digest(item) != sha256:
+            raise CellError(f"target '{item}' {AGAIN}")
+        target: Tensor = dataset.load(item, shape, channels=channels)
+    return target, reads_of_dataset(dataset, seen)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from torch import Tensor
 
@@ -18,6 +18,7 @@ from ..artifacts import Artifact
 from ..displays import Condition
 from ..isolation import Reads
 from ..isolation.read_files import digests
+from ..phases import Solution
 from ..plan import Cell
 from ..store import Record
 from ..versions import gate
@@ -40,10 +41,10 @@ def prediction(job: Job) -> Measured:
 
 @dataclass(frozen=True)
 class Foreseen:
-    """A hologram ``(C, H, W)`` [rad] of a target ``(C, h, w)``, its capture, and the prediction of that ``(C, h, w)``,
-    in the same unit; what the prediction took, what was learned before, and what was read."""
+    """A hologram of a target ``(C, h, w)``, its capture, and the prediction of that ``(C, h, w)``, in the same unit;
+    what the prediction took, what was learned before, and what was read."""
 
-    phase: Tensor
+    hologram: Solution
     target: Tensor
     capture: RectifiedCapture
     prediction: Tensor
@@ -56,7 +57,7 @@ def _foresee(job: Job) -> Foreseen:
     """Predict the capture of the hologram of the task's target."""
     task, cell, display = job.task, job.task.cells[0], job.task.conditions[0]
     target = job.target(cell, display)
-    phase, capture = shown(job, cell, display)
+    hologram, capture = shown(job, cell, display)
     method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
     gate(method, cell.method, cell.code, digests(method, cell.target), cell.files)
     refuse_saturated(capture)
@@ -69,7 +70,7 @@ def _foresee(job: Job) -> Foreseen:
         budget=0,  # the capture is what is to be predicted
         learned=moved(learned.state, job.device) if learned else None,
     )
-    own = phase[None].to(job.device, copy=True)
+    own = hologram.phase[None].to(job.device, copy=True)
     with isolation.opened(method, job.device) as ready:
         watch = cost.start(job.device, ready.pid)
         predicted = method.predict(own, handle)
@@ -77,7 +78,7 @@ def _foresee(job: Job) -> Foreseen:
     predicted = from_numpy(predicted)
     if not is_plain(predicted) or tuple(predicted.shape) != (1, *target.shape):
         raise wrong_output(task.label, "predict", predicted, f"an image {(1, *target.shape)}")
-    return Foreseen(phase, target, capture, predicted.detach().cpu()[0], taken, learned, ready.reads)
+    return Foreseen(hologram, target, capture, predicted.detach().cpu()[0], taken, learned, ready.reads)
 
 
 def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
@@ -90,7 +91,7 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
     further = more(seen)
 
     def compare(cell: Cell, _: Condition) -> Record:
-        keep_pictures(job, cell, image, wanted, seen.phase)
+        keep_pictures(job, cell, image, wanted, seen.hologram.phase)
         keep_capture(job, cell, image, wanted)
         return job.record(
             cell,
@@ -102,8 +103,8 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
             registration_residual_px=seen.capture.residual,
             saturated=seen.capture.saturated,
             learned=account(seen.learned),
-            reads=dict(seen.reads.covered),
-            uncovered=seen.reads.uncovered,
+            reads={**seen.hologram.covered, **seen.reads.covered},
+            uncovered=tuple({*seen.hologram.uncovered, *seen.reads.uncovered}),
         )
 
     return compare
@@ -115,32 +116,39 @@ def floor(job: Job) -> Measured:
     def wanted(cell: Cell, display: Condition) -> Tensor:
         return match(shown(job, cell, display)[1].image, job.target(cell, display))[0]
 
-    return references(job, wanted)
+    measured = references(job, wanted)
+
+    def reference(cell: Cell, display: Condition) -> Record:
+        hologram, record = shown(job, cell, display)[0], measured(cell, display)
+        return replace(record, reads={**record.reads, **hologram.covered}, uncovered=hologram.uncovered)
+
+    return reference
 
 
-def shown(job: Job, cell: Cell, display: Condition, again: bool = False) -> tuple[Tensor, RectifiedCapture]:
-    """The phase ``(C, H, W)`` of the hologram that a study shows for a target, and its capture; or, ``again``, another
-    capture of it, with noise of its own."""
+def shown(job: Job, cell: Cell, display: Condition, again: bool = False) -> tuple[Solution, RectifiedCapture]:
+    """The hologram that a study shows for a target, and its capture; or, ``again``, another capture of it, with noise
+    of its own."""
     photograph = (digest(cell.holograms["phase"]), display, cell.seed, cell.repeat, cell.exposure, again)
-    if photograph not in _photographs:
-        phase = _solved(job, cell, display)
+    known = _photographs.get(photograph)
+    if known is None or isolation.changed(known[0].covered, job.setting.folder):
+        hologram = _solved(job, cell, display)
         bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
         item = f"{cell.target}, again" if again else cell.target  # it names the noise
-        capture = bench.photograph(phase, target, item=item, repeat=cell.repeat, exposure=cell.exposure)
-        _photographs[photograph] = phase, capture
+        capture = bench.photograph(hologram.phase, target, item=item, repeat=cell.repeat, exposure=cell.exposure)
+        _photographs[photograph] = hologram, capture
         while len(_photographs) > PHOTOGRAPHS_KEPT:
             _photographs.popitem(last=False)
     return _photographs[photograph]
 
 
-_photographs: OrderedDict[object, tuple[Tensor, RectifiedCapture]] = OrderedDict()
+_photographs: OrderedDict[object, tuple[Solution, RectifiedCapture]] = OrderedDict()
 
 
-def _solved(job: Job, cell: Cell, display: Condition) -> Tensor:
-    """The phase of a hologram: kept from before, or solved."""
+def _solved(job: Job, cell: Cell, display: Condition) -> Solution:
+    """A hologram: kept from before, or solved."""
     name, phase_id = cell.holograms["name"], digest(cell.holograms["phase"])
-    if (known := job.phases.read(phase_id, folder=job.setting.folder)) is not None:
-        return known.phase
+    if (known := job.phases.read(phase_id)) is not None:
+        return known
     bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
     method = job.method(name, cell.holograms["params"])
     gate(method, name, cell.holograms["code"], digests(method, cell.target), cell.holograms["files"])
@@ -148,4 +156,4 @@ def _solved(job: Job, cell: Cell, display: Condition) -> Tensor:
     own = target[None].to(job.device, copy=True)
     solved = solved_by(job, method, name, handle, lambda method, handle: method.solve(own, handle))
     job.phases.keep(phase_id, solved)
-    return solved.phase
+    return solved

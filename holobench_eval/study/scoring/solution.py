@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -29,15 +30,23 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
     target: ``(C, h, w)``, which the display is exposed for. The method works on a copy, so its changes cannot reach
     the score. Its inputs are on the job's device; its phase returns to the CPU.
     """
+    first = job.task.cells[0]
+    takes_captures = isolation.traits(first.method, job.setting.folder).camera
+    with job.phases.locked(first.phase_id) if takes_captures else nullcontext():
+        return _solution(job, display, target, solve)
+
+
+def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solution:
     task, first = job.task, job.task.cells[0]
     learned = job.learned(task.preparation)
     others = starts.of(job, first)
     # A start has the same name after another training, so what it is counts too.
     state = str(learned.provenance["sha256"]) if learned else starts.content(others)
-    known = job.phases.read(first.phase_id, state, job.setting.folder)
+    known = job.phases.read(first.phase_id, state)
     if known is not None and (known.alone or not job.timed):
         return known
-    shared = Starts(job.phases, {name: first.phase[name] for name in identity.BASIS}, job.device)
+    basis = {name: first.phase[name] for name in identity.BASIS}
+    shared = Starts(job.phases, basis, job.device, job.target_reads())
     method = job.method(first.method, first.params)
     gate(method, first.method, first.code, digests(method, first.target), first.files)
     journal = job.phases.journal(first.phase_id)
@@ -57,9 +66,10 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
         journal=journal,
     )
     solved = solved_by(job, method, task.label, handle, solve)
-    taken = solved.cost.after(shared.before)
+    taken = solved.cost.after(known.cost for known in shared.before)
+    alone = job.alone and all(known.alone for known in shared.before)
     cost.keep(job.timing, taken.seconds)
-    solved = replace(solved, captures=journal.captures, cost=taken, learned=state)
+    solved = replace(solved, captures=journal.captures, cost=taken, learned=state, alone=alone)
     if starts.all_there(first, others):
         job.phases.keep(first.phase_id, solved)
     return solved
@@ -80,7 +90,7 @@ def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: 
         taken,
         stopped,
         alone=job.alone,
-        covered=dict(ready.reads.covered),
+        covered={**job.target_reads(), **ready.reads.covered},
         uncovered=ready.reads.uncovered,
     )
 

@@ -17,7 +17,7 @@ FOLDER = Path("of this test")
 
 
 def source(item: str, params: str = "{}", sha256: str = "") -> TargetSource:
-    return "charts", params, FOLDER, item, sha256 or Charts().digest(item)
+    return "charts", "", params, FOLDER, item, sha256 or Charts().digest(item)
 
 
 def place(side: int) -> Any:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,8 +15,13 @@ def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch: pyte
     bench = SimpleNamespace(photograph=lambda phase, *_, **__: None)
     monkeypatch.setattr(prediction, "_photographs", OrderedDict())
     monkeypatch.setattr(prediction.opening, "open_display", lambda *_: bench)
-    monkeypatch.setattr(prediction, "_solved", lambda job, cell, _: solved.append(cell.holograms["phase"]["code"]))
-    job: Any = SimpleNamespace(target=lambda cell, display: None, device="cpu")
+
+    def solve(job: Any, cell: Any, display: Any) -> Any:
+        solved.append(cell.holograms["phase"]["code"])
+        return SimpleNamespace(phase=None, covered={})
+
+    monkeypatch.setattr(prediction, "_solved", solve)
+    job: Any = SimpleNamespace(target=lambda cell, display: None, device="cpu", setting=SimpleNamespace(folder=Path()))
     display: Any = "a display"
     for version in ("before", "before", "after"):
         probe = {"name": "mine.py:Mine", "params": {}, "code": version, "phase": {"code": version}}

@@ -1,0 +1,280 @@
+"""No old number stands for what has changed: code and files that a study uses besides the code of its methods."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holobench_eval.core.sources import code_of
+from holobench_eval.methods.double_phase import DoublePhase
+from holobench_eval.study import isolation
+from holobench_eval.study.artifacts import Artifacts
+from holobench_eval.study.config import load_study
+from holobench_eval.study.phases import RESULTS, Phases
+from holobench_eval.study.plan import plan
+from holobench_eval.study.store import Store
+from holobench_eval.study.versions import method_version
+from tests.study.test_gate import reasons
+from tests.study.test_run import TWO
+from tests.study.test_run import compute as compute_with
+from tests.support.trained_study import compute, needs, write
+
+READING = """
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import torch
+
+
+def amount():
+    return float(Path(__file__).with_name("data.txt").read_text())
+
+
+@dataclass(frozen=True)
+class Mine:
+    def solve(self, target, bench):
+        return amount() * torch.rand((1, 3, *bench.spec.shape), generator=torch.Generator().manual_seed(0))
+
+
+@dataclass(frozen=True)
+class Learning(Mine):
+    trains: ClassVar[bool] = True
+
+    def prepare(self, bench):
+        return {"amount": torch.tensor(amount())}
+
+    def solve(self, target, bench):
+        phase = torch.rand((1, 3, *bench.spec.shape), generator=torch.Generator().manual_seed(0))
+        return float(bench.learned["amount"]) * phase
+
+
+@dataclass(frozen=True)
+class Named:
+    file: str = "data.txt"
+
+    def solve(self, target, bench):
+        amount = float(Path(self.file).read_text())
+        return amount * torch.rand((1, 3, *bench.spec.shape), generator=torch.Generator().manual_seed(0))
+"""
+
+
+def reading(folder: Path, amount: float) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "mine.py").write_text(READING)
+    (folder / "data.txt").write_text(str(amount))
+
+
+def using(folder: Path, *methods: str, **further: str) -> Path:
+    """A config with these methods on one target."""
+    listed = ", ".join(methods)
+    changes = [('methods: ["trained.py:Gain"]', f"protocol: {{metrics: [psnr]}}\nmethods: [{listed}]")]
+    return write(folder, *changes, *((f"{key}: ", f"{key}: {value}") for key, value in further.items()))
+
+
+def psnr(outcome: Any, label: str = "") -> list[float]:
+    rows = [row for row in outcome.records if not row["label"].startswith("floor_") and label in row["label"]]
+    assert {row["state"] for row in rows} == {"done"}, [row["reason"] for row in rows]
+    return [row["scores"]["psnr_linear"] for row in rows]
+
+
+IMAGES = (
+    READING
+    + """
+
+@dataclass(frozen=True)
+class Images:
+    def items(self):
+        return ["a", "b"]
+
+    def digest(self, item):
+        return 64 * item
+
+    def load(self, item, shape, channels=3):
+        return torch.rand((channels, *shape), generator=torch.Generator().manual_seed(ord(item))) * amount()
+"""
+)
+
+
+@pytest.mark.parametrize("use", ["targets", "training"])
+def test_a_file_that_images_are_made_with_counts_though_their_digests_do_not_tell(tmp_path: Path, use: str) -> None:
+    reading(tmp_path, 1.0)
+    (tmp_path / "mine.py").write_text(IMAGES)
+    method = "double_phase" if use == "targets" else '"trained.py:Gain"'
+    config = using(tmp_path, method)
+    old = {"targets": '"trained.py:Pictures", params: {count: 1}', "training": '"trained.py:Unseen"'}[use]
+    assert old in config.read_text()
+    config.write_text(config.read_text().replace(old, '"mine.py:Images"'))
+    before = compute(config)
+    assert compute(config).computed == 0
+    (tmp_path / "data.txt").write_text("0.5")
+    after = compute(config)
+    assert after.computed == (len(before.records) if use == "targets" else 1)
+    assert psnr(after) == psnr(compute(config, "fresh"))
+
+
+@pytest.mark.usefixtures("no_physics")
+@pytest.mark.parametrize("name", ["Even", "Gain"])
+def test_the_code_of_images_that_was_edited_after_the_plan_is_refused(tmp_path: Path, name: str) -> None:
+    config = write(tmp_path, ('methods: ["trained.py:Gain"]', f'methods: ["other.py:{name}"]'))
+    (why,) = reasons(config, lambda text: f"{text}\n", "trained.py")
+    assert "the code of dataset 'trained.py:" in why
+
+
+def test_the_code_of_training_images_is_in_the_name_of_what_was_learned(tmp_path: Path) -> None:
+    config = write(tmp_path, ('methods: ["trained.py:Gain"]', 'methods: ["other.py:Gain"]'))
+    (tmp_path / "other.py").write_text((tmp_path / "trained.py").read_text())
+    (before,) = needs(config)
+    Artifacts(tmp_path / "artifacts").write(before, {}, {"captures": 0, "seconds": 0.0})
+    (tmp_path / "trained.py").write_text((tmp_path / "trained.py").read_text() + "\n")
+    (after,) = needs(config)
+    assert before.id != after.id
+    assert "was learned with other code of its images" in Artifacts(tmp_path / "artifacts").outdated(after)
+
+
+def test_the_same_code_at_two_places_reads_what_lies_beside_it(tmp_path: Path) -> None:
+    reading(tmp_path / "a", 1.0)
+    reading(tmp_path / "b", 6.0)
+    outcome = compute(using(tmp_path, "{name: 'a/mine.py:Mine', label: a}", "{name: 'b/mine.py:Mine', label: b}"))
+    assert psnr(outcome, "a") != psnr(outcome, "b")
+
+
+def test_what_was_learned_from_a_file_is_learned_again_when_that_has_changed(tmp_path: Path) -> None:
+    reading(tmp_path, 1.0)
+    config = using(tmp_path, "'mine.py:Learning'")
+    before = psnr(compute(config))
+    assert compute(config).computed == 0
+    reading(tmp_path, 6.0)
+    after = compute(config)
+    assert after.computed == 1
+    assert psnr(after) != before
+    assert psnr(after) == psnr(compute(config, "fresh"))
+
+
+def test_scores_by_a_network_that_another_study_has_replaced_are_computed_again(tmp_path: Path) -> None:
+    reading(tmp_path, 1.0)
+    config = using(tmp_path, "'mine.py:Learning'")
+    before = psnr(compute(config))
+    (needed,) = needs(config)
+    artifacts = Artifacts(tmp_path / "artifacts")
+    state = {"amount": artifacts.load(needed).state["amount"] * 6}
+    artifacts.write(needed, state, {"captures": 0, "seconds": 0.0})
+    after = compute(config)
+    assert after.computed == 1
+    assert psnr(after) != before
+    artifacts.remove(needed)
+    assert compute(config).computed == 0  # where nothing is there now, nothing else is known
+
+
+def test_the_file_that_a_hologram_was_made_with_counts_for_its_predictions(tmp_path: Path) -> None:
+    reading(tmp_path, 1.0)
+    config = write(
+        tmp_path,
+        ('methods: ["trained.py:Gain"]', 'protocol: {metrics: [psnr]}\nmethods: ["trained.py:Even"]'),
+        ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {name: 'mine.py:Mine'}"),
+    )
+    before = compute(config)
+    reading(tmp_path, 6.0)
+    after = compute(config)
+    assert after.computed == len(before.records)
+    assert psnr(after) != psnr(before)
+
+
+def test_a_file_that_a_parameter_names_is_the_one_of_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "study").mkdir()
+    for place, amount in (("p", 1.0), ("q", 6.0)):
+        reading(tmp_path / place, amount)
+    (tmp_path / "study" / "mine.py").write_text(READING)
+    config = using(tmp_path / "study", "'mine.py:Named'")
+    found = []
+    for place in ("p", "q", "p"):
+        monkeypatch.chdir(tmp_path / place)
+        found.append(psnr(compute(config)))
+    assert found[0] == found[2] != found[1]
+
+
+def test_any_file_of_an_installed_package_is_part_of_its_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "a_package_of_methods"
+    reading(package, 1.0)
+    (package / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+
+    def version() -> str:
+        for name in [name for name in sys.modules if name.startswith(package.name)]:
+            del sys.modules[name]
+        return code_of(__import__(f"{package.name}.mine").mine.Mine).sha256
+
+    before = version()
+    assert version() == before
+    (package / "data.txt").write_text("6.0")
+    assert version() != before
+
+
+def test_a_method_that_calls_one_of_this_package_has_its_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from holobench_eval.methods.double_phase import DoublePhase\n\n\ndef Mine(target, bench):\n"
+        "    return DoublePhase().solve(target, bench)\n"
+    )
+
+    def version() -> str:
+        return method_version(type(isolation.solver("mine.py:Mine", {}, tmp_path, "none", None)))
+
+    before = version()
+    monkeypatch.setattr(DoublePhase, "version", 99, raising=False)
+    assert version() != before
+
+
+def test_a_phase_is_solved_by_one_at_a_time(tmp_path: Path) -> None:
+    phases, order = Phases(tmp_path), list[str]()
+
+    def second() -> None:
+        with phases.locked("ab"):
+            order.append("second")
+
+    with phases.locked("ab"):
+        waiting = threading.Thread(target=second)
+        waiting.start()
+        waiting.join(0.2)
+        order.append("first")
+    waiting.join()
+    assert order == ["first", "second"]
+
+
+def test_a_phase_is_whole_from_any_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reading(tmp_path / "study", 1.0)
+    config = using(tmp_path / "study", "'mine.py:Mine'", "{name: oracle, params: {start_iterations: 1, rounds: 1}}")
+    monkeypatch.chdir(tmp_path)
+    psnr(compute(config))
+
+
+def test_a_time_that_holds_one_that_was_shared_was_not_taken_alone(tmp_path: Path) -> None:
+    config = using(tmp_path, "{name: wirtinger, params: {iterations: 2, offset: none}}")
+    shared = compute_with(config, tmp_path / RESULTS / "a", executor=TWO)
+    assert [row["alone"] for row in shared.records if row["label"] == "wirtinger"] == [False]
+    config = using(tmp_path, "{name: wirtinger, params: {iterations: 2}}")
+    begun = compute(config, f"{RESULTS}/b")
+    assert [row["alone"] for row in begun.records if row["label"] == "wirtinger"] == [False]
+
+
+def test_a_damaged_capture_is_no_capture(tmp_path: Path) -> None:
+    config = using(tmp_path, "double_phase")
+    compute(config)
+    (cell,) = (cell for cell in plan(load_study(config)).cells if cell.method == "double_phase")
+    file = Store(tmp_path / "out").capture(cell.id)
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 64
+    file.write_bytes(content)
+    config.write_text(config.read_text().replace("[psnr]", "[psnr, ssim]"))
+    outcome = compute(config)
+    (row,) = (row for row in outcome.records if row["label"] == "double_phase")
+    assert outcome.unscored == 0
+    assert "ssim_linear" in row["scores"]
