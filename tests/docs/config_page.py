@@ -48,9 +48,10 @@ file of the same name, an installed package after it. A change of any byte of th
 file that is read while they are imported, has the method's cells computed and its training made again. A `version` of
 your class is a label for people.
 
-What a method opens in `prepare`, `solve` or `predict`, and a dataset for its images, is part of the cells by its digest
-where it lies in the folder of the config, or where a parameter names it or a folder above it. Other files are listed as
-not covered. Of an installed package all files count, and of this package the versions of the methods that yours imports.
+What a method opens in `prepare`, `solve` or `predict`, and a dataset for its images, is part of the cells by its
+digest where it lies in the folder of the config, or where a parameter names it or a folder above it. Other files are
+listed as not covered. Of an installed package all files count, and of this package the versions of the methods that
+yours imports.
 Not seen is what C code opens by itself (h5py, pyarrow, safetensors, `cv2.FileStorage`), unless a parameter names the
 file; what other programs and processes read; a listing of a folder, or the question whether a file is there; an
 environment variable. With `isolation: none`, a module that stays in memory from an earlier call is not seen either.

@@ -70,7 +70,7 @@ class MethodProcess:
         self.control, self.key, self.file = Channel(ours), (name, folder, home), folder / name.rpartition(":")[0]
         self.process = start(serve, theirs, name, folder, home)
         # Before it is asked to end, which a method's file may have forbidden.
-        util.Finalize(None, self.end, exitpriority=100)
+        self.at_exit = util.Finalize(None, self.end, exitpriority=100)
         theirs.close()
         ready = wait([ours, self.process.sentinel], IMPORT_LIMIT)  # others of its processes may hold the pipe
         try:
@@ -82,6 +82,7 @@ class MethodProcess:
             why = f"ends its process ({self.process.exitcode})" if ready else f"takes more than {IMPORT_LIMIT:g} s"
             raise UserError(f"method '{name}': the import of its file {why}") from None
         if isinstance(facts, str):
+            self.end()
             raise UserError(facts)
         self.facts, self.states = facts, self._states(facts)
 
@@ -97,6 +98,7 @@ class MethodProcess:
 
     def end(self) -> None:
         """Kill the process."""
+        self.at_exit.cancel()  # it would keep this object, and its files open, until the harness ends
         self.process.kill()
         self.process.join()
         self.control.connection.close()

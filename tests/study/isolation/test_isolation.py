@@ -17,6 +17,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study import isolation
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
+from holobench_eval.study.isolation import process
 from holobench_eval.study.isolation.process import process_of
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
@@ -422,3 +423,17 @@ def test_the_reason_of_a_failure_names_the_line_of_the_method_s_file(tmp_path: P
     record = solved(tmp_path, "torch.zeros(2) + torch.zeros(3)")
     assert record["state"] == "failed"
     assert re.search(r"RuntimeError: .* \(one\.py, line \d+\)$", record["reason"])
+
+
+def test_methods_that_have_ended_keep_no_files_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, "KEPT", 2)
+    monkeypatch.setattr(process, "_processes", [])
+    counts = []
+    for number in range(8):
+        (tmp_path / str(number)).mkdir()
+        (tmp_path / str(number) / "mine.py").write_text("def Mine(target, bench):\n    return target\n")
+        isolation.build("mine.py:Mine", {}, tmp_path / str(number))
+        counts.append(len(list(Path("/proc/self/fd").iterdir())))
+    for kept in process._processes:
+        kept.end()
+    assert counts[-1] == counts[3]
