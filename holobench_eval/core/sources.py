@@ -249,15 +249,15 @@ def _importer(frame: FrameType | None) -> str | None:
     return spec.loader_state if isinstance(getattr(spec, "loader", None), _FromSource) else None
 
 
-def _reach(files: Iterable[Path], folder: str, limit: str = "") -> set[Path]:
+def _reach(files: Iterable[Path], folder: str) -> set[Path]:
     """Python files that these import, at once or later, and those that they name in a text.
 
-    folder: where absolute names start; limit: the folder that they lie in, by default the same.
+    folder: where they lie, and absolute names start.
     """
     waiting, reached = list(files), set[Path]()
     while waiting:
         file = waiting.pop()
-        if file not in reached and (state := file_state(file)) is not None and _is_below(str(file), limit or folder):
+        if file not in reached and (state := file_state(file)) is not None and _is_below(str(file), folder):
             reached.add(file)
             waiting += [*_named(file, folder, state), *(parent / "__init__.py" for parent in file.parents)]
     return reached
