@@ -5,6 +5,7 @@ So no call begins with what an earlier one left in memory, and one that ends its
 
 from __future__ import annotations
 
+import ctypes
 import inspect
 import os
 import signal
@@ -23,6 +24,7 @@ from types import ModuleType
 from typing import Any
 
 import cv2
+import psutil
 import torch
 
 from ... import display
@@ -40,6 +42,8 @@ from .messages import Channel
 # The bench and the harness.
 HIDDEN = tuple(f"{PACKAGE}.{part}" for part in ("display.simulated", "study", "lab", "report", "commands", "testing"))
 HANDLES = {"MeteredDisplay": SolvingHandle, "TrainingBench": TrainingHandle}
+
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # prctl(2): die with the parent; get what descendants leave
 
 
 def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
@@ -69,14 +73,18 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     except (UserError, CellError) as error:
         channel.send(str(error))
         os._exit(1)
+    libc = ctypes.CDLL(None)
+    libc.prctl(PR_SET_CHILD_SUBREAPER, 1)
     with suppress(EOFError, OSError):
         while True:
             number = reduction.recv_handle(control)
             child = os.fork()
             if child == 0:
+                libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
                 control.close()
-                os.setsid()  # what it starts ends with it
-                _call(Channel(Connection(number)), cls, f"method '{name}'", code.folder if code else "")
+                os.setsid()
+                with suppress(EOFError, ConnectionError):  # one that was forked and is not needed
+                    _call(Channel(Connection(number)), cls, f"method '{name}'", code.folder if code else "")
                 os._exit(0)
             os.close(number)
             channel.send(child)
@@ -104,8 +112,9 @@ def _imported(name: str, folder: Path) -> tuple[type[Any], str]:
         refused = refusal.refused
         sys.meta_path.remove(refusal)  # to see what it declares; it cannot run here
         cls = plugins.find("methods", name, folder)
-    if _threads() > threads:
-        raise UserError(f"method '{name}' starts threads while its file is imported; start them in solve or prepare")
+    started = "threads" if _threads() > threads else "processes" if psutil.Process().children() else ""
+    if started:
+        raise UserError(f"method '{name}' starts {started} while its file is imported; start them in solve or prepare")
     if plugins.is_file(name):
         sys.path.append(sources.code_of(cls).folder)  # for processes that it starts
     return cls, refused
@@ -122,11 +131,13 @@ def _flush() -> None:
 
 
 def _ended(child: int) -> int:
-    """End a process and all that it has started; its exit code, or less than 0 the signal."""
-    for kill in (os.killpg, os.kill):  # it may not have a group yet
-        with suppress(ProcessLookupError, PermissionError):
-            kill(child, signal.SIGKILL)
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    """End a process and all that it has started, in whichever group; its exit code, or less than 0 the signal."""
+    statuses = dict[int, int]()
+    while numbers := [process.pid for process in psutil.Process().children()]:  # whose own then come to this one
+        for number in numbers:
+            os.kill(number, signal.SIGKILL)
+        statuses |= {number: os.waitpid(number, 0)[1] for number in numbers}
+    return os.waitstatus_to_exitcode(statuses[child])
 
 
 def _hide() -> _Refusal:

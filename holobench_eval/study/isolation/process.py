@@ -59,11 +59,23 @@ FACTS: TypeAdapter[Facts | str] = TypeAdapter(Facts | str)  # a text says why th
 SEEN = TypeAdapter(Seen)
 
 
+@dataclass(frozen=True)
+class Fork:
+    """A process for one call. setting: what it gets ready with; channel: the way to it."""
+
+    setting: dict[str, Any]
+    channel: Channel
+
+
 class MethodProcess:
-    """A process that has imported a method, and forks one for every call.
+    """A process that has imported a method, and forks one for every call; after a call the next at once, which gets
+    ready while the result is scored.
 
     facts: what the method is. UserError for a method that cannot be imported.
     """
+
+    _next: Fork | None = None
+    _ends = False  # whether it is still to tell how the last call ended, before the number of the next
 
     def __init__(self, name: str, folder: Path, home: Path) -> None:
         ours, theirs = CONTEXT.Pipe()
@@ -99,7 +111,9 @@ class MethodProcess:
     def end(self) -> None:
         """Kill the process."""
         self.at_exit.cancel()  # it would keep this object, and its files open, until the harness ends
-        self.process.kill()
+        if self._next is not None:
+            self._next.channel.connection.close()
+        self.process.kill()  # its forks end with it
         self.process.join()
         self.control.connection.close()
 
@@ -110,36 +124,64 @@ class MethodProcess:
 
         CellError where it ends by itself, sends what is no answer, or reaches a limit.
         """
-        ours, theirs = CONTEXT.Pipe()
-        channel, late, pid = Channel(ours), threading.Event(), 0
+        setting = {"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib}
+        late, pid, channel = threading.Event(), 0, None
+        failure: Exception | None = None
 
         def stop() -> None:
             late.set()
-            with socket.socket(fileno=os.dup(ours.fileno())) as end:  # others of its processes may hold the pipe
-                end.shutdown(socket.SHUT_RDWR)
+            if channel is not None:
+                with socket.socket(fileno=os.dup(channel.connection.fileno())) as end:  # others may hold the pipe
+                    end.shutdown(socket.SHUT_RDWR)
 
         timer = threading.Timer(min(limits.seconds, threading.TIMEOUT_MAX), stop)
         timer.daemon = True
-        timer.start()
-        failure: Exception | None = None
         try:
-            with theirs:
-                reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
-            pid = self._told()
-            channel.send({"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib})
+            pid, channel = self._forked(setting)
+            timer.start()
             channel.receive()
             yield pid, channel
+            with suppress(OSError):  # one that has ended is not current
+                self._end_call()
+                self._next = self._fork(setting)
+            return
         except (EOFError, OSError, GarbledError) as error:
             failure = error
         finally:
             timer.cancel()
-            ours.close()
-            ending = self._ending(pid)
-        if failure is not None and late.is_set():
+            if channel is not None:
+                channel.connection.close()
+            ending = "" if self._next else self._ending(pid)
+        if late.is_set():
             raise CellError(f"took more than {limits.seconds:g} s, the limit of the study")
-        if failure is not None:
-            what = "sent what is no answer" if isinstance(failure, GarbledError) else ending
-            raise CellError(f"the process of the method {what}")
+        what = "sent what is no answer" if isinstance(failure, GarbledError) else ending
+        raise CellError(f"the process of the method {what}")
+
+    def _forked(self, setting: dict[str, Any]) -> tuple[int, Channel]:
+        """The number of a process that gets ready for a call, and the way to it. EOFError, OSError without one."""
+        fork, self._next = self._next or self._fork(setting), None
+        if self._ends:
+            self._told()
+            self._ends = False
+        pid = self._told()
+        if fork.setting == setting:
+            return pid, fork.channel
+        fork.channel.connection.close()
+        self._end_call()
+        return self._forked(setting)
+
+    def _fork(self, setting: dict[str, Any]) -> Fork:
+        """Ask for a process that gets ready for a call."""
+        ours, theirs = CONTEXT.Pipe()
+        with theirs:
+            reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
+        channel = Channel(ours)
+        channel.send(setting)
+        return Fork(setting, channel)
+
+    def _end_call(self) -> None:
+        self.control.send("end")
+        self._ends = True
 
     def _told(self) -> int:
         """A number that the process tells. EOFError where it does not in time, which ends it."""
@@ -151,8 +193,8 @@ class MethodProcess:
     def _ending(self, pid: int) -> str:
         """End a call, and say how it ended by itself. pid: 0 for one that has not begun."""
         try:
-            self.control.send("end")
-            status = self._told()
+            self._end_call()
+            status, self._ends = self._told(), False
         except (EOFError, OSError, GarbledError):
             self.end()
             if pid:
