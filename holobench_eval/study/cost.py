@@ -1,4 +1,4 @@
-"""The cost of a solution: wall time, and the peak of memory above the level before it.
+"""The cost of a solution: wall time, processor time, and the peak of memory above the level before it.
 
 These are the only numbers of a table that differ from run to run: a study reports what it measured itself. The last
 time that a method took is also kept in ``$XDG_CACHE_HOME`` (or ``~/.cache``) ``/holobench_eval/timings/``, from which
@@ -6,6 +6,9 @@ the time is estimated that a study takes.
 
 Linux keeps the largest resident set that a process ever had (``VmHWM`` in ``/proc/self/status``) and sets it back to
 the present one when 5 is written to ``/proc/self/clear_refs`` (proc(5)). Elsewhere memory is not measured.
+A method in a process of its own could do that, too, and could work before its clock or leave work to others. So its
+peak is looked up every ``EACH`` seconds, what it took from its fork until it was ready counts as wall time, and
+processor time and memory are those of all processes that it has started.
 On a GPU the memory is that of torch's tensors on it, and the clock waits until the queued work is done.
 """
 
@@ -15,8 +18,9 @@ import gc
 import math
 import os
 import platform
+import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -37,46 +41,59 @@ from .plan import Plan, Task
 PROCESS = Path("/proc/self")
 _KIB_PER_MIB, _BYTES_PER_MIB = 1024, 1024**2
 KIND = ("code", "params", "optics", "display", "captures")  # entries of a phase that tell how long it takes
-APART = 10.0
+APART = 10.0  # s between two times that are kept
+EACH = 0.05  # s between two looks at the memory of a process
 
 
 @dataclass(frozen=True)
 class Cost:
-    """seconds: wall time; memory_mib: peak of the memory above the level before [MiB], None where unknown."""
+    """seconds: wall time; memory_mib: peak of the memory above the level before [MiB]; cpu_s: time of all processors
+    [s]; None where unknown."""
 
     seconds: float
     memory_mib: float | None = None
+    cpu_s: float | None = None
 
     def after(self, before: Iterable[Cost]) -> Cost:
         """The same with what was begun with and is from before: all of its time, and the peak, if each is known."""
         costs = [self, *before]
-        known = [each.memory_mib for each in costs if each.memory_mib is not None]
-        return Cost(sum(each.seconds for each in costs), max(known) if len(known) == len(costs) else None)
+        memory, cpu = [each.memory_mib for each in costs], [each.cpu_s for each in costs]
+        return Cost(
+            sum(each.seconds for each in costs),
+            None if None in memory else max(filter(None, memory), default=0.0),
+            None if None in cpu else sum(filter(None, cpu)),
+        )
 
 
 @dataclass(frozen=True)
 class Stopwatch:
     """Started by ``start()``, read by ``stop()``.
 
-    before: memory at the start, resident [KiB] or of a GPU [bytes] (None: not measured); clock: time at the start [s];
-    process: number of the one whose memory is measured, None for this one.
+    before: memory at the start, resident [KiB] or of a GPU [bytes] (None: not measured); clock, cpu: wall and processor
+    time at the start [s]; process: number of the one that is measured, None for this one; peak: of its memory.
     """
 
     before: int | None
     clock: float
+    cpu: float | None
     device: torch.device = CPU
     process: int | None = None
+    peak: _Peak | None = None
 
     def stop(self) -> Cost:
-        """The cost since the start."""
-        if self.device.type == "cuda" and self.process is None and self.before is not None:
+        """The cost since the start; of another process since its fork."""
+        on_gpu = self.device.type == "cuda" and self.process is None
+        if on_gpu:
             torch.cuda.synchronize(self.device)
-            seconds = time.perf_counter() - self.clock
-            return Cost(seconds, (torch.cuda.max_memory_allocated(self.device) - self.before) / _BYTES_PER_MIB)
-        seconds = time.perf_counter() - self.clock
-        peak = None if self.before is None else _status("VmHWM", self.process)
-        memory = None if peak is None or self.before is None else max(0, peak - self.before) / _KIB_PER_MIB
-        return Cost(seconds, memory)
+        seconds, cpu, memory = time.perf_counter() - self.clock, _cpu(self.process), None
+        if on_gpu and self.before is not None:
+            memory = (torch.cuda.max_memory_allocated(self.device) - self.before) / _BYTES_PER_MIB
+        elif self.before is not None:
+            peak = self.peak.end() if self.peak else _status("VmHWM", None)
+            memory = None if peak is None else max(0, peak - self.before) / _KIB_PER_MIB
+        if self.cpu is None or cpu is None:
+            return Cost(seconds, memory)
+        return Cost(seconds, memory, cpu - self.cpu) if self.process is None else Cost(seconds + self.cpu, memory, cpu)
 
 
 def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
@@ -91,9 +108,69 @@ def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
     if device.type == "cuda" and process is None:
         torch.cuda.synchronize(device)
         torch.cuda.reset_peak_memory_stats(device)
-        return Stopwatch(torch.cuda.memory_allocated(device), time.perf_counter(), device)
-    measured = device.type != "cuda" and _set_back(process)
-    return Stopwatch(_status("VmRSS", process) if measured else None, time.perf_counter(), device, process)
+        return Stopwatch(torch.cuda.memory_allocated(device), time.perf_counter(), _cpu(None), device)
+    before = _status("VmRSS", process) if device.type != "cuda" and _set_back(process) else None
+    peak = None if process is None or before is None else _Peak(process)
+    return Stopwatch(before, time.perf_counter(), _cpu(process), device, process, peak)
+
+
+class _Peak(threading.Thread):
+    """The peak of memory [KiB] of another process and of those that it has started, looked up again and again."""
+
+    def __init__(self, process: int) -> None:
+        super().__init__(daemon=True)
+        self.process, self.kib, self.ended = process, 0, threading.Event()
+        self.start()
+
+    def run(self) -> None:
+        """Look until the end, or until the process has gone."""
+        while self._look() and not self.ended.wait(EACH):
+            pass
+
+    def end(self) -> int:
+        """The peak up to now."""
+        self.ended.set()
+        self.join()
+        self._look()
+        return self.kib
+
+    def _look(self) -> bool:
+        own = _status("VmHWM", self.process)
+        others = [_status("Pss", number, "smaps_rollup") for number in _started(self.process)]
+        self.kib = max(self.kib, (own or 0) + sum(filter(None, others)))
+        return own is not None
+
+
+def _cpu(process: int | None) -> float | None:
+    """Processor time [s] of a process and those that it has started, None where unknown. process: None for this one,
+    of whose processes only those count that have ended."""
+    if process is None:
+        return time.process_time() + sum(os.times()[2:4])
+    try:
+        return sum(map(_cpu_of, (process, *_started(process))))
+    except (OSError, ValueError):
+        return None
+
+
+def _cpu_of(number: int) -> float:
+    # clock_getcpuclockid(3): the clock of another process; those that ended and were waited for are counted in ticks.
+    waited = (_process(number) / "stat").read_text().rpartition(")")[2].split()[13:15]
+    return time.clock_gettime(~number << 3 | 2) + sum(map(int, waited)) / os.sysconf("SC_CLK_TCK")
+
+
+def _started(process: int) -> list[int]:
+    """Numbers of the processes that a method's process has started; the one it was forked from adopts their orphans."""
+    numbers, todo = list[int](), [_status("PPid", process) or process]
+    while todo:
+        todo = [int(child) for number in todo for child in _children(number)]
+        numbers += todo
+    return [number for number in numbers if number != process]
+
+
+def _children(process: int) -> Iterator[str]:
+    for file in _process(process).glob("task/*/children"):
+        with suppress(OSError):
+            yield from file.read_text().split()
 
 
 def _collect() -> None:
@@ -122,10 +199,10 @@ def _process(number: int | None) -> Path:
     return PROCESS if number is None else PROCESS.with_name(str(number))
 
 
-def _status(name: str, process: int | None) -> int | None:
-    """A field of ``/proc/self/status`` [KiB], or of another process."""
+def _status(name: str, process: int | None, file: str = "status") -> int | None:
+    """A field of ``/proc/self/status`` [KiB], or of another process or file."""
     try:
-        text = (_process(process) / "status").read_text()
+        text = (_process(process) / file).read_text()
     except OSError:
         return None
     return next((int(line.split()[1]) for line in text.splitlines() if line.startswith(f"{name}:")), None)

@@ -52,7 +52,7 @@ class Record:
     it, by column; captures: camera captures that the method took, those of failed attempts included; seconds: wall
     time of the solution; reused: whether that was solved before, for another display, study or run; alone: whether it
     was timed without concurrent workers (None: unknown); memory_mib: peak of resident memory above the level before the
-    solution [MiB];
+    solution [MiB]; cpu_s: its time of all processors;
     registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
     saturated samples; learned: sha256, captures and seconds of the training that the method needed first; stopped: why
     the display ended the solution, whose best hologram so far was scored (empty: it did not); reads, uncovered: what a
@@ -72,6 +72,7 @@ class Record:
     reused: bool = False
     alone: bool | None = None
     memory_mib: Amount | None = None
+    cpu_s: Amount | None = None
     registration_residual_px: Amount | None = None
     saturated: Annotated[float, Interval(ge=0, le=1)] | None = None
     learned: dict[str, Any] | None = None

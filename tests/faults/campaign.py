@@ -27,6 +27,7 @@ TIMES = {
     "seconds",
     "reused",
     "memory_mib",
+    "cpu_s",
     "alone",
     "sha256",
 }  # of a record: what differs from run to run, and its digest

@@ -28,7 +28,7 @@ def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> lis
 
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{**record, "seconds": None, "memory_mib": None, "alone": None} for record in records]
+    return [{**record, "seconds": None, "memory_mib": None, "cpu_s": None, "alone": None} for record in records]
 
 
 @pytest.mark.slow

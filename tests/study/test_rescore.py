@@ -81,7 +81,7 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path
 def measured(outcome: Outcome) -> list[dict[str, Any]]:
     """Records without what each run measures itself, and without whether their phases were known before."""
     assert {record["state"] for record in outcome.records} == {"done"}, [r["reason"] for r in outcome.records]
-    return [{**one, "seconds": None, "memory_mib": None, "reused": None} for one in outcome.records]
+    return [{**one, "seconds": None, "memory_mib": None, "cpu_s": None, "reused": None} for one in outcome.records]
 
 
 def cells(config: Path) -> list[Cell]:

@@ -256,7 +256,7 @@ def noted_work(task: Job) -> list[Record]:
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Records without what each run measures itself."""
-    return [{**record, "seconds": None, "memory_mib": None, "reused": False} for record in records]
+    return [{**record, "seconds": None, "memory_mib": None, "cpu_s": None, "reused": False} for record in records]
 
 
 def untimed_table(path: Path) -> str:

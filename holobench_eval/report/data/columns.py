@@ -240,6 +240,12 @@ def memory_mib(record: Record, layout: Layout) -> float | None:
     return record.get("memory_mib")
 
 
+@column(FIGURES, "number", kept=if_known, table=mean, heading="processor seconds per {each}")
+def cpu_s(record: Record, layout: Layout) -> float | None:
+    """Time of all processors that solving took, on one or more cores."""
+    return record.get("cpu_s")
+
+
 @column(FIGURES, "count", kept=if_known)
 def timed_alone(record: Record, layout: Layout) -> bool | None:
     """1 where nothing else was at work beside the solution, else 0."""

@@ -71,7 +71,8 @@ def _light_and_time(results: Results, condition: str) -> Markdown:
         return number(cells.loc[cells["state"] == DONE, "saturated"].max() * 100)
 
     costs = cost_columns(results, " per target")
-    costs |= {"memory_mib": "memory [MiB]"} if "memory_mib" in results.table else {}
+    measured = {"cpu_s": "processor seconds per target", "memory_mib": "memory [MiB]"}
+    costs |= {key: title for key, title in measured.items() if key in results.table}
     sensor = results.layout.learned_display is None
     figures = [score for score in results.scores if not score.domain and not score.key.startswith(ELSEWHERE)]
     columns = [

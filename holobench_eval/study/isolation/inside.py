@@ -53,7 +53,8 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     torch.set_num_threads(1)
     cv2.setNumThreads(1)  # it looks for libraries when it is first called, which is here once for all calls
     current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # else a method could start no process
-    channel = Channel(control)
+    libc, channel = ctypes.CDLL(None), Channel(control)
+    libc.prctl(PR_SET_CHILD_SUBREAPER, 1)
     began = time.perf_counter()
     try:
         cls, refused = _imported(name, folder)
@@ -72,9 +73,9 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
         channel.send(facts)
     except (UserError, CellError) as error:
         channel.send(str(error))
+        with suppress(EOFError, OSError):
+            channel.receive()  # until the harness ends it, with what it has started
         os._exit(1)
-    libc = ctypes.CDLL(None)
-    libc.prctl(PR_SET_CHILD_SUBREAPER, 1)
     with suppress(EOFError, OSError):
         while True:
             number = reduction.recv_handle(control)

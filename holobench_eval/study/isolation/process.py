@@ -14,6 +14,7 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
+import psutil
 import torch
 from pydantic import TypeAdapter, ValidationError
 
@@ -109,11 +110,17 @@ class MethodProcess:
         return {path: file_state(path) for path in (*map(Path, facts.code.paths), self.file, *beside)}
 
     def end(self) -> None:
-        """Kill the process."""
+        """Kill the process and all that it has started."""
         self.at_exit.cancel()  # it would keep this object, and its files open, until the harness ends
         if self._next is not None:
             self._next.channel.connection.close()
-        self.process.kill()  # its forks end with it
+        left = list[psutil.Process]()
+        with suppress(psutil.Error):
+            left = psutil.Process(self.process.pid).children(recursive=True)
+        self.process.kill()
+        for process in left:
+            with suppress(psutil.Error):
+                process.kill()
         self.process.join()
         self.control.connection.close()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -57,16 +57,15 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
         scores=scores_of(job, cell, capture.image, target, job.setting.metrics),
         figures=_second_scores(bench, capture, target) | {"efficiency": capture.efficiency},
         captures=solved.captures,
-        seconds=solved.cost.seconds if timed else None,
         reused=solved.reused,
         alone=solved.alone,
-        memory_mib=solved.cost.memory_mib if timed else None,
         registration_residual_px=capture.residual,
         saturated=capture.saturated,
         learned=account(job.learned(job.task.preparation)),
         stopped=solved.stopped,
         reads=solved.covered,
         uncovered=solved.uncovered,
+        **asdict(solved.cost) if timed else {},
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from torch import Tensor
 
@@ -97,14 +97,13 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
             cell,
             scores=scores_of(job, cell, image, wanted, job.setting.metrics),
             figures=further,
-            seconds=taken.seconds,
             alone=job.alone,
-            memory_mib=taken.memory_mib,
             registration_residual_px=seen.capture.residual,
             saturated=seen.capture.saturated,
             learned=account(seen.learned),
             reads={**seen.hologram.covered, **seen.reads.covered},
             uncovered=tuple({*seen.hologram.uncovered, *seen.reads.uncovered}),
+            **asdict(taken),
         )
 
     return compare

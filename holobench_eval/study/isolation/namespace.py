@@ -1,0 +1,65 @@
+"""A world of its own for the process of a method: namespaces of Linux (namespaces(7)).
+
+From within no other process can be named, and so none can be stopped, killed or written to; whatever the method starts
+ends with it. Where the system lets nobody make namespaces, ``enter`` says so, and the process keeps what its user may.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+from contextlib import suppress
+from pathlib import Path
+
+libc = ctypes.CDLL(None)
+
+CLONE_NEWNS, CLONE_NEWUSER, CLONE_NEWPID = 0x20000, 0x10000000, 0x20000000  # unshare(2)
+MS_REC, MS_PRIVATE = 0x4000, 0x40000  # mount(2)
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # prctl(2)
+
+
+def enter() -> bool:
+    """Go on as the first process of new namespaces, in a fork of this one, which waits for it and ends as it does.
+
+    False, and nothing has changed, where the system forbids it.
+    """
+    user, group = os.geteuid(), os.getegid()
+    if libc.unshare(CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNS):
+        return False
+    _map("uid_map", user)
+    Path("/proc/self/setgroups").write_text("deny")  # else who is not root may map no group, user_namespaces(7)
+    _map("gid_map", group)
+    if first := os.fork():
+        _end_as(os.waitpid(first, 0)[1])
+    end_with_parent()
+    # So that a number of /proc is one of this namespace; the mount is seen in it alone.
+    libc.mount(b"none", b"/", None, MS_REC | MS_PRIVATE, None)
+    libc.mount(b"proc", b"/proc", b"proc", 0, None)
+    return True
+
+
+def end_with_parent() -> None:
+    """Let the system kill this process when the thread that forked it ends."""
+    libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def adopt() -> None:
+    """Let the processes whose parent has ended before them become children of this one."""
+    libc.prctl(PR_SET_CHILD_SUBREAPER, 1)
+
+
+def _map(file: str, own: int) -> None:
+    """Keep the numbers of users or groups: all where this process may map them, as root may, else its own."""
+    for line in ("0 0 4294967295", f"{own} {own} 1"):
+        with suppress(OSError):
+            Path("/proc/self", file).write_text(line)
+            return
+
+
+def _end_as(status: int) -> None:
+    code = os.waitstatus_to_exitcode(status)
+    if code < 0:
+        signal.signal(-code, signal.SIG_DFL) if -code != signal.SIGKILL else None
+        os.kill(os.getpid(), -code)
+    os._exit(code)

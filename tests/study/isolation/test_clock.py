@@ -1,0 +1,134 @@
+"""What a method takes in a process of its own is measured from outside, whatever the process does about it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from holobench_eval.core.device import CPU
+from holobench_eval.study import cost, isolation
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
+
+MIB = 96
+BURNER = "import time; x = bytearray(b'1') * {mib} * 2**20; print(1, flush=True)\nwhile {more}: pass"
+METHODS = f'''
+import os, subprocess, sys, time
+from dataclasses import dataclass
+
+SECONDS = 0.3
+
+
+def burn():
+    began = time.process_time()
+    while time.process_time() - began < SECONDS:
+        pass
+
+
+@dataclass(frozen=True)
+class Plain:
+    def solve(self, target, bench):
+        return target
+
+
+class SetsPeakBack(Plain):
+    def solve(self, target, bench):
+        held = bytearray(b"1") * {MIB} * 2**20
+        time.sleep(4 * {cost.EACH})
+        del held
+        with open("/proc/self/clear_refs", "w") as file:
+            file.write("5")
+        return target
+
+
+class HasItDone(Plain):
+    """By a process that ends before it does."""
+
+    def solve(self, target, bench):
+        subprocess.run([sys.executable, "-c", {BURNER.format(mib=MIB, more="time.process_time() < 0.3")!r}])
+        return target
+
+
+class LeavesIt(Plain):
+    """To a process of another session, which goes on and on."""
+
+    def solve(self, target, bench):
+        code = {BURNER.format(mib=MIB, more=True)!r}
+        left = subprocess.Popen([sys.executable, "-c", code], start_new_session=True, stdout=subprocess.PIPE)
+        left.stdout.readline()
+        time.sleep(SECONDS)
+        with open("left.txt", "w") as file:
+            file.write(str(left.pid))
+        return target
+'''
+
+
+def taken_by(name: str, folder: Path, more: str = "") -> cost.Cost:
+    """What a class of ``METHODS`` takes in its process; more: code that its file ends with."""
+    (folder / "mine.py").write_text(METHODS + more)
+    method = isolation.build(f"mine.py:{name}", {}, folder)
+    with isolation.opened(method, CPU) as ready:
+        watch = cost.start(CPU, ready.pid)
+        method.solve(None, None)
+        return watch.stop()
+
+
+@pytest.fixture(autouse=True)
+def in_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_method_that_does_nothing_takes_next_to_nothing(tmp_path: Path) -> None:
+    taken = taken_by("Plain", tmp_path)
+    assert taken.cpu_s is not None
+    assert taken.memory_mib is not None
+    assert 0 < taken.cpu_s < 0.25
+    assert taken.memory_mib < MIB / 2
+
+
+@pytest.mark.parametrize("name", ["SetsPeakBack", "HasItDone", "LeavesIt"])
+def test_memory_is_that_of_all_its_processes_at_any_time(name: str, tmp_path: Path) -> None:
+    memory = taken_by(name, tmp_path).memory_mib
+    assert memory is not None
+    assert MIB < memory < 2 * MIB
+
+
+@pytest.mark.parametrize("name", ["HasItDone", "LeavesIt"])
+def test_processor_time_is_that_of_all_its_processes(name: str, tmp_path: Path) -> None:
+    processors = taken_by(name, tmp_path).cpu_s
+    assert processors is not None
+    assert processors > 0.2
+
+
+def test_work_before_the_call_is_on_the_clock(tmp_path: Path) -> None:
+    taken = taken_by("Plain", tmp_path, "\nos.register_at_fork(after_in_child=burn)\n")
+    assert taken.seconds > 0.3
+    assert taken.cpu_s is not None
+    assert taken.cpu_s > 0.3
+
+
+def test_what_it_leaves_at_work_ends_with_the_call(tmp_path: Path) -> None:
+    taken_by("LeavesIt", tmp_path)
+    # The process that forks the calls ends one before it begins another.
+    isolation.build("mine.py:Plain", {}, tmp_path)
+    number = (tmp_path / "left.txt").read_text()
+    assert not Path(f"/proc/{number}").exists()
+
+
+def test_processes_that_start_with_its_import_are_refused(tmp_path: Path) -> None:
+    start = f"\nsubprocess.Popen([sys.executable, '-c', {BURNER.format(mib=1, more=True)!r}])\n"
+    with pytest.raises(Exception, match="starts processes while its file is imported; start them in solve or prepare"):
+        taken_by("Plain", tmp_path, start)
+    assert not [each for each in psutil.Process().children(recursive=True) if "bytearray" in " ".join(each.cmdline())]
+
+
+def test_of_this_process_all_its_processors_count() -> None:
+    watch = cost.start()
+    subprocess.run([sys.executable, "-c", "import time\nwhile time.process_time() < 0.3: pass"], check=True)
+    taken = watch.stop()
+    assert taken.cpu_s is not None
+    assert taken.cpu_s > 0.25
