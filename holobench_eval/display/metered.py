@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -108,6 +109,7 @@ class MeteredDisplay:
         self._starts = tuple(starts)
         self._kept: Tensor | None = None
         self._over = ""
+        self._frames = set[str]()
 
     @property
     def spec(self) -> DisplaySpec:
@@ -206,7 +208,9 @@ class MeteredDisplay:
         except BudgetError as error:
             self._over = str(error)
             raise
-        return camera.capture(phase)
+        capture = camera.capture(phase)
+        self._frames.add(_digest(capture))
+        return capture
 
     def announce(self, phases: Sequence[Tensor]) -> None:
         """Tell the display which phases ``(C, H, W)`` [rad] are captured next, in that order, whatever they show.
@@ -236,8 +240,18 @@ class MeteredDisplay:
         self._kept = hologram.detach().cpu().clone()
 
     def rectify(self, capture: Capture) -> Tensor:
-        """A capture in the target's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency."""
+        """A capture in the target's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency.
+
+        CellError for any other frame than ``capture`` has given: it would show where the camera stands, uncounted.
+        """
+        if _digest(capture) not in self._frames:
+            raise CellError(f"{self._label}: rectify takes a frame as capture returned it; change it afterwards")
         return self._display.rectified(capture, self._target)
+
+
+def _digest(capture: Capture) -> str:
+    numbers = repr((capture.dark, capture.white, capture.gain)).encode()
+    return hashlib.sha256(numbers + capture.frame.detach().cpu().numpy().tobytes()).hexdigest()
 
 
 class MethodHandles:

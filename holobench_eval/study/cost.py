@@ -20,7 +20,7 @@ import os
 import platform
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -36,6 +36,7 @@ from ..core.hashing import digest
 from ..core.installed import __version__
 from ..core.io import write_atomically
 from .definition import Study
+from .executors.processes import children
 from .plan import Plan, Task
 
 PROCESS = Path("/proc/self")
@@ -162,15 +163,9 @@ def _started(process: int) -> list[int]:
     """Numbers of the processes that a method's process has started; the one it was forked from adopts their orphans."""
     numbers, todo = list[int](), [_status("PPid", process) or process]
     while todo:
-        todo = [int(child) for number in todo for child in _children(number)]
+        todo = [child for number in todo for child in children(number)]
         numbers += todo
     return [number for number in numbers if number != process]
-
-
-def _children(process: int) -> Iterator[str]:
-    for file in _process(process).glob("task/*/children"):
-        with suppress(OSError):
-            yield from file.read_text().split()
 
 
 def _collect() -> None:

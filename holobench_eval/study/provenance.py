@@ -37,9 +37,8 @@ def describe(
     """Everything about the present run that is not in its config: versions, revision, machine, displays, command.
 
     device: as requested; gpu: its name, empty for a CPU or an unknown GPU. load: processes that wanted a core in the
-    minute before, on average. ``imports_s``: see ``isolation.imports``.
+    minute before, on average.
     """
-    imports = isolation.imports((entry.name for entry in study.methods), study.folder)
     return {
         **revision(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
@@ -52,7 +51,7 @@ def describe(
         "threads": threads,
         "workers": workers,
         **({"load": round(os.getloadavg()[0], 2)} if hasattr(os, "getloadavg") else {}),  # not on Windows
-        **({"imports_s": imports} if imports else {}),
+        **isolation.measured((entry.name for entry in study.methods), study.folder),
     }
 
 

@@ -10,12 +10,15 @@ from __future__ import annotations
 import builtins
 import copy
 import ctypes
+import dataclasses
 import gc
 import os
 import pickle
 import random
 import resource
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -304,6 +307,17 @@ class IgnoresTheEnd(Photographer):
 
 
 @dataclass(frozen=True)
+class RectifiesAForgedFrame(Photographer):
+    """Which would show where the camera stands, without a capture."""
+
+    outcome, reason = "refused", "as capture returned it"
+
+    def cheat(self, target, bench):
+        capture = bench.capture(self.phase(target, bench)[0])
+        bench.rectify(dataclasses.replace(capture, frame=torch.eye(*capture.frame.shape[1:]).expand_as(capture.frame)))
+
+
+@dataclass(frozen=True)
 class RaisesItsBudget(Photographer):
     def cheat(self, target, bench):
         bench.budget = 10**6
@@ -356,6 +370,180 @@ class FinishesInAThread(Attempt):
         phase = super().phase(target, bench)
         threading.Thread(target=lambda: (time.sleep(0.3), phase.fill_(1.0)), daemon=True).start()
         return phase
+
+
+@dataclass(frozen=True)
+class SetsItsPeakBack(Attempt):
+    kind = "lies about time"
+    mib: ClassVar[int] = 150
+
+    def cheat(self, target, bench):
+        held = bytearray(b"1") * self.mib * 2**20
+        time.sleep(0.3)
+        del held
+        with suppress(OSError):
+            Path("/proc/self/clear_refs").write_text("5")
+
+
+BURNS = "import time\nheld = bytearray(b'1') * 150 * 2**20\nprint(1, flush=True)\nwhile time.process_time() < {}: pass"
+
+
+@dataclass(frozen=True)
+class HasAnotherWork(Attempt):
+    kind = "lies about time"
+    mib: ClassVar[int] = 150
+    cpu: ClassVar[float] = 0.4
+
+    def cheat(self, target, bench):
+        subprocess.run([sys.executable, "-c", BURNS.format(0.4)], stdout=subprocess.DEVNULL, check=True)
+
+
+@dataclass(frozen=True)
+class LeavesAnotherAtWork(Attempt):
+    """Of a session of its own, so that it might go on beside the methods that are timed after it."""
+
+    kind = "lies about time"
+    mib: ClassVar[int] = 150
+    cpu: ClassVar[float] = 0.3
+
+    def cheat(self, target, bench):
+        command = [sys.executable, "-c", BURNS.format(1e9)]
+        left = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
+        left.stdout.readline()
+        time.sleep(1.0)
+
+
+@dataclass(frozen=True)
+class LeavesAnOrphanAtWork(Attempt):
+    """Whose parent has ended, so that no tree of processes has it below this one."""
+
+    kind = "lies about time"
+    cpu: ClassVar[float] = 0.3
+
+    def cheat(self, target, bench):
+        if (child := os.fork()) == 0:
+            os.setsid()
+            if os.fork() == 0:
+                while True:
+                    pass
+            os._exit(0)
+        os.waitpid(child, 0)
+        time.sleep(1.0)
+
+
+# --- reaches the process that scores
+
+
+def outside():
+    """Numbers of processes that are neither this one nor its own: by the pipes' other ends, ancestors, and /proc."""
+    numbers = {os.getppid()}
+    for number in range(3, 256):
+        with suppress(OSError), socket.socket(fileno=os.dup(number)) as end:
+            numbers.add(struct.unpack("3i", end.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[0])
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit():
+            with suppress(OSError):
+                command = (folder / "cmdline").read_bytes()
+                numbers |= {int(folder.name)} if b"python" in command or b"holoeval" in command else set()
+    return numbers - {0, os.getpid()}
+
+
+class Reaching(Attempt):
+    """Only from a namespace of its own, whose first process has forked it: without one it would really reach others."""
+
+    kind = "reaches the process that scores"
+
+    def solve(self, target, bench):
+        return super().solve(target, bench) if os.getppid() == 1 else self.phase(target, bench)
+
+
+@dataclass(frozen=True)
+class StopsTheScorer(Reaching):
+    def cheat(self, target, bench):
+        for number in outside():
+            with suppress(OSError):
+                os.kill(number, signal.SIGSTOP)
+
+
+@dataclass(frozen=True)
+class InterruptsTheScorer(Reaching):
+    def cheat(self, target, bench):
+        for number in outside():
+            with suppress(OSError):
+                os.kill(number, signal.SIGINT)
+
+
+@dataclass(frozen=True)
+class KillsTheScorer(Reaching):
+    def cheat(self, target, bench):
+        for number in outside():
+            with suppress(OSError):
+                os.kill(number, signal.SIGKILL)
+
+
+@dataclass(frozen=True)
+class StopsAllThereIs(Reaching):
+    def cheat(self, target, bench):
+        with suppress(OSError):
+            os.kill(-1, signal.SIGSTOP)
+
+
+@dataclass(frozen=True)
+class StopsTheGroupOfTheScorer(Reaching):
+    def cheat(self, target, bench):
+        for number in outside():
+            with suppress(OSError):
+                if (group := os.getpgid(number)) > 1:
+                    os.killpg(group, signal.SIGSTOP)
+
+
+@dataclass(frozen=True)
+class WritesIntoTheScorer(Reaching):
+    """Zeros in the place of its target, wherever that lies in memory."""
+
+    def cheat(self, target, bench):
+        sought = target[0, 0, 0, :16].contiguous().numpy().tobytes()
+        for number in outside() - {os.getppid()}:
+            with suppress(OSError), Path(f"/proc/{number}/mem").open("r+b", buffering=0) as memory:
+                for line in Path(f"/proc/{number}/maps").read_text().splitlines():
+                    first, last = (int(part, 16) for part in line.split()[0].split("-"))
+                    if "rw" in line.split()[1] and last - first < 2**28:
+                        with suppress(OSError, OverflowError):
+                            memory.seek(first)
+                            if (place := memory.read(last - first).find(sought)) >= 0:
+                                memory.seek(first + place)
+                                memory.write(bytes(len(sought)))
+
+
+@dataclass(frozen=True)
+class AttachesToTheScorer(Reaching):
+    def cheat(self, target, bench):
+        for number in outside() - {os.getppid()}:
+            assert ctypes.CDLL(None).ptrace(16, number, None, None) == -1
+
+
+@dataclass(frozen=True)
+class StopsTheScorerFromAnotherProgram(Reaching):
+    def cheat(self, target, bench):
+        with suppress(OSError):
+            subprocess.run(["pkill", "-STOP", "-f", "pytest|holoeval"], check=False)
+
+
+@dataclass(frozen=True)
+class LimitsTheScorer(Reaching):
+    def cheat(self, target, bench):
+        for number in outside() - {os.getppid()}:
+            with suppress(OSError):
+                resource.prlimit(number, resource.RLIMIT_CPU, (1, 1))
+
+
+@dataclass(frozen=True)
+class SlowsTheScorer(Reaching):
+    def cheat(self, target, bench):
+        for number in outside() - {os.getppid()}:
+            with suppress(OSError):
+                os.sched_setaffinity(number, {0})
+                os.setpriority(os.PRIO_PROCESS, number, 19)
 
 
 # --- keeps state

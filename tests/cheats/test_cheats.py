@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -76,6 +77,8 @@ def check(name: str, found: list[Any], honest: list[Any]) -> None:
             assert record["state"] == "done", record["reason"]
             assert record["captures"] in (0, 2) if getattr(attempt, "camera", False) else record["captures"] == 0
             assert record["seconds"] > (0.4 if getattr(attempt, "slow", False) else 0.0)
+            assert (record["memory_mib"] or math.inf) > getattr(attempt, "mib", 0)
+            assert (record["cpu_s"] or math.inf) > getattr(attempt, "cpu", 0)
     if attempt.outcome == "impossible":
         assert digits(found) == digits(honest)
 

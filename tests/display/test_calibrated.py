@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -45,6 +47,16 @@ def test_captures_are_counted_and_stop_at_the_budget(bench, target):
     with pytest.raises(BudgetError, match="used its 2 captures"):
         handle.capture(torch.zeros(3, *PANEL))
     assert handle.captures == 2
+
+
+def test_only_frames_that_were_captured_are_rectified(bench, target):
+    handle = bench.for_method(Camera(), "camera", target, "t", 0)
+    capture = handle.capture(torch.zeros(3, *PANEL))
+    for forged in (replace(capture, frame=capture.frame + 1), replace(capture, dark=capture.dark - 1)):
+        with pytest.raises(CellError, match="camera: rectify takes a frame as capture returned it"):
+            handle.rectify(forged)
+    assert handle.rectify(replace(capture)).shape == target.shape
+    assert handle.captures == 1
 
 
 def test_only_privileged_methods_see_the_simulation(bench, target):

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from multiprocessing import forkserver, get_all_start_methods, get_context, resource_tracker
 from multiprocessing.process import BaseProcess, current_process
+from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 J = TypeVar("J")  # a job
@@ -25,8 +28,19 @@ def start(function: Callable[..., None], *arguments: Any) -> BaseProcess:
     current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     process = CONTEXT.Process(target=function, args=arguments, daemon=True)
     prepare()
-    process.start()
+    with _without_main():
+        process.start()
     return process
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Else the process would begin with the user's script, which may have no ``if __name__ == "__main__"``."""
+    main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def prepare() -> None:
@@ -43,3 +57,20 @@ def prepare() -> None:
             forkserver.ensure_running()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def children(number: int) -> list[int]:
+    """Numbers of the processes that a process has started, in ``/proc``; none elsewhere."""
+    listed = list[int]()
+    for file in Path(f"/proc/{number}").glob("task/*/children"):
+        with suppress(OSError):
+            listed += map(int, file.read_text().split())
+    return listed
+
+
+def number_within(number: int) -> int:
+    """The number that a process has for itself in its namespace, 0 where it has ended."""
+    with suppress(OSError, StopIteration):
+        lines = Path(f"/proc/{number}/status").read_text().splitlines()
+        return int(next(line for line in lines if line.startswith("NSpid:")).split()[-1])
+    return 0

@@ -157,10 +157,15 @@ def solver(name: str, params: Mapping[str, Any], folder: Path, isolation: Isolat
     return _apart(name, folder)(params, limits)
 
 
-def imports(names: Iterable[str], folder: Path) -> dict[str, float]:
-    """Seconds that the import of methods that do not ship with the package took, outside the clock of their cells."""
+def measured(names: Iterable[str], folder: Path) -> dict[str, Any]:
+    """For the provenance, of methods that do not ship with the package: the seconds that their import took, outside the
+    clock of their cells, and whether each has namespaces of its own (``namespace.enter``). Empty without such."""
     users = [name for name in dict.fromkeys(names) if not plugins.is_shipped("methods", name)]
-    return {name: round(process.process_of(name, folder).facts.seconds, 2) for name in users}
+    facts = {name: process.process_of(name, folder).facts for name in users}
+    if not facts:
+        return {}
+    seconds = {name: round(told.seconds, 2) for name, told in facts.items()}
+    return {"imports_s": seconds, "methods_enclosed": all(told.enclosed for told in facts.values())}
 
 
 def runs_inside(name: str, folder: Path, isolation: Isolation) -> bool:

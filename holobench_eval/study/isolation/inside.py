@@ -5,7 +5,6 @@ So no call begins with what an earlier one left in memory, and one that ends its
 
 from __future__ import annotations
 
-import ctypes
 import inspect
 import os
 import signal
@@ -36,14 +35,13 @@ from ...core.reads import PACKAGE, recorded
 from ...core.schema import FieldError
 from ...display.api import from_numpy
 from ...display.traits import FLAGS, traits_of
+from . import namespace
 from .handles import SolvingHandle, TrainingHandle
 from .messages import Channel
 
 # The bench and the harness.
 HIDDEN = tuple(f"{PACKAGE}.{part}" for part in ("display.simulated", "study", "lab", "report", "commands", "testing"))
 HANDLES = {"MeteredDisplay": SolvingHandle, "TrainingBench": TrainingHandle}
-
-PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # prctl(2): die with the parent; get what descendants leave
 
 
 def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
@@ -53,8 +51,8 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     torch.set_num_threads(1)
     cv2.setNumThreads(1)  # it looks for libraries when it is first called, which is here once for all calls
     current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # else a method could start no process
-    libc, channel = ctypes.CDLL(None), Channel(control)
-    libc.prctl(PR_SET_CHILD_SUBREAPER, 1)
+    channel, enclosed = Channel(control), namespace.enter()
+    namespace.adopt()
     began = time.perf_counter()
     try:
         cls, refused = _imported(name, folder)
@@ -69,6 +67,7 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
             "refused": refused,
             "code": code and asdict(code),
             "seconds": time.perf_counter() - began,
+            "enclosed": enclosed,
         }
         channel.send(facts)
     except (UserError, CellError) as error:
@@ -81,7 +80,7 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
             number = reduction.recv_handle(control)
             child = os.fork()
             if child == 0:
-                libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+                namespace.end_with_parent()
                 control.close()
                 os.setsid()
                 with suppress(EOFError, ConnectionError):  # one that was forked and is not needed
@@ -94,7 +93,7 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
             watched = os.pidfd_open(child)
             wait([control, watched])
             os.close(watched)
-            status = _ended(child)
+            status = _ended(child, enclosed)
             with suppress(EOFError, OSError):
                 channel.receive()
             channel.send(status)
@@ -113,7 +112,7 @@ def _imported(name: str, folder: Path) -> tuple[type[Any], str]:
         refused = refusal.refused
         sys.meta_path.remove(refusal)  # to see what it declares; it cannot run here
         cls = plugins.find("methods", name, folder)
-    started = "threads" if _threads() > threads else "processes" if psutil.Process().children() else ""
+    started = "threads" if _threads() > threads else "processes" if _has_started() else ""
     if started:
         raise UserError(f"method '{name}' starts {started} while its file is imported; start them in solve or prepare")
     if plugins.is_file(name):
@@ -131,14 +130,31 @@ def _flush() -> None:
             stream.flush()
 
 
-def _ended(child: int) -> int:
-    """End a process and all that it has started, in whichever group; its exit code, or less than 0 the signal."""
+def _ended(child: int, enclosed: bool) -> int:
+    """End a process and all that it has started, in whichever group; its exit code, or less than 0 the signal.
+
+    enclosed: whether this process is the first of a namespace, in which no other is left then.
+    """
     statuses = dict[int, int]()
-    while numbers := [process.pid for process in psutil.Process().children()]:  # whose own then come to this one
+    while True:
+        numbers = [-1] if enclosed else [process.pid for process in psutil.Process().children()]
         for number in numbers:
-            os.kill(number, signal.SIGKILL)
-        statuses |= {number: os.waitpid(number, 0)[1] for number in numbers}
-    return os.waitstatus_to_exitcode(statuses[child])
+            with suppress(ProcessLookupError):
+                os.kill(number, signal.SIGKILL)
+        try:
+            number, status = os.waitpid(-1, 0)  # whose own processes then come to this one
+        except ChildProcessError:
+            return os.waitstatus_to_exitcode(statuses[child])
+        statuses[number] = status
+
+
+def _has_started() -> bool:
+    """Whether a process that this one has started is at work."""
+    with suppress(ChildProcessError):
+        while True:
+            if os.waitpid(-1, os.WNOHANG)[0] == 0:
+                return True
+    return False
 
 
 def _hide() -> _Refusal:

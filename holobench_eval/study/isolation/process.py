@@ -27,7 +27,7 @@ from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
 from ...display.traits import Function
 from ..definition import Limits
-from ..executors.processes import CONTEXT, start
+from ..executors.processes import CONTEXT, children, number_within, start
 from .handles import answer, known
 from .inside import serve
 from .messages import Channel, GarbledError
@@ -44,7 +44,7 @@ class Facts:
     """What a process tells of its method: see ``inside.serve``.
 
     flags: what its class declares, among anything else; refused: what its file imports that is hidden from methods;
-    code: None for a method of this package; seconds: that its import took.
+    code: None for a method of this package; seconds: that its import took; enclosed: see ``namespace.enter``.
     """
 
     name: str
@@ -54,6 +54,7 @@ class Facts:
     refused: str
     code: Code | None
     seconds: float
+    enclosed: bool
 
 
 FACTS: TypeAdapter[Facts | str] = TypeAdapter(Facts | str)  # a text says why the method cannot be imported
@@ -132,7 +133,7 @@ class MethodProcess:
         CellError where it ends by itself, sends what is no answer, or reaches a limit.
         """
         setting = {"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib}
-        late, pid, channel = threading.Event(), 0, None
+        late, channel = threading.Event(), None
         failure: Exception | None = None
 
         def stop() -> None:
@@ -158,7 +159,7 @@ class MethodProcess:
             timer.cancel()
             if channel is not None:
                 channel.connection.close()
-            ending = "" if self._next else self._ending(pid)
+            ending = "" if self._next else self._ending()
         if late.is_set():
             raise CellError(f"took more than {limits.seconds:g} s, the limit of the study")
         what = "sent what is no answer" if isinstance(failure, GarbledError) else ending
@@ -170,7 +171,7 @@ class MethodProcess:
         if self._ends:
             self._told()
             self._ends = False
-        pid = self._told()
+        pid = self._number(self._told())
         if fork.setting == setting:
             return pid, fork.channel
         fork.channel.connection.close()
@@ -190,6 +191,12 @@ class MethodProcess:
         self.control.send("end")
         self._ends = True
 
+    def _number(self, within: int) -> int:
+        """The number here of a process that it has forked, which has another one within; 0 for one that has ended."""
+        outer = int(self.process.pid or 0)
+        numbers = (number for parent in (outer, *children(outer)) for number in children(parent))
+        return next((number for number in numbers if number_within(number) == within), 0)
+
     def _told(self) -> int:
         """A number that the process tells. EOFError where it does not in time, which ends it."""
         if not self.control.connection.poll(ANSWER_LIMIT):
@@ -197,16 +204,13 @@ class MethodProcess:
             raise EOFError
         return int(self.control.receive())
 
-    def _ending(self, pid: int) -> str:
-        """End a call, and say how it ended by itself. pid: 0 for one that has not begun."""
+    def _ending(self) -> str:
+        """End a call, and say how it ended by itself."""
         try:
             self._end_call()
             status, self._ends = self._told(), False
         except (EOFError, OSError, GarbledError):
             self.end()
-            if pid:
-                with suppress(OSError):
-                    os.killpg(pid, signal.SIGKILL)
             return "has ended the process that it came from"
         return f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with exit code {status}"
 

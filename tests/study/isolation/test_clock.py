@@ -58,11 +58,9 @@ class LeavesIt(Plain):
 
     def solve(self, target, bench):
         code = {BURNER.format(mib=MIB, more=True)!r}
-        left = subprocess.Popen([sys.executable, "-c", code], start_new_session=True, stdout=subprocess.PIPE)
-        left.stdout.readline()
+        mine = [sys.executable, "-c", code, os.getcwd()]
+        subprocess.Popen(mine, start_new_session=True, stdout=subprocess.PIPE).stdout.readline()
         time.sleep(SECONDS)
-        with open("left.txt", "w") as file:
-            file.write(str(left.pid))
         return target
 '''
 
@@ -75,6 +73,11 @@ def taken_by(name: str, folder: Path, more: str = "") -> cost.Cost:
         watch = cost.start(CPU, ready.pid)
         method.solve(None, None)
         return watch.stop()
+
+
+def at_work(folder: Path) -> list[psutil.Process]:
+    """Processes that were started with the name of a folder."""
+    return [process for process in psutil.process_iter(["cmdline"]) if str(folder) in (process.info["cmdline"] or ())]
 
 
 @pytest.fixture(autouse=True)
@@ -115,15 +118,14 @@ def test_what_it_leaves_at_work_ends_with_the_call(tmp_path: Path) -> None:
     taken_by("LeavesIt", tmp_path)
     # The process that forks the calls ends one before it begins another.
     isolation.build("mine.py:Plain", {}, tmp_path)
-    number = (tmp_path / "left.txt").read_text()
-    assert not Path(f"/proc/{number}").exists()
+    assert not at_work(tmp_path)
 
 
 def test_processes_that_start_with_its_import_are_refused(tmp_path: Path) -> None:
-    start = f"\nsubprocess.Popen([sys.executable, '-c', {BURNER.format(mib=1, more=True)!r}])\n"
+    start = f"\nsubprocess.Popen([sys.executable, '-c', {BURNER.format(mib=1, more=True)!r}, os.getcwd()])\n"
     with pytest.raises(Exception, match="starts processes while its file is imported; start them in solve or prepare"):
         taken_by("Plain", tmp_path, start)
-    assert not [each for each in psutil.Process().children(recursive=True) if "bytearray" in " ".join(each.cmdline())]
+    assert not at_work(tmp_path)
 
 
 def test_of_this_process_all_its_processors_count() -> None:
