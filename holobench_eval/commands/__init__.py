@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from .. import __version__
-from ..core.errors import UserError, out_of_memory
+from ..core.errors import UserError, one_line, out_of_memory
 
 # By purpose and in the order of work, as the help lists them. Each is a file in this folder; its last name is that of
 # the function, or group of functions, in it.
@@ -132,7 +132,7 @@ def main() -> None:
     try:
         app()
     except (UserError, OSError) as error:
-        print(f"holoeval: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"holoeval: {one_line(str(error))}", file=sys.stderr)
         sys.exit(2)
     except (MemoryError, RuntimeError) as error:
         if not out_of_memory(error):

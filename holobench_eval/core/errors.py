@@ -49,8 +49,12 @@ def reason(error: BaseException) -> str:
     """
     own = isinstance(error, UserError | CellError) and not isinstance(error, ForeignError)
     text = str(error) if own else f"{type(error).__name__}: {error}"
-    text = text.encode("utf-8", "backslashreplace").decode()  # names of files
-    return " ".join(text.split())[:300] or "no reason given"
+    return one_line(text.encode("utf-8", "backslashreplace").decode())[:300] or "no reason given"  # names of files
+
+
+def one_line(text: str) -> str:
+    """A text in one line, with question marks in the place of signs that a terminal would obey."""
+    return "".join(sign if sign.isprintable() else "?" for sign in " ".join(text.split()))
 
 
 def out_of_memory(error: BaseException) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
@@ -42,16 +43,28 @@ FLAGS = tuple(item.name for item in fields(Traits) if item.name not in ("timed",
 """What any method may declare; only one that ships may say that it is not timed."""
 BOOLEANS = tuple(item.name for item in fields(Traits) if isinstance(item.default, bool) and item.name in FLAGS)
 
+WANTED = {"form": "a set of text", "tuned": "text in one line", "version": "a whole number from 0 up"}
+
+
+def _is_flag(flag: str, value: object) -> bool:
+    if flag == "version":
+        return type(value) is int and value >= 0
+    if flag == "tuned":
+        return value is None or (isinstance(value, str) and value.isprintable())
+    if flag == "form":
+        return value is None or (isinstance(value, Collection) and all(isinstance(each, str) for each in value))
+    return isinstance(value, bool)
+
 
 def traits_of(method: object, name: str = "") -> Traits:
     """The traits of a method, given as its class or as an object of it.
 
-    name: its name in messages, by default that of its class. UserError where a flag is neither True nor False.
+    name: its name in messages, by default that of its class. UserError where a flag is not what it has to be.
     """
     declared: dict[str, Any] = {item.name: getattr(method, item.name, item.default) for item in fields(Traits)}
-    for flag in BOOLEANS:
-        if not isinstance(declared[flag], bool):
-            cls = method if isinstance(method, type) else type(method)
-            raise UserError(f"method '{name or cls.__name__}': {flag} should be True or False")
+    for flag, value in declared.items():
+        if flag in FLAGS and not _is_flag(flag, value):
+            cls, wanted = method if isinstance(method, type) else type(method), WANTED.get(flag, "True or False")
+            raise UserError(f"method '{name or cls.__name__}': {flag} should be {wanted}")
     has = frozenset(function for function in FUNCTIONS if callable(getattr(method, function, None)))
     return Traits(**declared | {"functions": has})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -12,6 +13,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
+# Set while that process starts, so that it takes no file of the working directory, such as random.py, for a module.
+SAFE_PATH, OURS = "PYTHONSAFEPATH", "holobench_eval"
 J = TypeVar("J")  # a job
 R = TypeVar("R")  # its result
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -51,12 +54,15 @@ def prepare() -> None:
         server.ensure_running = lambda: None
     elif FORKS:
         CONTEXT.set_forkserver_preload(PRELOADED)
+        own = os.environ.setdefault(SAFE_PATH, OURS)
         resource_tracker.ensure_running()  # now, since it lets Ctrl-C through as it starts
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # never seen there, not even in its imports
         try:
             forkserver.ensure_running()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            if own == OURS:
+                del os.environ[SAFE_PATH]
 
 
 def children(number: int) -> list[int]:

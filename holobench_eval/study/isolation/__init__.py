@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import torch
-from pydantic import TypeAdapter, ValidationError
 
 from ...core import parameters, plugins, sources
 from ...core.device import CPU
@@ -109,6 +108,8 @@ def _apart(name: str, folder: Path) -> type[Apart]:
     calls: dict[str, Any] = {function: partialmethod(Apart._call, function) for function in facts.functions}
     flags = {flag: value for flag, value in facts.flags.items() if flag in FLAGS}  # the process may say anything
     identity = {"file": name, "folder": folder, "__doc__": facts.doc, "refused": facts.refused}
+    if not {"solve", "predict"} & set(facts.functions):
+        raise UserError(f"method '{name}' has neither solve nor predict")
     cls = type(facts.name, (Apart,), {**flags, **calls, **identity})
     traits_of(cls, name)  # UserError for a flag that is neither True nor False
     if facts.code is not None:
@@ -140,9 +141,10 @@ def words(name: str, folder: Path) -> parameters.Words:
     if not issubclass(cls, Apart):
         return parameters.words(cls)
     try:
-        return TypeAdapter(parameters.Words).validate_python(cls({})._call("words"))
-    except (CellError, ValidationError) as error:
+        told: parameters.Words = cls({})._call("words")
+    except CellError as error:
         raise UserError(f"method '{name}' does not tell what it is: {error}") from error
+    return told
 
 
 def params_of(method: Any) -> dict[str, Any]:

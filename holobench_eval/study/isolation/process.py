@@ -12,14 +12,17 @@ from dataclasses import dataclass
 from multiprocessing import reduction, util
 from multiprocessing.connection import wait
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import psutil
 import torch
-from pydantic import TypeAdapter, ValidationError
+from annotated_types import Interval
+from pydantic import AfterValidator, StringConstraints, TypeAdapter, ValidationError
 
+from ...core import parameters
 from ...core.errors import BudgetError, CellError, ForeignError, UserError
-from ...core.hashing import State, file_state
+from ...core.hashing import State, file_digest, file_state
+from ...core.plugins import is_file
 from ...core.reads import Seen
 from ...core.schema import FieldError
 from ...core.sources import Code
@@ -34,9 +37,21 @@ from .messages import Channel, GarbledError
 
 KEPT = 32  # processes of methods that stay when they have nothing to do
 IMPORT_LIMIT = 600.0  # seconds that the import of a method's file may take
+MOST_PROCESSES = 2**22  # of Linux, proc(5), pid_max
 ANSWER_LIMIT = 10.0  # seconds in which the process that has imported it answers
 ERRORS = {cls.__name__: cls for cls in (UserError, CellError, BudgetError)}
 Handle = MeteredDisplay | TrainingBench
+
+
+def _shown(text: str) -> str:
+    """A text that a terminal and a file can take."""
+    if not all(character.isprintable() or character in "\n\t" for character in text):
+        raise ValueError("characters that cannot be shown")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_shown), StringConstraints(max_length=20_000)]
+Name = Annotated[Text, StringConstraints(min_length=1, max_length=200)]
 
 
 @dataclass(frozen=True)
@@ -47,18 +62,25 @@ class Facts:
     code: None for a method of this package; seconds: that its import took; enclosed: see ``namespace.enter``.
     """
 
-    name: str
-    doc: str
+    name: Name
+    doc: Text
     flags: dict[str, Any]
     functions: list[Function]
-    refused: str
+    refused: Text
     code: Code | None
-    seconds: float
+    seconds: Annotated[float, Interval(ge=0, le=IMPORT_LIMIT)]
     enclosed: bool
 
 
-FACTS: TypeAdapter[Facts | str] = TypeAdapter(Facts | str)  # a text says why the method cannot be imported
+FACTS: TypeAdapter[Facts | Text] = TypeAdapter(Facts | Text)  # a text says why the method cannot be imported
 SEEN = TypeAdapter(Seen)
+RESULTS: dict[str, TypeAdapter[Any]] = {  # of functions that a method has beside those that compute
+    "params": TypeAdapter(dict[Text, Any]),
+    "words": TypeAdapter(parameters.Words),
+    "available": TypeAdapter(Text | None),
+    "files": TypeAdapter(list[Text]),
+    "external": TypeAdapter(dict[Text, Text | None]),
+}
 
 
 @dataclass(frozen=True)
@@ -98,7 +120,20 @@ class MethodProcess:
         if isinstance(facts, str):
             self.end()
             raise UserError(facts)
+        if not self._is_told_truly(facts.code):
+            self.end()
+            raise UserError(f"method '{name}': its process does not say which files its code is; run the command again")
         self.facts, self.states = facts, self._states(facts)
+
+    def _is_told_truly(self, code: Code | None) -> bool:
+        """Whether the code can be that of the file, where one is named: what the file does while it is imported could
+        make the process hide an edit."""
+        if code is None:
+            return not is_file(self.key[0])
+        if is_file(self.key[0]) and file_digest(self.file) not in code.files.values():
+            return False
+        texts = (code.name, code.folder, *code.files, *code.files.values(), *code.bases, *code.uncovered)
+        return all(map(str.isprintable, texts)) and Path(code.folder).is_dir()
 
     def is_current(self) -> bool:
         """Whether it lives, and its code, with the Python files beside it, is still what it has imported."""
@@ -202,7 +237,10 @@ class MethodProcess:
         if not self.control.connection.poll(ANSWER_LIMIT):
             self.end()
             raise EOFError
-        return int(self.control.receive())
+        number = self.control.receive()
+        if type(number) is not int or abs(number) > MOST_PROCESSES:
+            raise GarbledError("no number of a process, nor a status")
+        return number
 
     def _ending(self) -> str:
         """End a call, and say how it ended by itself."""
@@ -212,7 +250,9 @@ class MethodProcess:
         except (EOFError, OSError, GarbledError):
             self.end()
             return "has ended the process that it came from"
-        return f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with exit code {status}"
+        if -status in signal.valid_signals():
+            return f"was ended by {signal.Signals(-status).name}"
+        return f"ended with exit code {status}"
 
 
 def call(channel: Channel, seen: Seen, function: str, params: dict[str, Any], args: Sequence[Any]) -> Any:
@@ -239,7 +279,13 @@ def call(channel: Channel, seen: Seen, function: str, params: dict[str, Any], ar
         raise GarbledError(f"no reads: {error}") from None
     if "result" not in got:
         raise _raised(got)
-    return got["result"]
+    result = got["result"]
+    try:
+        return RESULTS[function].validate_python(result) if function in RESULTS else result
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = "".join(f"[{part!r}]" for part in first["loc"])
+        raise CellError(f"what {function} returned{where}: {first['msg'].lower()}") from None
 
 
 def _raised(told: dict[str, Any]) -> Exception:

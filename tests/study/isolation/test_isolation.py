@@ -437,3 +437,17 @@ def test_methods_that_have_ended_keep_no_files_open(tmp_path: Path, monkeypatch:
     for kept in process._processes:
         kept.end()
     assert counts[-1] == counts[3]
+
+
+def test_a_plain_script_runs_in_a_folder_with_files_named_like_modules(tmp_path: Path) -> None:
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work/random.py").write_text("def Mine(target, bench):\n    return target\n")
+    (tmp_path / "work/tempfile.py").write_text("import os\nos.abort()\n")
+    script = "from pathlib import Path\nfrom holobench_eval.study import isolation\n"
+    script += (
+        "import os\nassert 'PYTHONSAFEPATH' not in os.environ\nprint(isolation.find('random.py:Mine', Path('.')))\n"
+    )
+    (tmp_path / "script.py").write_text(script)  # without ``if __name__ == "__main__"``
+    command = [sys.executable, "../script.py"]
+    done = subprocess.run(command, cwd=tmp_path / "work", timeout=60, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.count("Mine")) == (0, 1), done.stderr

@@ -1,0 +1,133 @@
+"""What a method's process says of itself, right or wrong, is taken or refused in one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holobench_eval.core.device import CPU
+from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.study import isolation
+from holobench_eval.study.definition import Limits
+from holobench_eval.study.isolation import read_files
+from holobench_eval.study.isolation.messages import Channel
+from holobench_eval.study.versions import method_version
+
+METHOD = """
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mine:
+    level: float = 1.0
+
+    def solve(self, target, bench):
+        return target
+
+    def available(self):
+        return None
+
+    def files(self, target):
+        return []
+
+    def external(self):
+        return {}
+"""
+NUL, ESCAPE, HALF = "\0", "\x1b[31m", "\ud800"  # no text for a system, for a terminal, for a file
+FACTS: dict[str, list[Any]] = {
+    "name": [NUL, "", 3, "x" * 10**6, HALF, ESCAPE],
+    "doc": [ESCAPE, None, HALF],
+    "flags": [[], {"camera": "yes"}, {"version": "x"}, {"version": -1}, {"tuned": 3}, {"tuned": ESCAPE}, {"form": 3}],
+    "functions": [["__init__"], [], ["available"], None],
+    "refused": [3, ESCAPE],
+    "code": [None, {}],
+    "seconds": [math.nan, -1.0, math.inf, "x"],
+    "enclosed": [None, 3],
+}
+CODE: dict[str, list[Any]] = {
+    "name": [NUL],
+    "files": [{NUL: "0"}, {"../../../etc/passwd": "0"}, {}, {"mine.py": 3}],
+    "folder": [NUL, "/nowhere"],
+    "bases": [[3], [ESCAPE]],
+    "uncovered": [[NUL]],
+}
+RESULTS: dict[str, list[Any]] = {
+    "params": [3, None, {"level": math.nan}, {1: 2}, {"level": {}}, {HALF: 1}],
+    "words": [3, None, [], {}],
+    "available": [3, [], ESCAPE],
+    "files": [3, [3], ["\0"], "abc", [HALF]],
+    "external": [3, [], {"a": 3}, {3: "a"}, {"a": "\0"}],
+}
+NUMBERS = ["x", 10**30, None, [1], math.nan]
+RECEIVE, SEND = Channel.receive, Channel.send
+
+
+def use(folder: Path) -> None:
+    """All that a study asks of a method."""
+    method: Any = isolation.build("mine.py:Mine", {}, folder)
+    isolation.words("mine.py:Mine", folder)
+    method.available()
+    read_files.digests(method, "target")
+    method_version(type(method))
+    isolation.measured(["mine.py:Mine"], folder)
+    solver = isolation.solver("mine.py:Mine", {}, folder, "files", Limits(seconds=20))
+    with isolation.opened(solver, CPU) as ready:
+        solver.solve(None, None)
+        assert ready.reads
+
+
+@pytest.fixture
+def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Any], Any]], None]:
+    """Use a method whose process tells something else, as a function makes it of what it really tells."""
+    (tmp_path / "mine.py").write_text(METHOD)
+
+    def used(change: Callable[[Any], Any]) -> None:
+        monkeypatch.setattr(Channel, "receive", lambda channel: change(RECEIVE(channel)))
+        use(tmp_path)
+
+    return used
+
+
+def test_the_truth_is_taken(lie: Callable[[Callable[[Any], Any]], None]) -> None:
+    lie(lambda told: told)
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in FACTS.items() for value in values])
+def test_facts_that_cannot_be(name: str, value: Any, lie: Callable[[Callable[[Any], Any]], None]) -> None:
+    with pytest.raises(UserError, match=r"method 'mine.py:Mine'"):
+        lie(lambda told: {**told, name: value} if isinstance(told, dict) and "flags" in told else told)
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in CODE.items() for value in values])
+def test_code_that_is_not_that_of_the_file(name: str, value: Any, lie: Callable[[Callable[[Any], Any]], None]) -> None:
+    def change(told: Any) -> Any:
+        return {**told, "code": {**told["code"], name: value}} if isinstance(told, dict) and "flags" in told else told
+
+    with pytest.raises(UserError, match=r"method 'mine.py:Mine'"):
+        lie(change)
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in RESULTS.items() for value in values])
+def test_results_that_no_function_has(
+    name: str, value: Any, lie: Callable[[Callable[[Any], Any]], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = [""]
+
+    def send(channel: Channel, told: Any) -> None:
+        asked[0] = told["function"] if isinstance(told, dict) and "function" in told else asked[0]
+        SEND(channel, told)
+
+    monkeypatch.setattr(Channel, "send", send)
+    with pytest.raises((UserError, CellError)) as raised:
+        lie(lambda told: {**told, "result": value} if isinstance(told, dict) and asked[0] == name else told)
+    assert str(raised.value).isprintable() or HALF in str(raised.value)
+
+
+@pytest.mark.parametrize("value", NUMBERS)
+def test_numbers_that_no_process_has(value: Any, lie: Callable[[Callable[[Any], Any]], None]) -> None:
+    with pytest.raises((UserError, CellError), match="method"):
+        lie(lambda told: value if type(told) is int else told)
