@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shutil
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -30,17 +33,19 @@ def solve(
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from ..core.io import file_name
     from ..study.config import load_study
-    from ..study.displays import displays
     from ..study.plan import plan
     from .run import run
 
     names = [name.strip() for name in methods.split(",") if name.strip()]
     if not picture.is_file() and Path(methods).is_file():
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
-    folder = output or RESULTS / picture.stem
-    is_new, before = not folder.exists(), folder / STUDY
-    earlier = before.read_bytes() if before.is_file() else None
-    config = write_study(names, picture, display, panel, folder)
+    study_in = partial(_study, names, picture, display, panel)
+    folder = output or next(folder for folder in _folders(picture) if _is_free(folder, picture, study_in(folder)))
+    is_new, config = not folder.exists(), folder / STUDY
+    _copy(picture, folder)
+    if not _is_free(folder, picture, study_in(folder)):
+        raise UserError(f"{folder}: holds the report of other methods or of another display; choose another --output")
+    config.write_text(study_in(folder), encoding="utf-8")
     size = f"{panel[0]} x {panel[1]} pixels"
     try:
         study = load_study(config)
@@ -48,35 +53,33 @@ def solve(
         print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
         run(config, output=folder, executor="serial", artifacts=artifacts, retrain=retrain)
     except UserError as error:
-        if earlier is not None:  # the report that is there is of this one
-            config.write_bytes(earlier)
-        elif is_new and not (folder / "records").exists():
+        if is_new and not (folder / "records").exists():
             shutil.rmtree(folder)
         raise UserError(re.sub(rf"^{re.escape(str(config))}(:\d+)*: ", "", str(error))) from None
     labels = [file_name(label) for label in study.labels]
-    made = {(label, file_name(shown.title)) for label in labels for shown in displays(study).values()}
     for path in (
         *sorted(folder.glob("figures/comparison-*.jpg")),
         *(folder / what / label for what in ("phases", "captures") for label in labels),
     ):
         print(path)
-    for path in _earlier(folder, made):
-        print(f"{path}: not of this run, whose methods or display are others; left as it was")
 
 
-def _earlier(folder: Path, made: set[tuple[str, str]]) -> list[Path]:
-    """The folders of phases and captures in a folder that are those of other methods or displays than were made."""
-    found = sorted(path for what in ("phases", "captures") for path in folder.glob(f"{what}/*/*") if path.is_dir())
-    return [path for path in found if (path.parent.name, path.name) not in made]
+def _folders(picture: Path) -> Iterator[Path]:
+    """The folders of results that are named like a picture, the first without a number."""
+    return (RESULTS / f"{picture.stem}{f'-{number}' * (number > 1)}" for number in itertools.count(1))
 
 
-def write_study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> Path:
-    """Copy a picture into a folder and write the study of it there; the path of the config.
+def _is_free(folder: Path, picture: Path, study: str) -> bool:
+    """Whether a folder holds no report, or that of this study of this picture."""
+    config, copy = folder / STUDY, folder / "picture" / picture.name
+    if not config.exists():
+        return not (folder / "records").exists()
+    return config.read_text(encoding="utf-8") == study and copy.is_file() and copy.read_bytes() == picture.read_bytes()
 
-    UserError for a picture that is no such file, and for a folder that holds another picture or other files.
-    """
-    from ..core.installed import shipped_configs
-    from ..datasets.images import SUFFIXES, decode, opened, read
+
+def _copy(picture: Path, folder: Path) -> None:
+    """Copy a picture into a folder. UserError for one that is no such file, and where other files are there."""
+    from ..datasets.images import SUFFIXES, decode, read
 
     content = read(picture)
     decode(content, str(picture), gray=True)  # what is wrong with it is said of the file that was named
@@ -94,21 +97,26 @@ def write_study(methods: list[str], picture: Path, display: str, panel: tuple[in
     pictures.mkdir(parents=True, exist_ok=True)
     if not (pictures / picture.name).exists() or not (pictures / picture.name).samefile(picture):
         shutil.copyfile(picture, pictures / picture.name)
-    gray = {"gray": True} if opened(content, str(picture)).mode == "L" else {}
+
+
+def _study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> str:
+    """The study of a picture that lies in a folder."""
+    from ..core.installed import shipped_configs
+    from ..datasets.images import opened, read
+
+    gray = {"gray": True} if opened(read(picture), str(picture)).mode == "L" else {}
     profile = str(Path(display).resolve()) if Path(display).is_file() else display
     table3 = yaml.safe_load(shipped_configs()["table3"].read_bytes())  # whose trained methods serve here, too
     study = {
         "title": f"{picture.name} on {display}",
         "seed": table3["seed"],
         "display": {"profiles": [profile], "panel": list(panel)},
-        "targets": {"dataset": "folder", "params": {"path": str(pictures), **gray}},
+        "targets": {"dataset": "folder", "params": {"path": str(folder / "picture"), **gray}},
         "training": table3["training"],
         "methods": [_absolute(method.strip()) for method in methods],
         "save": {"captures": True, "phases": True},
     }
-    config = folder / STUDY
-    config.write_text(yaml.safe_dump(study, sort_keys=False), encoding="utf-8")
-    return config
+    return yaml.safe_dump(study, sort_keys=False)
 
 
 def _absolute(method: str) -> str:

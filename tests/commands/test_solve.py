@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from holobench_eval.commands.options import ARTIFACTS, learned_folder
-from holobench_eval.commands.solve import solve, write_study
+from holobench_eval.commands.solve import _study, solve
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.installed import shipped_configs
 from holobench_eval.study.config import load_study
@@ -52,7 +52,10 @@ def test_several_methods_give_phases_captures_scores_and_a_picture(
 
 
 def test_what_table_3_trained_serves_to_solve(picture: Path) -> None:
-    config = write_study(["hil"], picture, "leto-2020", (256, 256), Path("out"))
+    config = Path("out/study.yaml")
+    Path("out/picture").mkdir(parents=True)
+    picture.rename(Path("out/picture") / picture.name)
+    config.write_text(_study(["hil"], Path("out/picture") / picture.name, "leto-2020", (256, 256), Path("out")))
     (own,) = plan(load_study(config)).preparations()
     assert own in plan(load_study(shipped_configs()["table3"])).preparations()
 
@@ -94,21 +97,26 @@ def test_arguments_in_the_other_order_are_told(picture: Path) -> None:
 def test_a_refused_method_leaves_the_study_of_the_report_that_is_there(picture: Path) -> None:
     solve("double_phase", picture, display="ideal", panel=(128, 128), output=Path("out"))
     study = Path("out/study.yaml").read_text()
-    with pytest.raises(UserError, match="wirtinger"):
+    with pytest.raises(UserError, match="out: holds the report of other methods"):
         solve("wirtinker", picture, output=Path("out"))
     assert Path("out/study.yaml").read_text() == study
 
 
-def test_what_other_methods_and_displays_left_is_said_not_to_be_of_the_run(
-    picture: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for methods, display in (("double_phase", "ideal"), ("gerchberg_saxton", "ideal"), ("double_phase", "leto-mild")):
-        solve(methods, picture, display=display, panel=(128, 128), output=Path("out"))
-    said = [line.partition(": ")[0] for line in capsys.readouterr().out.splitlines() if "not of this run" in line]
-    first = [f"out/{what}/double_phase/ideal" for what in ("captures", "phases")]
-    second = [f"out/{what}/gerchberg_saxton/ideal" for what in ("captures", "phases")]
-    assert said == [*first, first[0], second[0], first[1], second[1]]
-    assert all(any(Path(path).iterdir()) for path in said)
+def test_a_report_of_other_methods_pictures_or_displays_stays(picture: Path) -> None:
+    solve("double_phase", picture, display="ideal", panel=(128, 128))
+    cv2.imwrite(str(picture), np.full((120, 120, 3), 90, np.uint8))
+    for display in ("ideal", "leto-mild"):
+        solve("double_phase", picture, display=display, panel=(128, 128))
+    folders = [Path("holoeval-results", name) for name in ("my picture", "my picture-2", "my picture-3")]
+    reports = [(folder / "report.md").read_text() for folder in folders]
+    assert len(set(reports)) == 3
+    solve("double_phase", picture, display="ideal", panel=(128, 128))  # the second once more
+    assert sorted(path.name for path in Path("holoeval-results").iterdir() if path.name != "solved") == [
+        folder.name for folder in folders
+    ]
+    with pytest.raises(UserError, match=r"holds the report of other methods or of another display; choose another"):
+        solve("gerchberg_saxton", picture, display="ideal", panel=(128, 128), output=folders[1])
+    assert [(folder / "report.md").read_text() for folder in folders] == reports
 
 
 def test_a_folder_holds_one_picture(picture: Path) -> None:
