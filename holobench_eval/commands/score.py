@@ -94,14 +94,14 @@ def score_folders(
             raise UserError(f"--output {output}: {mixed}; expected another folder")
     if visible and aligned:
         raise UserError("--visible --aligned: an aligned capture shows all of its target; expected one of the two")
-    folders = read_folders(captures, targets)
+    folders = read_folders(captures, targets, values == "linear")
     if baseline is not None and baseline not in folders.methods:
         raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
     for picture in folders.captures.values():
         if values == "linear" and picture.is_lossy:
             raise UserError(f"{picture.path}: compressed with loss, no linear light; expected --values stored or srgb")
-        if values != "linear" and picture.is_raw:
-            raise UserError(f"{picture.path}: a RAW file holds linear light; expected --values linear")
+        if values != "linear" and picture.is_linear:
+            raise UserError(f"{picture.path}: RAW files and floating point hold linear light; expected --values linear")
     scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned)
     with scoring.store.locked():
         known = provenance.begin(output, described(folders, values), resumed=True)

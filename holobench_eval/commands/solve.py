@@ -76,7 +76,8 @@ def write_study(methods: list[str], picture: Path, display: str, panel: tuple[in
     UserError for a picture that is no such file, and for a folder that holds another picture or other files.
     """
     from ..core.installed import shipped_configs
-    from ..datasets.images import SUFFIXES, decode, opened, read
+    from ..core.pictures import open_picture
+    from ..datasets.images import SUFFIXES, decode, read
 
     content = read(picture)
     decode(content, str(picture), gray=True)  # what is wrong with it is said of the file that was named
@@ -94,7 +95,7 @@ def write_study(methods: list[str], picture: Path, display: str, panel: tuple[in
     pictures.mkdir(parents=True, exist_ok=True)
     if not (pictures / picture.name).exists() or not (pictures / picture.name).samefile(picture):
         shutil.copyfile(picture, pictures / picture.name)
-    gray = {"gray": True} if opened(content, str(picture)).mode == "L" else {}
+    gray = {"gray": True} if open_picture(content).channels == 1 else {}
     profile = str(Path(display).resolve()) if Path(display).is_file() else display
     table3 = yaml.safe_load(shipped_configs()["table3"].read_bytes())  # whose trained methods serve here, too
     study = {

@@ -92,7 +92,7 @@ def test_raw_files_are_scored_as_linear_light_alone(tmp_path):
     mosaic[::2, ::2] += np.round(light * 15000).astype(np.uint16)
     (tmp_path / "captures" / "m").mkdir(parents=True)
     (tmp_path / "captures" / "m" / "astronaut.dng").write_bytes(bayer_dng(mosaic))
-    with pytest.raises(UserError, match="a RAW file holds linear light; expected --values linear"):
+    with pytest.raises(UserError, match="RAW files and floating point hold linear light; expected --values linear"):
         run(tmp_path)
     _, _, records = run(tmp_path, values="linear")
     assert records.loc[("m", "astronaut"), "psnr_linear_db"] > 18
