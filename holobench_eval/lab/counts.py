@@ -76,8 +76,8 @@ def _counts(values: NDArray[Any], **facts: bool) -> Counts:
     planes = values[None] if values.ndim == 2 else values.transpose(2, 0, 1)
     if values.dtype.kind == "u":
         white = float(np.iinfo(values.dtype).max)
-    elif not np.isfinite(white := float(values.max())) or not np.isfinite(values.min()) or white <= 0:
-        raise PictureError("values that are NaN, infinite or nowhere above 0")
+    elif not np.isfinite(white := float(values.max())) or not np.isfinite(values.min()):
+        raise PictureError("values that are NaN or infinite")
     return Counts(planes, white, np.zeros((1, 1, 1), np.float32), **facts)
 
 
