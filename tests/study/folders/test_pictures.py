@@ -7,6 +7,7 @@ import pytest
 import tifffile
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.lab.dark import given_dark
 from holobench_eval.study.folders.files import read_folders
 from holobench_eval.study.folders.pictures import checked
 from tests.support.photographed import photograph, save
@@ -51,8 +52,8 @@ def test_floating_point_is_read_over_its_highest_value(tmp_path, form):
 @pytest.mark.parametrize(
     ("values", "line"),
     [
-        (np.where(FLOATS > 100, np.nan, FLOATS), "NaN, infinite or nowhere above 0"),
-        (-np.abs(FLOATS), "NaN, infinite or nowhere above 0"),
+        (np.where(FLOATS > 100, np.nan, FLOATS), "NaN or infinite"),
+        (-np.abs(FLOATS), "no value is above 0"),
         (FLOATS.astype(np.int32), "an array of int32"),
         (FLOATS.astype(complex), "an array of complex128"),
         (FLOATS[:2], "an array of 2 x 48 x 64"),
@@ -72,3 +73,23 @@ def test_a_target_of_floating_point_is_refused(tmp_path):
     interleaved(tmp_path / "targets" / "coffee.tif", FLOATS)
     with pytest.raises(UserError, match=r"coffee.tif: floating point; expected a target in sRGB"):
         read_folders(tmp_path / "captures", tmp_path / "targets", linear=True)
+
+
+def test_light_is_above_the_dark_counts_and_a_capture_that_has_none_is_refused(tmp_path):
+    interleaved(tmp_path / "x.tif", LEVELS)
+    picture = checked(tmp_path / "x.tif", linear=True, dark=given_dark("9000")[0])
+    assert np.allclose(picture.light(), (LEVELS.astype(float) - 9000) / 65535, atol=1e-6)
+    assert np.allclose(picture.load(), LEVELS / 65535, atol=1e-7)
+    with pytest.raises(UserError, match=r"x.tif: no brighter than the dark counts"):
+        checked(tmp_path / "x.tif", linear=True, dark=given_dark("60000")[0])
+
+
+@pytest.mark.parametrize(("shift", "last"), [(0, 4095), (4, 65520), (6, 64 * 1023)])
+def test_a_camera_of_fewer_bits_clips_at_its_own_last_level(tmp_path, shift, last):
+    bits = last >> shift
+    counts = np.minimum(np.round(COLOUR * 2 * bits), bits).astype(np.uint16) << shift
+    interleaved(tmp_path / "x.tif", counts)
+    picture = checked(tmp_path / "x.tif")
+    assert (picture.load() >= picture.full).mean() == (counts == last).mean() > 0.05
+    interleaved(tmp_path / "y.tif", np.minimum(counts, last // 2))
+    assert checked(tmp_path / "y.tif").full == 1 or shift == 0
