@@ -27,13 +27,16 @@ def export(
     bench: Annotated[Path | None, typer.Option(help="File of the bench that will show the patterns.")] = None,
     display: Annotated[str | None, typer.Option(help="Without --bench: the study's display to stand for it.")] = None,
     fixed_exposure: Annotated[bool, typer.Option("--fixed-exposure", help="One exposure time for all.")] = False,
+    dark: Annotated[
+        str | None, typer.Option(metavar="FILE|LEVEL", help="Counts without light, in the place of dark frames.")
+    ] = None,
 ) -> None:
     """Write the patterns of a study: what to show, in which order, and under which names to save photographs."""
     from ..study.folders.session import export as begin
     from ..study.progress import watching
 
     with watching(console()) as watch:
-        advance = begin(config, folder, watch, bench, display, fixed_exposure)
+        advance = begin(config, folder, watch, bench, display, fixed_exposure, dark)
     _finish(advance, folder)
 
 

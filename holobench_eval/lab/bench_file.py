@@ -16,6 +16,7 @@ from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL
 from ..display.simulated.stages import Panel
 from ..imaging.convention import Convention
+from .dark import given_dark
 from .laser import LaserSettings
 from .settings import CaptureSettings
 
@@ -53,4 +54,9 @@ def load_bench_file(path: Path) -> BenchFile:
         raise document.error(("panel", "shape"), f"a panel has at least {SMALLEST_PANEL} pixels a side")
     if bench.panel.bits != 8:
         raise document.error(("panel", "bits"), f"levels are written with 8 bits, got {bench.panel.bits}")
-    return replace(bench, digest=hashlib.sha256(document.text.encode()).hexdigest())
+    told, capture = document.text, bench.capture
+    if isinstance(capture.dark, str):
+        file = path.parent / capture.dark
+        told += given_dark(str(file))[1]
+        capture = replace(capture, dark=str(file.resolve()))
+    return replace(bench, capture=capture, digest=hashlib.sha256(told.encode()).hexdigest())

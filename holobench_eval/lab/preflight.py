@@ -19,7 +19,8 @@ from torch import Tensor
 
 from ..imaging.convention import Convention
 from ..imaging.warp import Array, Frame
-from .exposure import Averaged, Dark
+from .dark import Dark
+from .exposure import Averaged
 from .photograph import MOST_SATURATED
 from .test_pattern import PatternFit, find_pattern
 
@@ -60,7 +61,7 @@ def linearity(take: Callable[[float], Averaged], seconds: float, dark: Dark) -> 
     if times[-1] < 4 * times[0]:
         given = f"{times[0]:.2g} to {times[-1]:.2g} s"
         return Check(False, f"linearity: the camera gave exposures of {given} only; it needs a factor of eight to tell")
-    light = np.array([float(np.mean((each.counts - dark.at(each.seconds))[bright])) for each in taken])
+    light = np.array([float(np.mean(dark.off(each.counts, each.seconds)[bright])) for each in taken])
     straight, offset = _affine(times, light)
     figures = f"r^2 {straight:.5f}, offset {offset:+.1%} of the longest exposure"
     if straight > STRAIGHTEST and abs(offset) <= FURTHEST_OFFSET:

@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from holobench_eval.imaging.convention import Convention
-from holobench_eval.lab.exposure import averaged, dark_level
+from holobench_eval.lab.dark import given_dark
+from holobench_eval.lab.exposure import averaged
 from holobench_eval.lab.preflight import full_turn, linearity, phase_sign
 from holobench_eval.lab.test_pattern import draw_pattern, find_pattern
 from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, Still, bench, pattern_phase
@@ -34,7 +35,7 @@ def green(initial_phase="random"):
 def check_linearity(exposure=0.02, picture=None, **camera):
     still = Still(np.random.default_rng(0).exponential(size=(100, 100)) if picture is None else picture)
     device = SimulatedCamera(still, **{"noise": 2.0, "bits": 14, **camera})
-    return linearity(partial(averaged, device, count=2, plane=0), exposure, dark_level(64.0))
+    return linearity(partial(averaged, device, count=2, plane=0), exposure, given_dark(64.0)[0])
 
 
 def test_a_linear_camera_passes():

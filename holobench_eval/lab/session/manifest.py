@@ -26,6 +26,7 @@ LARGEST_MANIFEST = 64 * 2**20  # bytes, about 200,000 patterns
 SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 DARK, FIDUCIAL, HOLOGRAM, REPEAT = "dark", "fiducial", "hologram", "repeat"
 LETTER, REVERSED = "letter", "reversed"
+DARK_FILE = "dark"  # the name, without its ending, of the file of dark counts that came with the export
 CHECKS = 0  # the round of the patterns that check the bench, which may be left out
 
 Role = Literal["dark", "fiducial", "hologram", "repeat", "letter", "reversed"]
@@ -62,7 +63,8 @@ class Manifest:
     """A session: its study and display, and all patterns so far, round by round in the order of showing.
 
     session: what tells it from others; study_sha256, bench_sha256: of its config and of its bench or profile; display:
-    name; panel: rows and columns; wavelengths [m]; photographed: sha256 of the photographs that were read, by the
+    name; panel: rows and columns; wavelengths [m]; dark: the counts without light, or the sha256 of the file that has
+    them; None where dark frames are photographed; photographed: sha256 of the photographs that were read, by the
     name of their pattern's capture.
     """
 
@@ -77,6 +79,7 @@ class Manifest:
     fixed_exposure: bool
     patterns: Annotated[tuple[Pattern, ...], MaxLen(1_000_000)] = ()
     photographed: dict[Annotated[str, MaxLen(100)], Hex] | None = None
+    dark: Annotated[float, Interval(ge=0)] | Hex | None = None
 
     @property
     def rounds(self) -> int:

@@ -10,10 +10,11 @@ import torch
 from numpy.typing import NDArray
 
 from ...core.errors import UserError
-from ...core.io import decode_levels
+from ...core.pictures import open_picture
 from ...optics.phase import blaze
 from ..real import RealBench
 from .folder import FolderPhotographer
+from .frames import MOST_PIXELS
 from .manifest import Pattern, inside
 
 
@@ -35,4 +36,4 @@ def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != pattern.sha256:
         raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
-    return np.asarray(decode_levels(content), dtype=np.uint8)
+    return np.asarray(open_picture(content, MOST_PIXELS).values(), dtype=np.uint8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,12 +14,13 @@ from ...core.io import write_atomically
 from ...core.yaml_source import load
 from ...imaging.convention import Convention
 from ...lab.bench_file import load_bench_file
+from ...lab.dark import given_dark
 from ...lab.live import letter
 from ...lab.real import RealBench
 from ...lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
 from ...lab.session.bench_checks import bench_checks
 from ...lab.session.geometry import look
-from ...lab.session.manifest import refuse_links_out
+from ...lab.session.manifest import DARK_FILE, refuse_links_out
 from .. import isolation
 from ..config import load_study
 from ..definition import Study
@@ -49,12 +51,19 @@ class Advance:
 
 
 def export(
-    config: Path, folder: Path, watch: Lines, bench: Path | None, display: str | None, fixed_exposure: bool
+    config: Path,
+    folder: Path,
+    watch: Lines,
+    bench: Path | None,
+    display: str | None,
+    fixed_exposure: bool,
+    dark: str | float | None = None,
 ) -> Advance:
     """Make a session folder for a study and write its first round of patterns.
 
     bench: file of the real bench; without it ``display``, one of the study's profiles, gives the nominal optics
-    (optional if the study has a single profile), and the panel's levels have the default convention.
+    (optional if the study has a single profile), and the panel's levels have the default convention. dark: the counts
+    without light, a level or a file, in the place of dark frames; by default those of the bench file.
     UserError: the folder is not empty, or the study cannot be shown on one real display.
     """
     if folder.exists() and any(folder.iterdir()):
@@ -66,6 +75,11 @@ def export(
     shown = next(iter(displays(chosen).values()))
     if shown.spec.bits != 8:
         raise UserError(f"'{shown.name}' has {shown.spec.bits} bits; patterns are written with 8")
+    described_bench = load_bench_file(shown.real.bench) if shown.real and shown.real.bench else None
+    if dark is None and described_bench:
+        dark = described_bench.capture.dark
+    if dark is not None:
+        given_dark(dark)  # what is wrong with it is said before the folder is made
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / STUDY, chosen.text.encode())
     inside = BENCH if bench else study.display.bench
@@ -74,8 +88,10 @@ def export(
         if copy.exists():
             raise UserError(f"{inside}: a session has a file of this name of its own; rename the bench file")
         copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(bench or study.folder / inside, copy)
-    described_bench = shown.real.bench if shown.real else None
+        original = bench or study.folder / inside
+        shutil.copyfile(original, copy)
+        if described_bench and isinstance(described_bench.capture.dark, str):
+            _copy_beside(copy, original, described_bench.capture.dark)
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
@@ -85,14 +101,37 @@ def export(
         display=shown.name,
         panel=shown.spec.shape,
         wavelengths=shown.spec.wavelengths,
-        phase=load_bench_file(described_bench).phase if described_bench else Convention(),
+        phase=described_bench.phase if described_bench else Convention(),
         fixed_exposure=fixed_exposure,
+        dark=_kept_dark(dark, folder),
     )
     write_manifest(folder, manifest)
     forget_sessions()
     opened = replace(chosen, display=replace(chosen.display, session=folder))
     session_photographer(folder).write_checks(letter(_bench(opened)).phase)
     return _advance(opened, folder, watch)
+
+
+def _copy_beside(copy: Path, original: Path, dark: str) -> None:
+    """Copy the dark counts of a bench file to where its copy finds them. UserError for a file that lies elsewhere."""
+    name = os.path.relpath(dark, original.resolve().parent)
+    if not _stays_inside(name):
+        raise UserError(f"{original}: its dark counts, {dark}, lie elsewhere; put the file beside it")
+    (copy.parent / name).parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(dark, copy.parent / name)
+
+
+def _kept_dark(given: str | float | None, folder: Path) -> str | float | None:
+    """The dark level for the manifest, or the sha256 of its file, of which the session gets a copy."""
+    if given is None:
+        return None
+    dark, told = given_dark(given)
+    if not dark.bias.ndim:
+        return float(told)
+    kept = folder / f"{DARK_FILE}{Path(str(given)).suffix.lower()}"
+    if not kept.exists():  # as the bench file's own
+        shutil.copyfile(str(given), kept)
+    return told
 
 
 def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path | None) -> Advance:

@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import tifffile
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -132,6 +133,12 @@ def test_real_numbers_of_any_precision_and_byte_order_are_read(tmp_path: Path, k
     apart = 1e-3 if kind == "<f2" else 1e-6  # half precision has eleven bits
     assert turns_apart(solved(tmp_path / "phase.npy"), PHASE) < apart
     assert turns_apart(solved(tmp_path / "phase.npy", **pair), PHASE) < apart
+
+
+def test_sixteen_bit_levels_in_separate_planes_are_those_of_an_interleaved_picture(tmp_path: Path) -> None:
+    levels = LEVELS.astype(np.uint16) * 256
+    tifffile.imwrite(tmp_path / "planar.tif", levels, photometric="rgb", planarconfig="separate")
+    assert turns_apart(solved(tmp_path / "planar.tif"), PHASE) < 1e-6
 
 
 def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
