@@ -210,9 +210,12 @@ def _softened(sigma: float) -> Callable[[Tensor], Tensor]:
 def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
     """Both as float64 tensors on one device; float64, since SSIM subtracts nearly equal squares."""
     light, wanted = (
-        (side if isinstance(side, Tensor) else torch.from_numpy(np.array(side, dtype=np.float64))).detach().double()
-        for side in (capture, target)
+        side if isinstance(side, Tensor) else torch.from_numpy(np.array(side)) for side in (capture, target)
     )
+    for name, side in (("capture", light), ("target", wanted)):
+        if not side.is_floating_point():  # levels of a picture, or counts
+            raise ValueError(f"the {name} is of {side.dtype}; expected linear light as floating point")
+    light, wanted = light.detach().double(), wanted.detach().double()
     light = light.to(wanted.device)
     if light.shape != wanted.shape or light.ndim != 3 or light.shape[0] not in (1, 3):
         raise ValueError(

@@ -271,6 +271,15 @@ def test_values_that_are_not_finite_are_errors(capture: Tensor, target: Tensor, 
         score(capture, broken)
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_integers_may_be_levels_or_counts_and_are_refused(target: Tensor, side: int) -> None:
+    pair = [target, target]
+    pair[side] = (255 * target).byte()
+    for sides in (pair, [tensor.numpy() for tensor in pair]):
+        with pytest.raises(ValueError, match=r"is of torch\.uint8; expected linear light as floating point"):
+            score(*sides)
+
+
 def test_wrong_shapes_ranges_and_names_are_errors(capture: Tensor, target: Tensor) -> None:
     with pytest.raises(ValueError, match="must both be"):
         score(capture[:, 1:], target)
