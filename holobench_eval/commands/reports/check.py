@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -58,11 +59,17 @@ def problems_in(folder: Path) -> tuple[int, list[str]]:
 
 def _earlier(folder: Path) -> Iterator[str]:
     """A line for each other version of the protocol by which reports were scored; they stand as they are."""
+    from ...metrics.protocol import VERSION as PROTOCOL
     from ...study import provenance
-    from ...study.identity import PROTOCOL, parted
+    from ...study.identity import parted
 
-    known = [provenance.read(report).get("scores", {}) for report in committed.reports_in(folder)]
-    versions = Counter(version for scores in known for version in {parted(scored)[0] for scored in scores.values()})
+    versions = Counter[str]()
+    for report in committed.reports_in(folder):
+        with suppress(UserError):  # what is wrong with its provenance is a problem already
+            scores = provenance.read(report).get("scores")
+            versions.update(
+                {parted(str(scored))[0] for scored in (scores if isinstance(scores, dict) else {}).values()}
+            )
     for version, count in sorted(versions.items()):
         if version != PROTOCOL:
             yield (

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
+import typer
 
 from holobench_eval.commands.reports.check import check, problems_in
 from holobench_eval.core.errors import UserError
@@ -129,3 +130,13 @@ def test_scores_by_an_earlier_protocol_are_no_problem_and_said_in_one_line(
         "of their studies scores",
         "1 report, 0 problems",
     ]
+
+
+@pytest.mark.parametrize("text", ["{", '{"scores": 3}', '{"scores": {"psnr": 1}}'])
+def test_a_provenance_that_is_no_provenance_ends_the_check_with_its_problem_alone(
+    report: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (report / "provenance.json").write_text(text)
+    with pytest.raises(typer.Exit):
+        check(report.parent)
+    assert "1 report, 1 problem" in capsys.readouterr().out
