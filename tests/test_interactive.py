@@ -287,6 +287,11 @@ def test_counts_of_a_camera_are_linear_light_whatever_their_type(target) -> None
             lambda d, t: d.capture(np.arange(3.0 * 128 * 128).reshape(3, 128, 128) % 256, t),
             "a phase has whole numbers up to 255: levels; expected radians, modulo 2 pi",
         ),
+        (
+            lambda d, t: d.capture(np.full((3, 128, 128), 1e30), t),
+            r"reaches 1e\+30 rad, where float32 has lost the turn",
+        ),
+        (lambda d, t: d.ideal(np.full((3, 128, 128), -2.7e5)), r"reaches 2\.7e\+05 rad, .* expected it modulo 2 pi"),
         (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase holds 49152 values that are NaN or infinite"),
         (lambda d, t: hb.open_display("ideal", panel=(256.0, 256)), r"rows and columns such as .*; got \(256.0, 256\)"),
         (lambda d, t: hb.open_display("ideal", panel=256), "rows and columns such as .*; got 256"),

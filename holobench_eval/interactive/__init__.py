@@ -7,6 +7,7 @@ methods of files in processes of their own; what is here is for a notebook, wher
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +23,8 @@ from ..core.panels import is_small, rows_and_columns
 from ..core.plugins import build
 from ..datasets.base import fit, with_channels
 from ..datasets.images import decode, from_array, read
-from ..display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_plain, type_name
+from ..display.api import DisplaySpec, from_numpy, ideal_image, is_plain, type_name
+from ..display.phases import check_phase, phase_doubt
 from ..display.traits import traits_of
 from ..metrics import catalogue, match
 from ..metrics import score as _score
@@ -143,6 +145,8 @@ class OpenDisplay:
             The camera cannot be registered.
         """
         light, shown = self._target(target), self._phase(phase)
+        if doubt := phase_doubt(shown, light, self.spec):
+            warnings.warn(f"the phase {doubt}", stacklevel=2)
         with self._threads():
             return self._bench.photograph(shown, light, _name(light), whole(repeat, "repeat")).image.cpu().numpy()
 
