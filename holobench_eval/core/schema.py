@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from functools import cache
@@ -81,8 +81,8 @@ def checked(cls: type[T], data: Any, owner: str = "", adapter: TypeAdapter[T] | 
     try:
         return (adapter or TypeAdapter(cls)).validate_json(text, strict=True)
     except ValidationError as error:
-        fault = error.errors()[0]
-        raise FieldError(fault["loc"], _value_line(fault["loc"], fault, owner)) from None
+        where, fault = _deepest(data, error.errors())
+        raise FieldError(where, _value_line(where, fault, owner)) from None
 
 
 @cache
@@ -135,6 +135,25 @@ def placed(document: Document, name: Keys, params: Keys) -> Iterator[None]:
         field = (*params, *error.where[:1]) if isinstance(error, FieldError) else params
         where = field if field != params and field in document.keys else name
         raise document.error(where, str(error), at_key=isinstance(error, FieldError) and error.at_key) from error
+
+
+def _deepest(data: Any, faults: Sequence[Any]) -> tuple[Keys, Any]:
+    """The first fault and its place; where a value may be of several kinds, that of the kind which it comes nearest."""
+    placed = [(_place(data, fault), fault) for fault in faults]
+    first = placed[0][0]
+    return max((each for each in placed if each[0][: len(first)] == first), key=lambda each: len(each[0]))
+
+
+def _place(data: Any, fault: Mapping[str, Any]) -> Keys:
+    """The keys of a fault, without the names that pydantic gives to the kinds that a value may be of."""
+    where: Keys = ()
+    for part in fault["loc"]:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            continue
+        where = (*where, part)
+    return (*where, fault["loc"][-1]) if fault["type"] == "missing" else where
 
 
 def _unknown_keys(cls: Any, mappings: list[tuple[Keys, Any]]) -> Iterator[tuple[Keys, list[str]]]:
