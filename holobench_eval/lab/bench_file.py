@@ -10,12 +10,13 @@ from typing import Annotated, Any
 
 from annotated_types import Interval, MinLen
 
-from ..core.errors import UserError
+from ..core.errors import CellError, UserError
 from ..core.schema import typed
 from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL
 from ..display.simulated.stages import Panel
 from ..imaging.convention import Convention
+from ..methods.files.correction import on_panel
 from .laser import LaserSettings
 from .settings import CaptureSettings
 
@@ -53,4 +54,9 @@ def load_bench_file(path: Path) -> BenchFile:
         raise document.error(("panel", "shape"), f"a panel has at least {SMALLEST_PANEL} pixels a side")
     if bench.panel.bits != 8:
         raise document.error(("panel", "bits"), f"levels are written with 8 bits, got {bench.panel.bits}")
-    return replace(bench, digest=hashlib.sha256(document.text.encode()).hexdigest())
+    try:
+        phase = on_panel(bench.phase, bench.panel.shape, len(bench.panel.wavelengths), path.parent)
+    except CellError as error:
+        raise document.error(("phase", "correction"), f"phase: {error}") from error
+    correction = (path.parent / phase.correction.file).read_bytes() if phase.correction else b""
+    return replace(bench, phase=phase, digest=hashlib.sha256(document.text.encode() + correction).hexdigest())

@@ -76,6 +76,7 @@ def export(
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(bench or study.folder / inside, copy)
     described_bench = shown.real.bench if shown.real else None
+    phase = _phase(described_bench, folder, inside or BENCH) if described_bench else Convention()
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
@@ -85,7 +86,7 @@ def export(
         display=shown.name,
         panel=shown.spec.shape,
         wavelengths=shown.spec.wavelengths,
-        phase=load_bench_file(described_bench).phase if described_bench else Convention(),
+        phase=phase,
         fixed_exposure=fixed_exposure,
     )
     write_manifest(folder, manifest)
@@ -93,6 +94,25 @@ def export(
     opened = replace(chosen, display=replace(chosen.display, session=folder))
     session_photographer(folder).write_checks(letter(_bench(opened)).phase)
     return _advance(opened, folder, watch)
+
+
+def _phase(bench: Path, folder: Path, copied: str) -> Convention:
+    """The phase convention of a bench file, whose correction map is copied to its place beside the bench file's copy.
+
+    copied: where that is in the session's folder. UserError for a map that does not lie in the bench file's folder.
+    """
+    phase = load_bench_file(bench).phase
+    if phase.correction is None:
+        return phase
+    name = phase.correction.file
+    if not (_stays_inside(name) and _stays_inside(copied)):
+        raise UserError(
+            f"{bench}: phase.correction.file: {name} does not travel with a session; put it beside this file"
+        )
+    place = Path(copied).parent / name
+    (folder / place).parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(bench.parent / name, folder / place)
+    return replace(phase, correction=replace(phase.correction, file=place.as_posix()))
 
 
 def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path | None) -> Advance:
@@ -127,7 +147,7 @@ def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path |
     except Pending:
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
-    notes = [study.note, *photographer.notes, *(check.line for check in checks), *findings]
+    notes = [study.note, *photographer.notes, manifest.phase.out_of_reach, *(check.line for check in checks), *findings]
     texts = [note.strip() for note in notes]
     sentences = [f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}" for text in texts if text]
     return _advance(replace(study, note=" ".join(sentences)), folder, watch)
