@@ -197,6 +197,9 @@ def _value_line(where: Keys, fault: Mapping[str, Any], owner: str) -> str:
         if isinstance(where[-1], str):
             return f"missing key '{where[-1]}' in {_dotted(where[:-1])}"
         return f"{_dotted(where[:-1])} has too few values: {str(fault['input'])[:LONGEST_VALUE]}"
+    if fault["type"] == "value_error":  # a sentence of our own
+        place = f"{owner}: parameter '{_joined(where)}'" if owner else _dotted(where)
+        return f"{place}: {fault['ctx']['error']}"
     message = str(fault["msg"])
     for ours, theirs in PLAIN_WORDS:
         message = message.replace(theirs, ours)

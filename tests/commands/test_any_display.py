@@ -1,4 +1,4 @@
-"""Every command that takes a display or a study works on one laser or three, one bit or eight, and panels of any shape."""
+"""Every command that takes a display or a study works on one laser or three, one bit or eight, and any panel."""
 
 from __future__ import annotations
 

@@ -26,6 +26,7 @@ from ...core.errors import UserError
 from ...datasets.charts import Charts
 from ...display import load_profile
 from ...display.calibrated import CalibratedBench
+from ...display.resolution import refuse_far
 from ...display.simulated.pipeline import ChannelMaps, SimulatedBench
 from ...display.simulated.stages import PixelAperture
 from ...methods.wirtinger import Wirtinger
@@ -55,6 +56,7 @@ def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | N
     path = output or Path(f"stages-{profile.name}.png")
     if path.suffix not in (".png", ".pdf", ".svg"):
         raise UserError(f"--output {path}: a picture is written as .png, .pdf or .svg")
+    refuse_far(profile.spec(shape), profile.panel.distance)
     return save_sheet(open_bench(profile, shape), profile.scaling_note(shape), path)
 
 
