@@ -56,6 +56,7 @@ def import_(
 
 def _finish(advance: Advance, folder: Path) -> None:
     """Name the photographs to take next; where there are none, write the report."""
+    from ..lab.session import read_manifest
     from ..study.folders.session import REPORT
 
     records = advance.outcome.records
@@ -67,4 +68,6 @@ def _finish(advance: Advance, folder: Path) -> None:
     readme = f"{folder}/patterns/round-{number}/README.txt"
     if number == 1:
         print(f"to check the bench first: {folder}/patterns/checks/README.txt")
+        if line := read_manifest(folder).phase.out_of_reach:
+            print(line)
     print(f"round {number}: {len(advance.patterns)} patterns to photograph, see {readme}")

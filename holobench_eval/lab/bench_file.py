@@ -10,12 +10,13 @@ from typing import Annotated, Any
 
 from annotated_types import Interval, MinLen
 
-from ..core.errors import UserError
+from ..core.errors import CellError, UserError
 from ..core.schema import typed
 from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL
 from ..display.simulated.stages import Panel
 from ..imaging.convention import Convention
+from ..methods.files.correction import on_panel
 from .dark import given_dark
 from .laser import LaserSettings
 from .settings import CaptureSettings
@@ -59,4 +60,9 @@ def load_bench_file(path: Path) -> BenchFile:
         file = path.parent / capture.dark
         told += given_dark(str(file))[1]
         capture = replace(capture, dark=str(file.resolve()))
-    return replace(bench, capture=capture, digest=hashlib.sha256(told.encode()).hexdigest())
+    try:
+        phase = on_panel(bench.phase, bench.panel.shape, len(bench.panel.wavelengths), path.parent)
+    except CellError as error:
+        raise document.error(("phase", "correction"), f"phase: {error}") from error
+    correction = (path.parent / phase.correction.file).read_bytes() if phase.correction else b""
+    return replace(bench, phase=phase, capture=capture, digest=hashlib.sha256(told.encode() + correction).hexdigest())

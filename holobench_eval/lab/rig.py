@@ -140,7 +140,7 @@ class Rig:
         if self.settings.settle != "auto":
             return self.settings.settle
         self.laser.select(0)
-        bright, dark = (self.convention.levels(each) for each in (phase[0], torch.zeros_like(phase[0])))
+        bright, dark = (self.convention.of(0).levels(each) for each in (phase[0], torch.zeros_like(phase[0])))
         toggle = Toggle(
             show=lambda lit: self.slm.show(bright if lit else dark),
             take=lambda: averaged(self.camera, seconds, 1, self.planes[0]).counts,
@@ -171,6 +171,8 @@ class Rig:
             return self._take(replace(pattern, phase=phase), convention, ready, single).light
 
         yield phase_sign(show, pattern.phase, self.convention)
+        if self.convention.out_of_reach:
+            yield Check(True, self.convention.out_of_reach)
         yield full_turn(show, pattern.phase, self.convention)
 
     def _take(self, request: Request, convention: Convention, ready: Prepared, settings: CaptureSettings) -> Photograph:
@@ -191,7 +193,7 @@ class Rig:
 
     def _show(self, phase: Tensor, channel: int, convention: Convention, settle: float) -> None:
         self.laser.select(channel)
-        levels = convention.levels(phase[channel])
+        levels = convention.of(channel).levels(phase[channel])
         self._fresh.changed((channel, levels.tobytes()))
         self.slm.show(levels)
         self.wait(settle)

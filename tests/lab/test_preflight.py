@@ -158,6 +158,23 @@ def test_a_level_that_costs_much_light_is_refused_and_the_best_is_named():
     assert full_turn(photographer(two_pi_level=175.0), green(), Convention(two_pi_level=named)).passed
 
 
+def test_every_laser_has_a_best_level_of_its_own():
+    cameras = [photographer(two_pi_level=level) for level in (175.0, 256.0)]
+
+    def show(phase, convention):
+        frames = [
+            camera(part[None], convention.of(i)) for i, (camera, part) in enumerate(zip(cameras, phase, strict=True))
+        ]
+        return torch.cat(frames)
+
+    both = green().expand(2, -1, -1)
+    line = full_turn(show, both, Convention()).line
+    first, second = (float(each) for each in line.split("light of [")[1].split("]")[0].split(","))
+    assert abs(first - 175) < 0.08 * 175
+    assert second > 1.3 * first
+    assert full_turn(show, both, Convention(two_pi_level=(first, second))).line.endswith("of the best level")
+
+
 def test_a_level_that_costs_little_light_is_only_remarked_on():
     check = full_turn(photographer(two_pi_level=205.0), green(), Convention())
     assert check.passed

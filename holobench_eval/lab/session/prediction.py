@@ -26,7 +26,8 @@ def predicted(
     UserError for a pattern that is not as it was exported.
     """
     levels = _levels(photographer.folder, pattern)
-    phase = sign * photographer.manifest.phase.phase(levels) - blaze(bench.spec.shape, bench.carrier)
+    shown = photographer.manifest.phase.of(pattern.colour).phase(levels).float()
+    phase = sign * shown - blaze(bench.spec.shape, bench.carrier)
     field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
     return np.asarray(bench.spec.region.crop(field.abs().square()).numpy())
 

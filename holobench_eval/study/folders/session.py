@@ -13,7 +13,7 @@ from ...core.hashing import digest
 from ...core.io import write_atomically
 from ...core.yaml_source import load
 from ...imaging.convention import Convention
-from ...lab.bench_file import load_bench_file
+from ...lab.bench_file import BenchFile, load_bench_file
 from ...lab.dark import given_dark
 from ...lab.live import letter
 from ...lab.real import RealBench
@@ -91,7 +91,10 @@ def export(
         original = bench or study.folder / inside
         shutil.copyfile(original, copy)
         if described_bench and isinstance(described_bench.capture.dark, str):
-            _copy_beside(copy, original, described_bench.capture.dark)
+            _copy_beside(original, copy, Path(described_bench.capture.dark), "capture.dark")
+    phase = Convention()
+    if described_bench and shown.real and shown.real.bench:
+        phase = _phase(described_bench, shown.real.bench, folder, inside or BENCH)
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
@@ -101,7 +104,7 @@ def export(
         display=shown.name,
         panel=shown.spec.shape,
         wavelengths=shown.spec.wavelengths,
-        phase=described_bench.phase if described_bench else Convention(),
+        phase=phase,
         fixed_exposure=fixed_exposure,
         dark=_kept_dark(dark, folder),
     )
@@ -112,13 +115,28 @@ def export(
     return _advance(opened, folder, watch)
 
 
-def _copy_beside(copy: Path, original: Path, dark: str) -> None:
-    """Copy the dark counts of a bench file to where its copy finds them. UserError for a file that lies elsewhere."""
-    name = os.path.relpath(dark, original.resolve().parent)
+def _copy_beside(original: Path, copy: Path, file: Path, key: str) -> None:
+    """Copy a file that a bench file names under a key to where the bench file's copy finds it.
+
+    UserError for one that does not lie in the bench file's folder.
+    """
+    name = os.path.relpath(file.resolve(), original.resolve().parent)
     if not _stays_inside(name):
-        raise UserError(f"{original}: its dark counts, {dark}, lie elsewhere; put the file beside it")
+        raise UserError(f"{original}: {key}: {name} does not travel with a session; put it beside this file")
     (copy.parent / name).parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(dark, copy.parent / name)
+    shutil.copyfile(file, copy.parent / name)
+
+
+def _phase(bench: BenchFile, file: Path, folder: Path, copied: str) -> Convention:
+    """The phase convention of a bench file, whose correction map travels with it. copied: its place in the folder."""
+    if bench.phase.correction is None:
+        return bench.phase
+    name = bench.phase.correction.file
+    if not _stays_inside(copied):
+        raise UserError(f"{file}: it does not travel with a session, and so does not {name}; put it beside the study")
+    _copy_beside(file, folder / copied, file.parent / name, "phase.correction.file")
+    place = (Path(copied).parent / name).as_posix()
+    return replace(bench.phase, correction=replace(bench.phase.correction, file=place))
 
 
 def _kept_dark(given: str | float | None, folder: Path) -> str | float | None:
@@ -166,7 +184,7 @@ def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path |
     except Pending:
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
-    notes = [study.note, *photographer.notes, *(check.line for check in checks), *findings]
+    notes = [study.note, *photographer.notes, manifest.phase.out_of_reach, *(check.line for check in checks), *findings]
     texts = [note.strip() for note in notes]
     sentences = [f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}" for text in texts if text]
     return _advance(replace(study, note=" ".join(sentences)), folder, watch)
