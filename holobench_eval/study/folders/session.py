@@ -80,21 +80,23 @@ def export(
         dark = described_bench.capture.dark
     if dark is not None:
         given_dark(dark)  # what is wrong with it is said before the folder is made
+    inside = BENCH if bench else study.display.bench
+    beside = _beside(described_bench, shown.real.bench, inside) if described_bench and shown.real else {}
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / STUDY, chosen.text.encode())
-    inside = BENCH if bench else study.display.bench
     if inside and _stays_inside(inside):
         copy = folder / inside
         if copy.exists():
             raise UserError(f"{inside}: a session has a file of this name of its own; rename the bench file")
         copy.parent.mkdir(parents=True, exist_ok=True)
-        original = bench or study.folder / inside
-        shutil.copyfile(original, copy)
-        if described_bench and isinstance(described_bench.capture.dark, str):
-            _copy_beside(original, copy, Path(described_bench.capture.dark), "capture.dark")
-    phase = Convention()
-    if described_bench and shown.real and shown.real.bench:
-        phase = _phase(described_bench, shown.real.bench, folder, inside or BENCH)
+        shutil.copyfile(bench or study.folder / inside, copy)
+    for place, file in beside.items():
+        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, folder / place)
+    phase = described_bench.phase if described_bench else Convention()
+    if phase.correction is not None:
+        place = (Path(inside or BENCH).parent / phase.correction.file).as_posix()
+        phase = replace(phase, correction=replace(phase.correction, file=place))
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
@@ -115,28 +117,20 @@ def export(
     return _advance(opened, folder, watch)
 
 
-def _copy_beside(original: Path, copy: Path, file: Path, key: str) -> None:
-    """Copy a file that a bench file names under a key to where the bench file's copy finds it.
+def _beside(bench: BenchFile, file: Path | None, copied: str | None) -> dict[Path, Path]:
+    """The files that a bench file names, by their places in a session, where the bench file's copy finds them.
 
-    UserError for one that does not lie in the bench file's folder.
+    copied: place of that copy. UserError for a file that does not lie in the bench file's folder.
     """
-    name = os.path.relpath(file.resolve(), original.resolve().parent)
-    if not _stays_inside(name):
-        raise UserError(f"{original}: {key}: {name} does not travel with a session; put it beside this file")
-    (copy.parent / name).parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(file, copy.parent / name)
-
-
-def _phase(bench: BenchFile, file: Path, folder: Path, copied: str) -> Convention:
-    """The phase convention of a bench file, whose correction map travels with it. copied: its place in the folder."""
-    if bench.phase.correction is None:
-        return bench.phase
-    name = bench.phase.correction.file
-    if not _stays_inside(copied):
-        raise UserError(f"{file}: it does not travel with a session, and so does not {name}; put it beside the study")
-    _copy_beside(file, folder / copied, file.parent / name, "phase.correction.file")
-    place = (Path(copied).parent / name).as_posix()
-    return replace(bench.phase, correction=replace(bench.phase.correction, file=place))
+    if file is None:
+        return {}
+    named = {} if bench.phase.correction is None else {"phase.correction.file": Path(bench.phase.correction.file)}
+    if isinstance(bench.capture.dark, str) and copied and _stays_inside(copied):  # else it is read where it is
+        named["capture.dark"] = Path(os.path.relpath(bench.capture.dark, file.resolve().parent))
+    for key, name in named.items():
+        if not (copied and _stays_inside(copied) and _stays_inside(str(name))):
+            raise UserError(f"{file}: {key}: {name} does not travel with a session; put it beside this file")
+    return {Path(copied or "").parent / name: file.parent / name for name in named.values()}
 
 
 def _kept_dark(given: str | float | None, folder: Path) -> str | float | None:
