@@ -12,7 +12,6 @@ from torch import Tensor
 
 from .propagation_reference import (
     INSETS,
-    RIGHT,
     ROUNDED,
     TAU,
     Grid,
@@ -146,6 +145,10 @@ def _low_passes(
     for name, radius in RADII.items():
         order = torch.argsort(radius(fy[:, None], fx).flatten())
         last = int((power[order].cumsum(0) < present * power.sum()).sum())
-        limit = float(radius(fy[:, None], fx).flatten()[order[min(last, len(order) - 1)]])
-        twin = propagated(field, setting, physics, replace(RIGHT, radius=radius, limit=limit))
+        near = float(radius(fy[:, None], fx).flatten()[order[min(last, len(order) - 1)]])
+        limits = (near * (1 + step / 100) for step in range(-6, 7))  # an image's edges hide some of the light
+        twins = {
+            limit: propagated(field, setting, physics, Transform(4, radius=radius, limit=limit)) for limit in limits
+        }
+        limit, twin = min(twins.items(), key=lambda each: difference(image, each[1], field))
         yield f"a low pass: the band ends at {2 * limit * setting.pitch:.2f} of that of the pixels{name}", twin

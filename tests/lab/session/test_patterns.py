@@ -78,8 +78,9 @@ def test_a_changed_map_is_another_bench(tmp_path: Path) -> None:
 def test_what_is_wrong_with_the_levels_of_a_bench_is_one_line(tmp_path: Path, phase: str, says: str) -> None:
     (tmp_path / "lab").mkdir()
     cv2.imwrite(str(tmp_path / "up.bmp"), FLAT)
-    _, said = exported(tmp_path / "lab", f"{BENCH}phase: {phase}\n")
+    session, said = exported(tmp_path / "lab", f"{BENCH}phase: {phase}\n")
     assert says in said
+    assert not session.exists()
 
 
 def test_a_manifest_names_no_map_outside_its_folder(tmp_path: Path) -> None:
