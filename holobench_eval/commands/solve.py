@@ -74,9 +74,11 @@ def _folders(picture: Path) -> Iterator[Path]:
 def _is_free(folder: Path, picture: Path, study: str) -> bool:
     """Whether a folder holds no report, or that of this study of this picture."""
     config, copy = folder / STUDY, folder / "picture" / picture.name
-    if not config.exists():
-        return not (folder / "records").exists()
-    return config.read_text(encoding="utf-8") == study and copy.is_file() and copy.read_bytes() == picture.read_bytes()
+    if not (folder / "records").exists():
+        return True
+    if not (config.is_file() and copy.is_file()):
+        return False
+    return config.read_text(encoding="utf-8") == study and copy.read_bytes() == picture.read_bytes()
 
 
 def _copy(picture: Path, folder: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import is_dataclass, make_dataclass, replace
+from dataclasses import fields, is_dataclass, make_dataclass, replace
 from functools import cache, lru_cache, wraps
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -201,8 +201,15 @@ def made(cls: type[Any], owner: str, params: dict[str, Any], adapter: TypeAdapte
         raise UserError(f"{owner} cannot be built: {first}") from error
 
 
+LATER = {"later": True}
+"""Metadata of a parameter that came after results were kept: with its default it is in no name, so they keep theirs."""
+
+
 def params_of(plugin: Any) -> dict[str, Any]:
-    """Every parameter of a method or dataset as plain JSON values, defaults included."""
+    """Every parameter of a method or dataset as plain JSON values, defaults included but for those of ``LATER``."""
     params: dict[str, Any] = TypeAdapter(type(plugin)).dump_python(plugin, mode="json")
+    for item in fields(plugin):
+        if item.metadata == LATER and getattr(plugin, item.name) == item.default:
+            del params[item.name]
     canonical(params)
     return params

@@ -94,7 +94,10 @@ class Stopwatch:
             memory = None if peak is None else max(0, peak - self.before) / _KIB_PER_MIB
         if self.cpu is None or cpu is None:
             return Cost(seconds, memory)
-        return Cost(seconds, memory, cpu - self.cpu) if self.process is None else Cost(seconds + self.cpu, memory, cpu)
+        if self.process is None:
+            return Cost(seconds, memory, cpu - self.cpu)
+        before = self.cpu if self.device.type == "cpu" else 0.0  # to open a GPU takes longer than many solutions
+        return Cost(seconds + before, memory, cpu)
 
 
 def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Protocol
 
@@ -16,6 +16,7 @@ from torch import Tensor
 
 from ...core.errors import CellError, UserError
 from ...core.io import file_name
+from ...core.plugins import LATER
 from ...display.api import DisplaySpec
 from ...imaging.convention import Convention, Correction, FullTurn
 from ...optics.phase import are_levels
@@ -90,7 +91,7 @@ class Phases:
     variable: str = ""
     levels: Literal["integers", "all"] = "integers"
     two_pi_level: FullTurn | None = None
-    correction: Correction | None = None
+    correction: Correction | None = field(default=None, metadata=LATER)
     sign: Literal[1, -1] = 1
     origin: float = 0.0
     flip_horizontal: bool = False

@@ -127,3 +127,10 @@ def test_a_parameter_that_no_config_can_set_is_refused_in_one_line(
     with pytest.raises(UserError) as found:
         plugins.find("methods", "mine.py:f", tmp_path)
     assert str(found.value) == message
+
+
+def test_a_parameter_that_came_later_is_in_no_name_while_it_has_its_default() -> None:
+    own = {"file": "a.png", "two_pi_level": 200}
+    assert "correction" not in plugins.params_of(plugins.build("methods", "phases", own, None))
+    given = {**own, "correction": {"file": "flat.bmp"}}
+    assert plugins.params_of(plugins.build("methods", "phases", given, None))["correction"]["file"] == "flat.bmp"

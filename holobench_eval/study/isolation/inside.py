@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from importlib.machinery import ModuleSpec
-from multiprocessing import reduction
+from multiprocessing import reduction, set_start_method
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import current_process
 from pathlib import Path
@@ -51,6 +51,7 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
     torch.set_num_threads(1)
     cv2.setNumThreads(1)  # it looks for libraries when it is first called, which is here once for all calls
     current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # else a method could start no process
+    set_start_method("fork", force=True)  # its file is no module that another process could import
     channel, enclosed = Channel(control), namespace.enter()
     namespace.adopt()
     began = time.perf_counter()

@@ -22,11 +22,23 @@ PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # prctl(2)
 def enter() -> bool:
     """Go on as the first process of new namespaces, in a fork of this one, which waits for it and ends as it does.
 
-    False, and nothing has changed, where the system forbids it.
+    False, and nothing has changed, where the system forbids any part of it; a process of its own tries that out first.
     """
+    if (trial := os.fork()) == 0:
+        with suppress(OSError):
+            _enter()
+            os._exit(0)
+        os._exit(1)
+    if os.waitpid(trial, 0)[1]:
+        return False
+    _enter()
+    return True
+
+
+def _enter() -> None:
     user, group = os.geteuid(), os.getegid()
     if libc.unshare(CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNS):
-        return False
+        raise OSError("no namespaces")
     _map("uid_map", user)
     Path("/proc/self/setgroups").write_text("deny")  # else who is not root may map no group, user_namespaces(7)
     _map("gid_map", group)
@@ -34,9 +46,8 @@ def enter() -> bool:
         _end_as(os.waitpid(first, 0)[1])
     end_with_parent()
     # So that a number of /proc is one of this namespace; the mount is seen in it alone.
-    libc.mount(b"none", b"/", None, MS_REC | MS_PRIVATE, None)
-    libc.mount(b"proc", b"/proc", b"proc", 0, None)
-    return True
+    if libc.mount(b"none", b"/", None, MS_REC | MS_PRIVATE, None) or libc.mount(b"proc", b"/proc", b"proc", 0, None):
+        raise OSError("no /proc of its own")
 
 
 def end_with_parent() -> None:
@@ -50,11 +61,13 @@ def adopt() -> None:
 
 
 def _map(file: str, own: int) -> None:
-    """Keep the numbers of users or groups: all where this process may map them, as root may, else its own."""
+    """Keep the numbers of users or groups: all where this process may map them, as root may, else its own. OSError
+    where it may map none."""
     for line in ("0 0 4294967295", f"{own} {own} 1"):
         with suppress(OSError):
             Path("/proc/self", file).write_text(line)
             return
+    raise OSError(f"no {file}")
 
 
 def _end_as(status: int) -> None:

@@ -171,6 +171,7 @@ class MethodProcess:
         late = threading.Event()
         channel: Channel | None = None
         failure: Exception | None = None
+        is_left = False
 
         def stop() -> None:
             late.set()
@@ -187,15 +188,20 @@ class MethodProcess:
             yield pid, channel
             with suppress(OSError):  # one that has ended is not current
                 self._end_call()
-                self._next = self._fork(setting)
+                is_left = True
+                if device.type == "cpu":  # on a GPU it would hold memory while it waits
+                    self._next = self._fork(setting)
             return
         except (EOFError, OSError, GarbledError) as error:
             failure = error
+        except KeyboardInterrupt:
+            self.end()  # what it was about to tell would be taken for the answer to the next question
+            raise
         finally:
             timer.cancel()
             if channel is not None:
                 channel.connection.close()
-            ending = "" if self._next else self._ending()
+            ending = "" if is_left else self._ending()
         if late.is_set():
             raise CellError(f"took more than {limits.seconds:g} s, the limit of the study")
         what = "sent what is no answer" if isinstance(failure, GarbledError) else ending
@@ -246,6 +252,8 @@ class MethodProcess:
     def _ending(self) -> str:
         """End a call, and say how it ended by itself."""
         try:
+            if self._ends:
+                raise GarbledError("no end of the call before")
             self._end_call()
             status, self._ends = self._told(), False
         except (EOFError, OSError, GarbledError):
