@@ -202,7 +202,7 @@ def levels_of(light: interactive.Array) -> np.ndarray:
     return (srgb_encode(torch.from_numpy(light)) * 255).round().numpy().astype(np.uint8)
 
 
-@pytest.mark.parametrize(("full", "kind"), [(255, np.uint8), (65535, np.uint16), (1, np.float64)])
+@pytest.mark.parametrize(("full", "kind"), [(255, np.uint8), (65535, np.uint16), (65535, ">u2"), (1, np.float64)])
 def test_levels_of_a_picture_are_scored_as_the_light_that_they_stand_for(display, full, kind) -> None:
     levels = np.random.default_rng(1).integers(0, 256, (3, 104, 104), dtype=np.uint8)
     target = display.target(levels)

@@ -17,10 +17,12 @@ from .api import DisplaySpec, is_plain, type_name
 # sign or unit comes within 0.15 of these. Amplitudes in the place of phases have at most 0.37.
 RIGHT, BETTER, UNLIKE = 0.85, 0.1, 0.4
 GRAIN = 4  # pixels a side over which speckle is averaged
+FAINT = 0.03  # of the mean amplitude; of a target with less contrast, right phases too may come below UNLIKE
 EDGE = 0.02  # of a span, by which the values of a phase in another unit may miss its ends
 
 UNITS = {  # what values in a span may be, and what makes radians of them
     (0.0, 1.0): ("turns or amplitudes", math.tau),
+    (-0.5, 0.5): ("turns", math.tau),
     (0.0, 256.0): ("levels of 8 bits", math.tau / 256),
     (0.0, 360.0): ("degrees", math.tau / 360),
     (-180.0, 180.0): ("degrees", math.tau / 360),
@@ -70,7 +72,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     -------
     str
         What to say of the phase, such as "fits its target better with the opposite sign ..."; empty where nothing is
-        odd, and for a phase or a target without structure.
+        odd, and for a phase or a target without structure, which a target has where its contrast is above its speckle.
     """
     phase, target = phase.detach().cpu().float(), target.detach().cpu().float()
     low, high = (float(value) for value in phase.aminmax())
@@ -78,9 +80,10 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     own = as_given.get("", 1.0)
     if own >= RIGHT or low == high:
         return ""
-    unit, scale = _unit(low, high)
     readings = {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(0)}
-    readings |= {f"read as {unit}": scale * phase} if unit else {}
+    for (first, last), (unit, scale) in UNITS.items():
+        if first <= low and high <= last:
+            readings[f"read as {unit}"] = scale * phase
     fits = [(fit, pose) for pose, fit in as_given.items()]
     for reading, values in readings.items():
         fits += [(fit, f"{reading}, {pose}".removesuffix(", ")) for pose, fit in _fits(values, target, spec).items()]
@@ -88,7 +91,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     if best >= own + BETTER and best >= UNLIKE:
         return f"fits its target better {how} (correlation {best:.2f} on the nominal model; as it is, {own:.2f})"
     correlation = f"correlation {own:.2f} with its target on the nominal model, where holograms have about 0.9"
-    if unit:
+    if unit := _filled(low, high):
         return f"has values from {low:.2f} to {high:.2f}, as {unit} have ({correlation})"
     if own < UNLIKE:
         as_amplitudes = " and is never negative, as amplitudes are" if low >= 0 and high < math.pi else ""
@@ -96,18 +99,18 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     return ""
 
 
-def _unit(low: float, high: float) -> tuple[str, float]:
-    """The unit in whose span the values are, and what makes radians of them; an empty name where there is none."""
-    for (first, last), unit in UNITS.items():
+def _filled(low: float, high: float) -> str:
+    """The unit whose span the values fill from end to end; empty where there is none."""
+    for (first, last), (unit, _) in UNITS.items():
         gap = EDGE * (last - first)
         if first <= low <= first + gap and last - gap <= high <= last:
             return unit
-    return "", 1.0
+    return ""
 
 
 def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec) -> dict[str, float]:
     """The correlation of amplitudes of image and target, mean over colours, by the pose of the file; empty where the
-    target is even in all colours."""
+    target is even, or nearly so, in all colours."""
     fields = [
         spec.propagator(channel).forward(torch.polar(torch.ones_like(panel), panel))
         for channel, panel in enumerate(phase)
@@ -116,7 +119,7 @@ def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec) -> dict[str, float]:
     poses = {name: image.flip(axes) for name, axes in MIRRORED.items()}
     if spec.shape[0] == spec.shape[1]:
         poses |= {f"transposed, {name}".removesuffix(", "): pose.mT for name, pose in poses.items()}
-    wanted = _structure(target)
+    wanted = _structure(target, FAINT)
     lit = wanted.norm(dim=1) > 0
     if not lit.any():
         return {}
@@ -124,9 +127,12 @@ def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec) -> dict[str, float]:
     return {name: float((made * wanted).sum(1)[lit].mean()) for name, made in shown.items()}
 
 
-def _structure(image: Tensor) -> Tensor:
-    """Amplitudes ``(C, n)`` of an image ``(C, h, w)`` behind its speckle, of mean zero and norm one, or zero."""
+def _structure(image: Tensor, faint: float = 0.0) -> Tensor:
+    """Amplitudes ``(C, n)`` of an image ``(C, h, w)`` behind its speckle, of mean zero and norm one; zero where their
+    contrast is at most ``faint``."""
     coarse = avg_pool2d(image[None], GRAIN)[0].sqrt().flatten(1)
-    coarse = coarse - coarse.mean(1, keepdim=True)
+    mean = coarse.mean(1, keepdim=True)
+    coarse = coarse - mean
     norm = coarse.norm(dim=1, keepdim=True)
-    return torch.where(norm > 1e-4 * math.sqrt(coarse.shape[1]), coarse / norm.clamp_min(1e-12), 0.0)
+    least = (faint * mean).clamp_min(1e-4) * math.sqrt(coarse.shape[1])
+    return torch.where(norm > least, coarse / norm.clamp_min(1e-12), 0.0)

@@ -63,7 +63,7 @@ def capture_of(values: Numbers, what: str, meaning: object) -> Tensor:
     light = torch.from_numpy(array.astype(np.float32, order="C"))
     if meaning != "srgb":
         return light
-    encoded = light / FULL.get(str(array.dtype), 1)
+    encoded = light / FULL.get(array.dtype.name, 1)  # a name has no byte order
     if not (float(encoded.min()) >= 0 and float(encoded.max()) <= 1):  # nor NaN
         raise UserError(f"{what} of {array.dtype}; as sRGB expected uint8, uint16, or floating point in [0, 1]")
     return srgb_decode(encoded)

@@ -24,7 +24,7 @@ from .speckle import speckle_contrast
 
 VERSION = "v2"
 SMALLEST_SCORED = 16
-DIMMEST = 0.02  # of the light of the brightest colour; no colour of the photographs here has less than 0.07
+DIMMEST = 0.05  # of the light of the brightest colour; no colour of the photographs here has less than 0.07
 
 Image = Tensor | NDArray[np.floating]
 

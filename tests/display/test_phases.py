@@ -46,6 +46,8 @@ ODD = {
     "degrees of both signs": (lambda phase: DEGREES * ((phase + math.pi) % TAU - math.pi), "better read as degrees"),
     "levels": (lambda phase: LEVELS * phase, "better read as levels of 8 bits"),
     "turns": (lambda phase: phase / TAU, "better read as turns"),
+    "turns of both signs": (lambda phase: (phase / TAU + 0.5) % 1 - 0.5, "better read as turns"),
+    "levels over their number": (lambda phase: (phase / TAU * 255).round() / 255, "better read as turns"),
     "noise": (
         lambda phase: 6 * torch.rand(phase.shape, generator=torch.Generator().manual_seed(1)),
         "makes nothing like",
@@ -82,6 +84,24 @@ def test_a_right_phase_is_not_remarked_on(display: hb.OpenDisplay, target: Tenso
 def test_what_fits_better_is_named(display: hb.OpenDisplay, target: Tensor, phase: Tensor, kind: str) -> None:
     change, remark = ODD[kind]
     assert remark in phase_doubt(change(phase), target, display.spec)
+
+
+def test_a_unit_is_named_for_values_that_do_not_fill_its_span(display: hb.OpenDisplay, target: Tensor) -> None:
+    smooth = (solved(display, target, "wirtinger") % TAU).clamp(0.1 * TAU, 0.9 * TAU)
+    for kind in ("turns", "levels over their number", "degrees", "levels"):
+        change, remark = ODD[kind]
+        assert remark in phase_doubt(change(smooth), target, display.spec)
+
+
+@pytest.mark.parametrize("contrast", [0.01, 0.05, 0.07])
+@pytest.mark.parametrize("method", ["double_phase", "gerchberg_saxton"])
+def test_a_right_phase_of_a_nearly_even_target_is_not_remarked_on(
+    display: hb.OpenDisplay, method: str, contrast: float
+) -> None:
+    rows, columns = (torch.arange(n) // 16 for n in display.spec.region.shape)
+    checks = ((rows[:, None] + columns) % 2).expand(3, -1, -1)
+    even = 0.5 + contrast * checks
+    assert phase_doubt(solved(display, even, method) % TAU, even, display.spec) == ""
 
 
 @pytest.mark.parametrize(

@@ -178,14 +178,27 @@ def test_a_few_pixels_that_are_not_black_forgive_no_leak(capture: Tensor, red: T
     assert forgiven[-1] < 2
 
 
-def test_a_colour_with_a_fiftieth_of_the_brightest_s_light_has_a_factor_of_its_own(
+def test_a_colour_with_a_twentieth_of_the_brightest_s_light_has_a_factor_of_its_own(
     capture: Tensor, target: Tensor
 ) -> None:
     light = target.mean((1, 2), keepdim=True)
-    dim = target * torch.tensor([1.0, 0.0200001, 0.0200001]).view(3, 1, 1) * light[0] / light
+    dim = target * torch.tensor([1.0, 0.0500001, 0.0500001]).view(3, 1, 1) * light[0] / light
     _, factors = match(capture, dim)
     own = (capture * dim).sum((1, 2)) / capture.square().sum((1, 2))
     assert torch.allclose(factors, own, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("part", [0.02, 0.03, 0.04])
+def test_a_colour_below_a_twentieth_has_its_own_factor_in_proportion_to_its_light(
+    capture: Tensor, target: Tensor, part: float
+) -> None:
+    light = target.mean((1, 2), keepdim=True)
+    dim = target * torch.tensor([1.0, part, part]).view(3, 1, 1) * light[0] / light
+    _, factors = match(capture, dim)
+    own = (capture * dim).sum((1, 2)) / capture.square().sum((1, 2))
+    weights = dim.mean((1, 2))
+    common, share = weights @ own / weights.sum(), part / 0.05
+    assert torch.allclose(factors[1:], share * own[1:] + (1 - share) * common, rtol=1e-6, atol=0)
 
 
 def test_one_colour_has_the_score_of_the_same_picture_in_three_equal_ones(capture: Tensor, target: Tensor) -> None:
