@@ -26,7 +26,6 @@ from .manifest import (
     CAPTURES,
     CHECKS,
     DARK,
-    DARK_FILE,
     FIDUCIAL,
     LETTER,
     PATTERNS,
@@ -35,6 +34,7 @@ from .manifest import (
     Manifest,
     Pattern,
     capture_of,
+    dark_name,
     file_of,
     inside,
     read_manifest,
@@ -108,7 +108,8 @@ class FolderPhotographer:
         """The dark counts that were given with the export. UserError where their file has changed."""
         given = self.manifest.dark
         if isinstance(given, str):
-            path = next(self.folder.glob(f"{DARK_FILE}.*"), self.folder / DARK_FILE)
+            name = dark_name(given)
+            path = next(self.folder.glob(f"{name}.*"), self.folder / name)
             dark, sha256 = given_dark(str(inside(self.folder, path.name)))
             if sha256 != given:
                 raise UserError(f"{path}: has changed since the session was exported; put the file back")

@@ -27,7 +27,6 @@ LARGEST_MANIFEST = 64 * 2**20  # bytes, about 200,000 patterns
 SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 DARK, FIDUCIAL, HOLOGRAM, REPEAT = "dark", "fiducial", "hologram", "repeat"
 LETTER, REVERSED = "letter", "reversed"
-DARK_FILE = "dark"  # the name, without its ending, of the file of dark counts that came with the export
 CHECKS = 0  # the round of the patterns that check the bench, which may be left out
 
 Role = Literal["dark", "fiducial", "hologram", "repeat", "letter", "reversed"]
@@ -101,6 +100,11 @@ def file_of(round_: int, number: int) -> str:
 def capture_of(round_: int, number: int) -> str:
     """Where the photograph of a pattern belongs, without the ending of its kind."""
     return f"{CAPTURES}/{_folder_of(round_)}/{number:04d}"
+
+
+def dark_name(sha256: str) -> str:
+    """The name, without its ending, of the file of dark counts in a session: no other file there has it."""
+    return f"dark-{sha256[:16]}"
 
 
 def _folder_of(round_: int) -> str:

@@ -20,7 +20,7 @@ from ...lab.real import RealBench
 from ...lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
 from ...lab.session.bench_checks import bench_checks
 from ...lab.session.geometry import look
-from ...lab.session.manifest import DARK_FILE, refuse_links_out
+from ...lab.session.manifest import dark_name, refuse_links_out
 from .. import isolation
 from ..config import load_study
 from ..definition import Study
@@ -137,13 +137,11 @@ def _kept_dark(given: str | float | None, folder: Path) -> str | float | None:
     """The dark level for the manifest, or the sha256 of its file, of which the session gets a copy."""
     if given is None:
         return None
-    dark, told = given_dark(given)
+    dark, name = given_dark(given)
     if not dark.bias.ndim:
-        return float(told)
-    kept = folder / f"{DARK_FILE}{Path(str(given)).suffix.lower()}"
-    if not kept.exists():  # as the bench file's own
-        shutil.copyfile(str(given), kept)
-    return told
+        return float(name)
+    shutil.copyfile(str(given), folder / f"{dark_name(name)}{Path(str(given)).suffix.lower()}")
+    return name
 
 
 def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path | None) -> Advance:

@@ -47,6 +47,25 @@ def test_given_dark_counts_stand_for_dark_frames(tmp_path: Path, kind: str) -> N
     light, counts = photographer.light(pattern), photographer.counts(pattern)
     assert np.allclose(light * pattern.exposure, counts - DARK, atol=1e-2)
     if kind != "level":
-        np.save(folder / "dark.npy", np.zeros(counts.shape, np.float32))
+        (copy,) = folder.glob("dark-*.npy")
+        np.save(copy, np.zeros(counts.shape, np.float32))
         with pytest.raises(UserError, match="has changed since the session was exported"):
             FolderPhotographer(folder).light(pattern)
+
+
+def described(folder: Path, **bench: object) -> list[str]:
+    """The words of an export with a bench file."""
+    (folder / "study.yaml").write_text(STUDY)
+    panel = yaml.safe_load(PROFILE.read_text())["panel"] | {"shape": [144, 144]}
+    (folder / "dark.yaml").write_text(yaml.safe_dump({"name": "lab", "version": 1, "panel": panel, **bench}))
+    return ["session", "export", str(folder / "study.yaml"), str(folder / "out"), "--bench", str(folder / "dark.yaml")]
+
+
+def test_given_dark_counts_go_before_those_of_the_bench_file_whatever_the_files_are_called(tmp_path: Path) -> None:
+    for name, level in (("dark.npy", 64), ("new/dark.npy", 80)):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        np.save(tmp_path / name, np.full((100, 100), level, np.uint16))
+    words = described(tmp_path, capture={"dark_frames": 0, "dark": "dark.npy"})
+    done = CliRunner().invoke(app, [*words, "--dark", str(tmp_path / "new" / "dark.npy")])
+    assert done.exit_code == 0, (done.output, done.exception)
+    assert FolderPhotographer(tmp_path / "out").dark_of(1, 0).bias.mean() == 80
