@@ -198,3 +198,12 @@ def test_closing_turns_the_lasers_off():
 
 def test_a_colour_cameras_plane_follows_the_wavelength():
     assert [plane_of(nm * 1e-9) for nm in (638, 593, 532, 517, 488, 450)] == [0, 0, 1, 1, 2, 2]
+
+
+def test_each_laser_is_shown_the_levels_of_its_own_full_turn_with_the_map():
+    turns = np.random.default_rng(0).random((3, *bench().spec.shape))
+    convention = Convention(two_pi_level=(311.0, 256.0, 221.0), turns=turns)
+    bench_rig, phase = rig(convention=convention, channels=(0, 1, 2)), pattern_phase()
+    for channel, levels in enumerate(convention.levels(phase)):
+        bench_rig._show(phase, channel, convention, 0.0)
+        assert np.array_equal(bench_rig.scene.history[-1][1], levels)
