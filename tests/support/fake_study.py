@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -19,6 +20,7 @@ from torch import Tensor
 from holobench_eval.core.seeds import generator
 from holobench_eval.display import CalibratedBench, MeteredDisplay, load_profile
 from holobench_eval.display.account import Journal
+from holobench_eval.display.api import Capture
 from holobench_eval.display.metered import Known
 from holobench_eval.study import opening
 from holobench_eval.study.scoring import reference, scores
@@ -193,8 +195,8 @@ class FakeBench:
     def session(self, *names: object, exposure: tuple[float, ...] = ()) -> FakeSession:
         return FakeSession(self.spec, tuple(name for name in names if not isinstance(name, Tensor)))
 
-    def rectified(self, capture: Tensor, target: Tensor) -> Tensor:
-        return capture
+    def rectified(self, capture: Capture, target: Tensor) -> Tensor:
+        return capture.frame
 
 
 @dataclass(frozen=True)
@@ -204,9 +206,10 @@ class FakeSession:
     spec: Any
     names: tuple[object, ...]
 
-    def capture(self, phase: Tensor) -> Tensor:
+    def capture(self, phase: Tensor) -> Capture:
         noise = torch.rand((len(phase), *self.spec.region.shape), generator=generator(*self.names))
-        return phase.mean((1, 2))[:, None, None] + noise
+        frame = phase.mean((1, 2))[:, None, None] + noise
+        return Capture(frame, dark=0.0, white=math.inf, gain=(1.0,) * len(frame))
 
 
 def fake_display(place: Any, seed: int, device: torch.device | None = None) -> FakeBench:

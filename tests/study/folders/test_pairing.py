@@ -50,12 +50,15 @@ def test_a_colour_target_in_the_light_of_one_laser_is_refused(tmp_path):
     assert "light in its red channel alone and the target is in colour" in refused
 
 
-@pytest.mark.parametrize("target", [COLOUR, EQUAL, np.concatenate([GRAY, 0 * GRAY, 0 * GRAY])])
-def test_pictures_in_colour_are_compared_in_colour(tmp_path, target):
+@pytest.mark.parametrize(
+    ("target", "note"),
+    [(COLOUR, ""), (EQUAL, ""), (np.concatenate([GRAY, 0 * GRAY, 0 * GRAY]), "coffee has light in red alone")],
+)
+def test_pictures_in_colour_are_compared_in_colour(tmp_path, target, note):
     found = folders(tmp_path, (target * [[[0.9]], [[0.5]], [[0.7]]]).astype(np.float32), target)
     assert found.pairings["m", "coffee"].channel == ""
     assert found.pairings["m", "coffee"].refused == ""
-    assert found.notes == ()
+    assert [note in said for said in found.notes] == [True] * bool(note)
 
 
 @pytest.mark.parametrize(("capture", "target"), [(0.9 * EQUAL, GRAY), (0.9 * GRAY, EQUAL)])

@@ -27,7 +27,7 @@ def test_only_what_a_method_may_declare_is_taken_from_its_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     flags = {"camera": True, "timed": False, "solve": "mine", "_call": None}
-    facts = process.Facts("Mine", "", flags, ["solve"], "", None, 0.0)
+    facts = process.Facts("Mine", "", flags, ["solve"], "", None, 0.0, True)
     monkeypatch.setattr(process, "process_of", lambda *_: SimpleNamespace(facts=facts))
     cls = isolation.find("mine.py:Mine", tmp_path)
     assert isolation.traits("mine.py:Mine", tmp_path).camera
