@@ -82,7 +82,9 @@ def _counts(values: NDArray[Any], **facts: bool) -> Counts:
 
 
 def _planes_last(values: NDArray[Any], largest: int) -> NDArray[Any]:
-    """Numbers ``(H, W)`` or ``(H, W, 3)``, from an array that may have its colours first."""
+    """Numbers ``(H, W)`` or ``(H, W, 3)``, from an array that may have its colours first, or a single one."""
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
     if values.ndim == 3 and values.shape[2] != 3 and values.shape[0] in (1, 3):
         values = values.transpose(1, 2, 0) if len(values) == 3 else values[0]
     if values.ndim not in (2, 3) or values.shape[2:] not in ((), (3,)) or not values[..., :1].size > 0:
