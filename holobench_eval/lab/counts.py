@@ -96,6 +96,12 @@ def _planes_last(values: NDArray[Any], largest: int) -> NDArray[Any]:
     return values
 
 
+def step(values: NDArray[Any]) -> int:
+    """The largest power of two, up to 256, that divides every unsigned value; 0 where there is no light at all."""
+    joined = int(np.bitwise_or.reduce(values, axis=None))
+    return min(joined & -joined, 256)
+
+
 def _raw(content: bytes, path: Path) -> Counts:
     raw = read_raw(content, str(path))
     black = np.array(raw.black, dtype=np.float32)
