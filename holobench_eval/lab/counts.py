@@ -82,7 +82,9 @@ def _counts(values: NDArray[Any], **facts: bool) -> Counts:
 
 
 def _planes_last(values: NDArray[Any], largest: int) -> NDArray[Any]:
-    """Numbers ``(H, W)`` or ``(H, W, 3)``, from an array that may have its colours first."""
+    """Numbers ``(H, W)`` or ``(H, W, 3)``, from an array that may have its colours first, or a single one."""
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
     if values.ndim == 3 and values.shape[2] != 3 and values.shape[0] in (1, 3):
         values = values.transpose(1, 2, 0) if len(values) == 3 else values[0]
     if values.ndim not in (2, 3) or values.shape[2:] not in ((), (3,)) or not values[..., :1].size > 0:
@@ -92,6 +94,12 @@ def _planes_last(values: NDArray[Any], largest: int) -> NDArray[Any]:
     if values.shape[0] * values.shape[1] > largest:
         raise PictureError(f"{values.shape[1]} x {values.shape[0]} pixels; expected at most {largest // 10**6} million")
     return values
+
+
+def step(values: NDArray[Any]) -> int:
+    """The largest power of two, up to 256, that divides every unsigned value; 0 where there is no light at all."""
+    joined = int(np.bitwise_or.reduce(values, axis=None))
+    return min(joined & -joined, 256)
 
 
 def _raw(content: bytes, path: Path) -> Counts:

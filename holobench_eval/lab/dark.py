@@ -22,10 +22,15 @@ from .counts import read_counts
 
 @dataclass(frozen=True, eq=False)
 class Dark:
-    """Counts without light: bias and, for every unit of exposure, rate; of each sample, or numbers for all of them."""
+    """Counts without light: bias and, for every unit of exposure, rate; of each sample, or numbers for all of them.
+
+    full: the count of full scale of the file that they come from, 1 for floating point that never exceeds 1; None where
+    there is no file, or nothing is known of its scale.
+    """
 
     bias: NDArray[Any]
     rate: NDArray[Any] | float = 0.0
+    full: float | None = None
 
     def at(self, exposure: float) -> NDArray[Any]:
         """Counts of an exposure."""
@@ -37,23 +42,31 @@ class Dark:
         if dark.size > 1 and dark.shape != counts.shape:
             sizes = (" x ".join(map(str, array.shape)) for array in (dark, counts))
             raise UserError("the dark frame has {} samples and the photograph {}; expected the same".format(*sizes))
-        kinds = self.bias.dtype, counts.dtype
-        if kinds[0] != kinds[1] and all(kind.kind == "u" for kind in kinds):
-            depths = [8 * kind.itemsize for kind in kinds]
-            raise UserError("the dark frame has {} bits and the photograph {}; expected the same".format(*depths))
+        if counts.dtype.kind == "u":
+            self.refuse_other_scale(np.iinfo(counts.dtype).max)
         return np.asarray(counts - dark)
+
+    def refuse_other_scale(self, full: float) -> None:
+        """UserError where photographs whose full scale is ``full`` counts cannot be on the scale of these."""
+        if self.full == 1:
+            raise UserError(
+                f"the dark frame never exceeds 1 and the photograph counts to {full:g}; expected its counts"
+            )
+        if self.full is not None and (self.full > 255) != (full > 255):  # a camera of 12 bits writes files of 16
+            depths = [16 if each > 255 else 8 for each in (self.full, full)]
+            raise UserError("the dark frame has {} bits and the photograph {}; expected the same".format(*depths))
 
     def plane(self, index: int) -> Dark:
         """That of one colour, of a dark frame ``(C, H, W)`` with all of them or with one for all."""
         bias = self.bias[min(index, len(self.bias) - 1)] if self.bias.ndim == 3 else self.bias
-        return Dark(bias, self.rate)
+        return Dark(bias, self.rate, self.full)
 
 
 def given_dark(given: str | float, upright: bool = False) -> tuple[Dark, str]:
     """The dark counts that somebody states, and what tells them from others.
 
     given: a level, or the path of a file; upright: photographs are turned as their EXIF orientation says. UserError for
-    a file that is missing or no photograph.
+    a file that is missing, no photograph, or compressed with loss.
     """
     try:
         level = float(given)
@@ -62,8 +75,13 @@ def given_dark(given: str | float, upright: bool = False) -> tuple[Dark, str]:
         if not path.is_file():
             raise UserError(f"{path}: no such file; expected counts without light, as a level or a file") from None
         content = read(path)
-        dark = Dark(read_counts(content, path, linear=True, upright=upright).values)
-        return dark, hashlib.sha256(content).hexdigest()
+        counts = read_counts(content, path, linear=True, upright=upright)
+        if counts.is_lossy:
+            raise UserError(
+                f"{path}: compressed with loss, no counts; expected a PNG, TIFF, .npy or RAW file, or a level"
+            ) from None
+        full = counts.white if counts.values.dtype.kind == "u" else 1.0 if 0 < counts.white <= 1 else None
+        return Dark(counts.values, full=full), hashlib.sha256(content).hexdigest()
     if not math.isfinite(level) or level < 0:
         raise UserError(f"dark {given}: expected counts without light, 0 or more, or a file")
     return Dark(np.array(level, dtype=np.float32)), f"{level:g}"

@@ -151,6 +151,7 @@ class Rig:
     def _darks(self, exposures: Sequence[float]) -> tuple[Dark, ...]:
         if self.settings.dark is not None:
             dark, _ = given_dark(self.settings.dark)
+            dark.refuse_other_scale(self.camera.white)
             return tuple(dark.plane(plane) for plane in self.planes)
         self.laser.select(None)
         least, darks = min(self.settings.hdr), []

@@ -18,7 +18,7 @@ from rich.console import Console
 from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.metrics import score
-from holobench_eval.optics.colour import srgb_decode
+from holobench_eval.optics.colour import srgb_decode, srgb_encode
 from holobench_eval.study.folders import scoring as scored_pictures
 from tests.support.bayer import bayer_dng
 from tests.support.photographed import Picture, captured, drowned, photograph, pose, save
@@ -292,8 +292,28 @@ def test_a_black_level_that_turns_the_order_is_told_and_dark_takes_it_off(tmp_pa
         assert "take it off with --dark" in said
     assert "Bright where" not in right[1] + terminal
     assert "--dark 4096" in text
+    for said in run(tmp_path / "black", "linear", aligned=True, dark="4")[:2]:
+        assert "of its white, although --dark took 4 counts off: bright/astronaut" in said
     with pytest.raises(UserError, match="not off encoded values; expected --values linear"):
         run(tmp_path / "black", "srgb", dark="4096")
+
+
+@pytest.mark.parametrize(("values", "coarse"), [("stored", 1), ("srgb", 1), ("linear", 16)])
+def test_a_black_level_is_told_whatever_the_values_and_with_what_takes_it_off(tmp_path, values, coarse):
+    linear_counts(tmp_path, 4096)
+    for path in tmp_path.glob("captures/*/*.tif"):
+        counts = cv2.imread(str(path), -1)
+        if values == "linear":
+            cv2.imwrite(str(path), counts // coarse * coarse)
+            continue
+        encoded = srgb_encode(torch.from_numpy(counts / counts.max())).numpy()
+        cv2.imwrite(str(path.with_suffix(".png")), np.round(255 * encoded).astype(np.uint8))
+        path.unlink()
+    dark = "256" if values == "linear" else None
+    for said in run(tmp_path, values, aligned=True, dark=dark)[:2]:
+        assert "Bright where the target is darkest" in said
+        assert ("save linear counts and take it off with --dark" in said) == (values != "linear")
+        assert ("256 counts off (the files count in steps of 16: is it 4096?)" in said) == (values == "linear")
 
 
 def test_a_clipped_capture_of_linear_light_is_refused_as_in_a_study_though_dark_counts_are_taken_off(tmp_path):

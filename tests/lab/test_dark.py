@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from PIL import Image
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.bench_file import load_bench_file
@@ -41,9 +42,13 @@ def test_a_dark_frame_or_the_mean_of_several_is_taken_off_sample_by_sample(
 def test_dark_counts_that_do_not_fit_are_refused_in_one_line(tmp_path: Path) -> None:
     np.save(tmp_path / "small.npy", COUNTS[:, 1:])
     np.save(tmp_path / "eight.npy", np.zeros_like(COUNTS, np.uint8))
+    np.save(tmp_path / "parts.npy", np.full(COUNTS.shape, 0.08, np.float32))
+    Image.fromarray(np.full((24, 32), 60, np.uint8)).save(tmp_path / "lossy.jpg", quality=98)
     for given, line in (
         (tmp_path / "small.npy", "1 x 23 x 32 samples and the photograph 1 x 24 x 32"),
         (tmp_path / "eight.npy", "8 bits and the photograph 16"),
+        (tmp_path / "parts.npy", "the dark frame never exceeds 1 and the photograph counts to 65535"),
+        (tmp_path / "lossy.jpg", "lossy.jpg: compressed with loss"),
         (tmp_path / "none.npy", "no such file; expected counts without light"),
         ("-3", "0 or more, or a file"),
         ("nan", "0 or more, or a file"),

@@ -129,6 +129,13 @@ def test_what_is_set_is_not_measured():
     assert lines[1:3] == ["settling: 250 ms (as set)", "dark: 64.0 counts (as set)"]
 
 
+def test_a_dark_frame_of_another_depth_than_the_camera_ends_the_preparation(tmp_path):
+    np.save(tmp_path / "dark.npy", np.full((4, 4), 20, np.uint8))
+    bench_rig = rig(CaptureSettings(exposure=0.01, dark_frames=0, dark=str(tmp_path / "dark.npy"), settle=0.25))
+    with pytest.raises(UserError, match="8 bits and the photograph 16"):
+        bench_rig.prepare(asked(), quiet)
+
+
 def test_exposures_are_relative_to_those_of_the_letter_divided_by_its_own():
     plain, double = rig(), rig()
     one, two = plain.prepare(asked(), quiet), double.prepare(asked(relative=2.0), quiet)

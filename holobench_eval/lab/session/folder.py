@@ -21,7 +21,7 @@ from ...imaging.convention import Levels
 from ..dark import Dark, given_dark
 from ..photograph import Photograph, Request, plane_of
 from .checks import Series, check_present, check_series
-from .frames import Frame, Plane, facts, find, read_frame
+from .frames import Facts, Frame, Plane, facts, find, read_frame
 from .manifest import (
     CAPTURES,
     CHECKS,
@@ -150,6 +150,7 @@ class FolderPhotographer:
                 "session: one is one series of photographs"
             )
         series, faults = check_series(patterns, known)
+        faults += self._dark_faults(next(iter(known.items())))
         faults += [
             f"duplicated: {name} is {self._contents[frame.content]} of an earlier round"
             for name, frame in known.items()
@@ -159,6 +160,19 @@ class FolderPhotographer:
             self._series[number] = series
             self._contents |= {frame.content: name for name, frame in known.items() if frame.highest}
         return faults, sums
+
+    def _dark_faults(self, photograph: tuple[str, Facts]) -> list[str]:
+        """Why given dark counts are not on the scale of a round's photographs, from one that stands for all."""
+        if self.manifest.dark is None:
+            return []
+        name, frame = photograph
+        if not frame.linear:
+            return [f"{name}: compressed with loss, no counts to take dark ones off; save PNG, TIFF or RAW files"]
+        try:
+            self._given.refuse_other_scale(frame.top)
+        except UserError as error:
+            return [f"{name}: {error}"]
+        return []
 
     def accept(self, captures: Mapping[str, str]) -> None:
         """Keep what was read, so that a later change is noticed; captures: sha256 by name."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import UserError
 from ...optics.colour import srgb_decode
-from ..counts import read_counts
+from ..counts import read_counts, step
 from .manifest import SUFFIXES, inside
 
 MOST_PIXELS = 200_000_000  # more would be the bomb of a hostile file
@@ -99,10 +98,4 @@ def read_frame(path: Path, colour: int) -> Frame:
     if frame.is_lossy:
         light = srgb_decode(torch.from_numpy(counts / np.float32(255))).numpy() * np.float32(255)
         return Frame(light, 255.0, 1, sha256, linear=False)
-    return Frame(counts, frame.white, 1 if frame.is_raw else _step(plane), sha256, linear=True)
-
-
-def _step(levels: NDArray[Any]) -> int:
-    """The largest power of two, up to 256, that divides every level; 0 where there is no light at all."""
-    joined = int(np.bitwise_or.reduce(levels, axis=None))
-    return min(joined & -joined, 256)
+    return Frame(counts, frame.white, 1 if frame.is_raw else step(plane), sha256, linear=True)

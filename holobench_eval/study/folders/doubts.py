@@ -10,11 +10,13 @@ from ...imaging.align import ALIKE_IN_POSE, is_same_mirrored
 from ...lab.photograph import MOST_SATURATED
 from ..store import Record
 from .files import Folders, named
+from .pictures import Picture
 
 NEARLY_ITSELF = 40.0  # dB: the noise of a good camera alone leaves less
 # Of white; constant light of so much leaves 26 dB. Real captures (Stanford 2021) have 2 to 5 %, simulated displays but
 # the hazy leto-2020 less than 2 %, and a black level of 6 % of full scale gives 3 to 17 %.
 LIFTED = 0.05
+NOISE = 1.25  # of the darkest hundredth of a capture, which noise puts below its black level
 ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of it has a high PSNR
 
 
@@ -28,12 +30,14 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     if near := [_name(record) for record in captures if record.values()[psnr] > least[record.target]]:
         yield f"Nearly the target itself, which a photograph with sensor noise is not: {named(near)}."
     yield from _mirrored(captures, folders)
-    lifted = {_name(record): record.values().get("darkest", 0.0) for record in captures}
-    if bright := [f"{name} {value:.0%}" for name, value in lifted.items() if value > LIFTED]:
+    if bright := [record for record in captures if record.values().get("darkest", 0.0) > LIFTED]:
+        shares = named([f"{_name(record)} {record.values()['darkest']:.0%}" for record in bright])
+        first = folders.captures[bright[0].label, bright[0].target]
+        remedy = "" if first.dark else f" If the files still have one, {_remedy(bright[0])}."
         yield (
-            f"Bright where the target is darkest, by more than {LIFTED:.0%} of its white: {named(bright)}. Haze and "
-            "stray light of the display do that; so does a camera's black level, which can turn the order of methods. "
-            "If the files still have one, take it off with --dark FILE|LEVEL."
+            f"Bright where the target is darkest, by more than {LIFTED:.0%} of its white{_although(first)}: "
+            f"{shares}. Haze and stray light of the display do that; so does a camera's black level, which can turn "
+            f"the order of methods.{remedy}"
         )
     if clipped := [record for record in captures if (record.saturated or 0) > MOST_SATURATED]:
         shares = named([f"{_name(record)} {record.saturated:.2%}" for record in clipped])
@@ -42,6 +46,26 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     if unlike := [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]:
         correlations = named([f"{_name(record)} {record.capture['geometry']['correlation']:.2f}" for record in unlike])
         yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
+
+
+def _remedy(record: Record) -> str:
+    """How a black level is taken off the files of a capture."""
+    linear = record.capture["values"] == "linear"
+    return f"{'' if linear else 'save linear counts and '}take it off with --dark FILE|LEVEL"
+
+
+def _although(picture: Picture) -> str:
+    """What was taken off a capture that is bright in the dark all the same; empty where nothing was.
+
+    Counts of 12 bits at the upper end of 16 are 16 times those that the camera's own software shows.
+    """
+    if picture.dark is None:
+        return ""
+    taken, darkest = float(picture.dark.bias.mean()), float(np.percentile(picture.load(), 1)) * picture.white
+    larger = taken * picture.step
+    asked = f": is it {larger:g}?" if taken < larger < NOISE * darkest else ""
+    rest = f" (the files count in steps of {picture.step}{asked})" if picture.step > 1 else ""
+    return f", although --dark took {taken:g} counts off{rest}"
 
 
 def _mirrored(captures: Sequence[Record], folders: Folders) -> Iterator[str]:

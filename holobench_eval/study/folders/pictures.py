@@ -13,7 +13,7 @@ from ...core.errors import UserError
 from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
 from ...datasets.images import read
 from ...imaging.similarity import reduced
-from ...lab.counts import RIGHT, Counts, read_counts
+from ...lab.counts import RIGHT, Counts, read_counts, step
 from ...lab.dark import Dark
 from ...lab.session.checks import DEPTHS
 from .exposure import Levels, levels
@@ -38,7 +38,8 @@ class Picture:
     left out that is opaque everywhere; is_lossy: whether it was compressed with loss; is_linear: whether its values
     are linear in light by their kind, a RAW file's or floating point. structure: standard deviation of each channel's
     values, noise averaged away; levels: of each channel, whatever their brightness; full: the value from which a sample
-    is clipped; dark: counts without light.
+    is clipped; white: the count of full scale; step: all counts are multiples of it, as far as is known; dark: counts
+    without light.
     """
 
     path: Path
@@ -53,6 +54,8 @@ class Picture:
     structure: tuple[float, ...]
     levels: tuple[Levels, ...]
     full: float
+    white: float
+    step: int
     dark: Dark | None
 
     def load(self) -> Values:
@@ -112,6 +115,8 @@ def checked(path: Path, linear: bool = False, dark: Dark | None = None) -> Pictu
         structure=tuple(float(np.std(reduced(plane, FACTS_SIDE)[0])) for plane in values),
         levels=tuple(levels(plane) for plane in values),
         full=_full(counts),
+        white=counts.white,
+        step=step(counts.values) if counts.values.dtype.kind == "u" and not counts.is_raw else 1,
         dark=dark,
     )
 
@@ -128,8 +133,7 @@ def _full(counts: Counts) -> float:
     highest = int(counts.values.max())
     if counts.values.dtype != np.uint16 or counts.is_raw or not highest:
         return 1.0
-    joined = int(np.bitwise_or.reduce(counts.values, axis=None))
-    return highest / counts.white if highest + (joined & -joined) in {2**bits for bits in DEPTHS} else 1.0
+    return highest / counts.white if highest + step(counts.values) in {2**bits for bits in DEPTHS} else 1.0
 
 
 def _values(counts: Counts) -> Values:

@@ -234,7 +234,7 @@ class Scoring:
         kept = self.store.read(digest(cell))
         drawn = kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file()
         is_full = kept is not None and not identity.lacking(kept.scores, self.metrics)
-        if kept is not None and drawn and is_full and (self.values != "linear" or "darkest" in kept.values()):
+        if kept is not None and drawn and is_full and "darkest" in kept.values():
             return kept  # and not of a version that did not look at the darkest part
         capture, target = self.loaded(key)
         warp = alignment.warp if part is None else cropped(alignment.warp, part)
@@ -252,7 +252,7 @@ class Scoring:
         figures = self.second(frame, compared, warp)
         # In the precision that scores are computed in, so that there is no second copy of a large picture.
         image, reference = torch.from_numpy(sampled(frame, warp)).double(), compared.double()
-        figures |= {} if self.values != "linear" else {"darkest": darkest(image, reference)}
+        figures["darkest"] = darkest(self.as_light(image), self.as_light(reference))
         del capture, frame, compared  # of a large picture, read again to be drawn
         scores = self.scores(image, reference, self.metrics)
         capture, _ = self.loaded(key)

@@ -95,8 +95,8 @@ def export(
         shutil.copyfile(file, folder / place)
     phase = described_bench.phase if described_bench else Convention()
     if phase.correction is not None:
-        kept = Path(inside or BENCH).parent / phase.correction.file
-        phase = replace(phase, correction=replace(phase.correction, file=kept.as_posix()))
+        map_file = (Path(inside or BENCH).parent / phase.correction.file).as_posix()
+        phase = replace(phase, correction=replace(phase.correction, file=map_file))
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,

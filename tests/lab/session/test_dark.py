@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 from typer.testing import CliRunner
 
 import holobench_eval.display.simulated.profile as profiles
 from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.session.folder import FolderPhotographer
+from holobench_eval.lab.session.manifest import CHECKS
 from tests.lab.session.test_bench_checks import LAB, STUDY
 from tests.support.photographing import Lab
 
@@ -69,3 +71,26 @@ def test_given_dark_counts_go_before_those_of_the_bench_file_whatever_the_files_
     done = CliRunner().invoke(app, [*words, "--dark", str(tmp_path / "new" / "dark.npy")])
     assert done.exit_code == 0, (done.output, done.exception)
     assert FolderPhotographer(tmp_path / "out").dark_of(1, 0).bias.mean() == 80
+
+
+@pytest.mark.parametrize(
+    ("ending", "dark", "line"),
+    [
+        (".png", np.uint8(20), "has 8 bits and the photograph 16"),
+        (".png", np.float32(0.08), "never exceeds 1 and the photograph counts to 65535"),
+        (".jpg", np.uint8(20), "compressed with loss, no counts to take dark ones off"),
+    ],
+)
+def test_photographs_on_another_scale_than_the_given_dark_counts_are_a_fault(
+    tmp_path: Path, ending: str, dark: np.generic, line: str
+) -> None:
+    np.save(tmp_path / "dark.npy", np.full((100, 100), dark))
+    done = CliRunner().invoke(app, [*described(tmp_path), "--dark", str(tmp_path / "dark.npy")])
+    assert done.exit_code == 0, (done.output, done.exception)
+    photographer, draw = FolderPhotographer(tmp_path / "out"), np.random.default_rng(0)
+    for pattern in photographer.manifest.of_round(CHECKS):
+        counts = draw.integers(0, 250, (100, 100)).astype(np.uint16) * (1 if ending == ".jpg" else 256)
+        picture = Image.fromarray(counts.astype(np.uint8) if ending == ".jpg" else counts)
+        picture.save(tmp_path / "out" / f"{pattern.capture}{ending}")
+    faults, _ = photographer.check_round(CHECKS)
+    assert any(line in fault for fault in faults), faults

@@ -84,6 +84,12 @@ def test_light_is_above_the_dark_counts_and_a_capture_that_has_none_is_refused(t
         checked(tmp_path / "x.tif", linear=True, dark=given_dark("60000")[0])
 
 
+@pytest.mark.parametrize("shape", [(1, 48, 64), (48, 64, 1)])
+def test_gray_numbers_may_have_one_colour_first_or_last(tmp_path, shape):
+    np.save(tmp_path / "x.npy", FLOATS[1].reshape(shape))
+    assert np.allclose(checked(tmp_path / "x.npy").load()[0], FLOATS[1] / FLOATS[1].max(), atol=1e-6)
+
+
 @pytest.mark.parametrize(("shift", "last"), [(0, 4095), (4, 65520), (6, 64 * 1023)])
 def test_a_camera_of_fewer_bits_clips_at_its_own_last_level(tmp_path, shift, last):
     bits = last >> shift
