@@ -18,18 +18,23 @@ from ..core.errors import UserError
 def new_method(
     name: Annotated[str, typer.Argument(help="Lower-case words, such as my_method.")],
     folder: Annotated[Path, typer.Option(help="Where to write NAME.py and test_NAME.py.")] = Path(),
+    camera: Annotated[bool, typer.Option("--camera", help="One that captures its own holograms.")] = False,
+    trains: Annotated[bool, typer.Option("--trains", help="One that learns from captures first.")] = False,
 ) -> None:
     """Write a method that works, to be changed, and its test."""
-    method, test, source = write_method(name, folder)
+    if camera and trains:
+        raise UserError("--camera and --trains: each writes another method; choose one of them")
+    method, test, source = write_method(name, folder, "camera" if camera else "trains" if trains else "method")
     print(
         f"{method}\n{test}\nnext: pytest {test} (in a clone of holobench_eval, after pip install -e '.[dev]'); "
         f"name it in a config as '{source}'"
     )
 
 
-def write_method(name: str, folder: Path) -> tuple[Path, Path, str]:
+def write_method(name: str, folder: Path, kind: str = "method") -> tuple[Path, Path, str]:
     """Write ``NAME.py`` and ``test_NAME.py`` and return their paths and the method as a config names it.
 
+    kind: a template of methods: "method", which knows the nominal optics alone, "camera" or "trains".
     UserError for a name that is no module name and for files that exist: nothing is ever overwritten.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
@@ -44,7 +49,7 @@ def write_method(name: str, folder: Path) -> tuple[Path, Path, str]:
     words = {"name": name, "cls": cls, "title": name.replace("_", " ").capitalize()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for path, template in zip(paths, ("method.txt", "test_method.txt"), strict=True):
+        for path, template in zip(paths, (f"{kind}.txt", "test_method.txt"), strict=True):
             text = files(__package__).joinpath("templates", template).read_text(encoding="utf-8")
             path.write_text(Template(text).substitute(words), encoding="utf-8")
     except OSError as error:
