@@ -12,6 +12,8 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
+from ..core.errors import listed
+
 if TYPE_CHECKING:
     from ..report import Results
     from ..study.definition import Study
@@ -114,7 +116,7 @@ def print_holes(console: Console, results: Results) -> None:
         return
     console.print(f"without a score: {len(results.holes)} of {len(results.frame)} cells", highlight=False)
     for (state, _), cells in list(groups.items())[:MOST_REASONS]:
-        whose = ", ".join(dict.fromkeys(f"{method} on {condition}" for method, condition, _ in cells))
+        whose = listed(dict.fromkeys(f"{method} on {condition}" for method, condition, _ in cells))
         line = f"{len(cells)} {state} ({whose}): {cells[0][2] or 'no reason given'}"
         console.print(Padding(escape(line), (0, 0, 0, 2), expand=False), highlight=False)
     if len(groups) > MOST_REASONS:

@@ -13,6 +13,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from ..core.errors import listed
 from ..core.panels import is_small
 from .options import (
     ARTIFACTS,
@@ -228,5 +229,5 @@ def training_table(rows: list[TrainingRow]) -> Table:
         )
         state = f"{row.state}: {row.reason}" if row.reason else row.state
         name = row.name.rpartition("-")[0]
-        result.add_row(*map(escape, (name, ", ".join(row.needed_by), state)), *figures)
+        result.add_row(*map(escape, (name, listed(row.needed_by), state)), *figures)
     return result
