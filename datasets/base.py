@@ -61,7 +61,7 @@ class Dataset(Protocol):
         shape : tuple of int
             Rows and columns; the image is cropped to this aspect and never stretched.
         channels : {3, 1}
-            Red, green and blue, or luminance.
+            Red, green and blue, or luminance, see ``with_channels``.
 
         Returns
         -------
@@ -157,12 +157,16 @@ def with_channels(image: Tensor, channels: int) -> Tensor:
     image : Tensor
         ``(3, h, w)`` linear light.
     channels : {3, 1}
-        Three leave it as it is; one makes ``(1, h, w)`` luminance. UserError for others.
+        Three leave it as it is; one makes ``(1, h, w)`` luminance, or takes the colour that alone has light, which is
+        then as bright as the same picture in gray. UserError for others.
     """
     if channels == 3:
         return image
     if channels != 1:
         raise UserError(f"a target has 3 channels (R, G, B) or 1 (luminance), not {channels}")
+    lit = [plane for plane in image if plane.any()]
+    if len(lit) == 1:
+        return lit[0][None].clone()
     return torch.einsum("c,chw->hw", torch.tensor(LUMINANCE), image)[None].clamp(0.0, 1.0)
 
 

@@ -16,6 +16,7 @@ from PIL import Image
 import holobench_eval as hb
 from holobench_eval import interactive
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.optics.colour import srgb_encode
 from holobench_eval.report.charts.comparison import GAP, HEADER, SIDE, tile_size
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
@@ -197,6 +198,25 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
     assert np.array_equal(display.target(narrow), display.target(narrow.transpose(2, 0, 1).copy()))
 
 
+def levels_of(light: interactive.Array) -> np.ndarray:
+    return (srgb_encode(torch.from_numpy(light)) * 255).round().numpy().astype(np.uint8)
+
+
+@pytest.mark.parametrize(("full", "kind"), [(255, np.uint8), (65535, np.uint16), (1, np.float64)])
+def test_levels_of_a_picture_are_scored_as_the_light_that_they_stand_for(display, full, kind) -> None:
+    levels = np.random.default_rng(1).integers(0, 256, (3, 104, 104), dtype=np.uint8)
+    target = display.target(levels)
+    stored = (levels / 255 * full).round(0 if full > 1 else 9).astype(kind)
+    assert hb.score(stored, target=target, metrics=["psnr"], values="srgb")["psnr_linear"] == pytest.approx(80, abs=0.1)
+
+
+def test_counts_of_a_camera_are_linear_light_whatever_their_type(target) -> None:
+    counts = (target * 4095).astype(np.uint16)
+    found = hb.score(counts, target=target, metrics=["psnr"], values="linear")
+    assert found == hb.score(counts.astype(np.float64), target=target, metrics=["psnr"])
+    assert found["psnr_linear"] > 60
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -237,7 +257,23 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
         (lambda d, t: d.solve(3, t), "a method of type 'int'; expected a name"),
         (lambda d, t: d.solve("wirtinger", t * np.nan), r"a target with values from nan to nan; .* in \[0, 1\]"),
         (lambda d, t: d.solve("wirtinger", t * 2), r"a target with values from 0 to .*; expected .* in \[0, 1\]"),
-        (lambda d, t: d.solve("wirtinger", t + 1j), "a target of complex64; expected real numbers"),
+        (lambda d, t: d.solve("wirtinger", t + 1j), "a target of complex64; expected linear light in"),
+        (lambda d, t: d.solve("wirtinger", levels_of(t)), "a target of uint8; expected linear light in"),
+        (
+            lambda d, t: d.capture(np.zeros((3, 128, 128)), levels_of(t)),
+            "a target of uint8; .* OpenDisplay.target",
+        ),
+        (
+            lambda d, t: hb.score(levels_of(t), target=t),
+            "a capture of uint8; expected values='linear'",
+        ),
+        (lambda d, t: hb.score(t > 0.5, target=t), "a capture of bool; expected"),
+        (lambda d, t: hb.score(t, target=levels_of(t)), "a target of uint8; expected linear light"),
+        (lambda d, t: hb.score(t, target=levels_of(t), values="srgb"), "a target of uint8; expected linear light"),
+        (lambda d, t: hb.score(levels_of(t).astype(int), target=t, values="srgb"), "of int64; as sRGB expected uint8"),
+        (lambda d, t: hb.score(2 * t, target=t, values="srgb"), r"of float32; as sRGB .* floating point in \[0, 1\]"),
+        (lambda d, t: hb.score(t, target=t, values="stored"), "values: expected 'linear' or 'srgb'; got 'stored'"),
+        (lambda d, t: hb.compare(t, {"a": levels_of(t)}), "capture 'a' of uint8; expected linear light"),
         (lambda d, t: d.solve("phases", t, file="gone.png"), "gone.png: no such file"),
         (lambda d, t: d.capture(np.zeros((3, 5, 5)), t), "the display shows"),
         (
@@ -251,6 +287,11 @@ def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
             lambda d, t: d.capture(np.arange(3.0 * 128 * 128).reshape(3, 128, 128) % 256, t),
             "a phase has whole numbers up to 255: levels; expected radians, modulo 2 pi",
         ),
+        (
+            lambda d, t: d.capture(np.full((3, 128, 128), 1e30), t),
+            r"reaches 1e\+30 rad, where float32 has lost the turn",
+        ),
+        (lambda d, t: d.ideal(np.full((3, 128, 128), -2.7e5)), r"reaches 2\.7e\+05 rad, .* expected it modulo 2 pi"),
         (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase holds 49152 values that are NaN or infinite"),
         (lambda d, t: hb.open_display("ideal", panel=(256.0, 256)), r"rows and columns such as .*; got \(256.0, 256\)"),
         (lambda d, t: hb.open_display("ideal", panel=256), "rows and columns such as .*; got 256"),

@@ -51,9 +51,14 @@ def write_report(
 
 
 def print_headline(console: Console, results: Results) -> None:
-    """Print the headline score, rank and captures of every method, a table a condition, in 80 columns."""
+    """Print the headline score, rank and captures of every method, a table a condition, in 80 columns; and what is odd
+    about phases."""
+    from ..report.data.phrases import remarks
+
     for condition in results.conditions:
         console.print(headline_table(results, condition))
+    for remark in remarks(results):
+        console.print(remark, style="yellow", markup=False, highlight=False, soft_wrap=True)
 
 
 def headline_table(results: Results, condition: str) -> Table:

@@ -12,11 +12,10 @@ import torch
 from torch import Tensor
 from torch.nn import Parameter
 
-from ..core.errors import CellError
 from ..imaging.register import Registration
 from ..optics import AngularSpectrum
 from ..optics.convolution import frequencies
-from ..optics.phase import Matrix, are_levels, refocus
+from ..optics.phase import Matrix, refocus
 from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
@@ -379,22 +378,3 @@ def from_numpy(value: Any) -> Any:
 def type_name(value: object) -> str:
     """What a value is called in messages; an array with the type of its numbers."""
     return f"ndarray of {value.dtype}" if type(value) is np.ndarray else type(value).__name__
-
-
-def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
-    """Refuse a phase ``(C, H, W)`` [rad] that no display can show. label: name of the method in the error message.
-
-    CellError for another shape or type, a subclass of ``Tensor`` among them, for values that are not finite or levels.
-    """
-    who = f"{label}: " if label else ""
-    if not is_plain(phase):
-        raise CellError(f"{who}phase is {type_name(phase)}, the display shows a plain torch.Tensor")
-    if phase.ndim != 3 or tuple(phase.shape[-2:]) != spec.shape:
-        raise CellError(f"{who}phase is {tuple(phase.shape)}, the display shows (C, {spec.shape[0]}, {spec.shape[1]})")
-    if phase.is_complex() or not phase.is_floating_point():
-        raise CellError(f"{who}phase is {phase.dtype}, the display shows real numbers in radians")
-    bad = int((~torch.isfinite(phase.float())).sum())  # in the precision that the display computes in
-    if bad:
-        raise CellError(f"{who}phase holds {bad} values that are NaN or infinite; the display refuses it")
-    if are_levels(phase):
-        raise CellError(f"{who}phase has whole numbers up to {phase.max():g}: levels; expected radians, modulo 2 pi")

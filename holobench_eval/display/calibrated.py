@@ -16,12 +16,12 @@ from .api import (
     Exposure,
     Fiducials,
     RectifiedCapture,
-    check_phase,
     efficiency,
     in_target_frame,
     white_irradiance,
 )
 from .metered import MethodHandles
+from .phases import check_phase
 from .resampling import Resampling
 from .simulated.pipeline import BenchSession, SimulatedBench
 from .simulated.stages.relay import sample

@@ -18,12 +18,12 @@ from .api import (
     Exposure,
     RectifiedCapture,
     Simulation,
-    check_phase,
     efficiency,
     from_numpy,
     white_irradiance,
 )
 from .metered import MeteredDisplay, MethodHandles
+from .phases import check_phase
 
 
 class Predictor(Protocol):

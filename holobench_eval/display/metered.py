@@ -14,7 +14,8 @@ from torch import Tensor
 from ..core.errors import BudgetError, CellError
 from ..core.seeds import generator
 from .account import Account, Journal
-from .api import Camera, Capture, Display, DisplaySpec, Simulation, check_phase, white_irradiance
+from .api import Camera, Capture, Display, DisplaySpec, Simulation, white_irradiance
+from .phases import check_phase
 from .traits import traits_of
 
 

@@ -15,8 +15,9 @@ from ..core.device import CPU, moved
 from ..core.errors import CellError
 from ..core.seeds import generator
 from .account import Account, Journal
-from .api import Camera, Display, DisplaySpec, check_phase, white_irradiance
+from .api import Camera, Display, DisplaySpec, white_irradiance
 from .metered import Known, OpenLoop, Solver
+from .phases import check_phase
 
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""

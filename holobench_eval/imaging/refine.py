@@ -1,4 +1,4 @@
-"""Bounded rigid refinement of one capture against its target (protocol v1, point 3)."""
+"""Bounded rigid refinement of one capture against its target (protocol, point 3)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Refined:
 
 
 def refine(capture: Tensor, target: Tensor) -> Refined:
-    """Align a rectified capture with its target by a bounded rigid move (protocol v1, point 3).
+    """Align a rectified capture with its target by a bounded rigid move (protocol, point 3).
 
     One shift and rotation for all channels, at most 2 px and 0.1 degree, that maximises the correlation of the square
     root of the light summed over the channels (the enhanced correlation coefficient of Evangelidis & Psarakis, IEEE

@@ -1,4 +1,4 @@
-"""Where the scored region lands on the sensor, from one capture of a fiducial grid (protocol v1, point 2).
+"""Where the scored region lands on the sensor, from one capture of a fiducial grid (protocol, point 2).
 
 The steps: find the circles (`circles`), a RANSAC homography, sub-pixel offsets of every circle (`subpixel`), and a
 quadratic distortion where it lowers the residual by more than chance would. All offsets come from local correlation
@@ -105,7 +105,7 @@ class Registration:
 
 
 def register(image: Tensor, grid: FiducialGrid, bound: float = 0.3) -> Registration:
-    """Register a camera from the capture of the grid's hologram (protocol v1, point 2).
+    """Register a camera from the capture of the grid's hologram (protocol, point 2).
 
     Parameters
     ----------

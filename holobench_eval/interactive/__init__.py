@@ -7,6 +7,7 @@ methods of files in processes of their own; what is here is for a notebook, wher
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,14 +23,15 @@ from ..core.panels import is_small, rows_and_columns
 from ..core.plugins import build
 from ..datasets.base import fit, with_channels
 from ..datasets.images import decode, from_array, read
-from ..display.api import DisplaySpec, check_phase, from_numpy, ideal_image, is_plain, type_name
+from ..display.api import DisplaySpec, from_numpy, ideal_image, is_plain, type_name
+from ..display.phases import check_phase, phase_doubt
 from ..display.traits import traits_of
 from ..metrics import catalogue, match
 from ..metrics import score as _score
 from ..optics.colour import srgb_encode
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
-from .given import Numbers, array_of, as_in_config, names, path_of, tensor_of, whole
+from .given import LIGHT, RADIANS, Numbers, array_of, as_in_config, capture_of, names, path_of, tensor_of, whole
 from .methods import method_of
 
 if TYPE_CHECKING:
@@ -143,6 +145,8 @@ class OpenDisplay:
             The camera cannot be registered.
         """
         light, shown = self._target(target), self._phase(phase)
+        if doubt := phase_doubt(shown, light, self.spec):
+            warnings.warn(f"the phase {doubt}", stacklevel=2)
         with self._threads():
             return self._bench.photograph(shown, light, _name(light), whole(repeat, "repeat")).image.cpu().numpy()
 
@@ -172,7 +176,7 @@ class OpenDisplay:
             torch.set_num_threads(before)
 
     def _target(self, target: Numbers) -> Tensor:
-        light, wanted = tensor_of(target, "a target"), (len(self.spec.wavelengths), *self.spec.region.shape)
+        light, wanted = tensor_of(target, "a target", LIGHT), (len(self.spec.wavelengths), *self.spec.region.shape)
         if tuple(light.shape) != wanted:
             raise UserError(f"a target of {tuple(light.shape)}; expected {wanted}, as OpenDisplay.target gives it")
         low, high = (float(value) for value in light.aminmax())
@@ -181,7 +185,7 @@ class OpenDisplay:
         return light.clamp_(0, 1)
 
     def _phase(self, phase: Numbers) -> Tensor:
-        shown, wanted = tensor_of(phase, "a phase", radians=True), (len(self.spec.wavelengths), *self.spec.shape)
+        shown, wanted = tensor_of(phase, "a phase", RADIANS), (len(self.spec.wavelengths), *self.spec.shape)
         if tuple(shown.shape) != wanted:
             raise UserError(f"a phase of {tuple(shown.shape)}; the display shows {wanted}")
         try:
@@ -267,17 +271,23 @@ def open_bench(file: str | Path, seed: int = 0) -> OpenDisplay:
     return OpenDisplay(real_condition(path.name, path.parent), whole(seed, "seed"), path.parent)
 
 
-def score(capture: Numbers, *, target: Numbers, metrics: Sequence[str] | None = None) -> dict[str, float]:
+def score(
+    capture: Numbers, *, target: Numbers, metrics: Sequence[str] | None = None, values: str | None = None
+) -> dict[str, float]:
     """The scores of a capture by the metric protocol, by the names that the columns of a study have.
 
     Parameters
     ----------
     capture
-        ``(C, h, w)`` linear light in any unit, aligned with the target.
+        ``(C, h, w)``, aligned with the target: floating point is linear light in any unit.
     target
-        ``(C, h, w)`` linear light in [0, 1]. It is given by its name: the two in the other order have another score.
+        ``(C, h, w)`` linear light in [0, 1] as floating point. It is given by its name: the two in the other order have
+        another score.
     metrics
         Names, such as ``["psnr", "ssim"]``; None for all that can be computed here.
+    values
+        What the numbers of the capture are: ``"linear"``, counts of light; or ``"srgb"``, levels as pictures store
+        them, which are decoded. A capture of integers is refused without it.
 
     Returns
     -------
@@ -290,7 +300,7 @@ def score(capture: Numbers, *, target: Numbers, metrics: Sequence[str] | None = 
         Other shapes or values, or an unknown metric.
     """
     computed = [metric.name for metric in catalogue() if metric.available() is None] if metrics is None else metrics
-    light, wanted = tensor_of(capture, "a capture"), tensor_of(target, "a target")
+    light, wanted = capture_of(capture, "a capture", values), tensor_of(target, "a target", LIGHT)
     try:
         found = _score(light, wanted, metrics=names(computed, "metrics"))
     except ValueError as error:
@@ -310,7 +320,7 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     target
         ``(C, h, w)`` linear light in [0, 1].
     captures
-        ``(C, h, w)`` linear light, by the names of their columns.
+        ``(C, h, w)`` linear light as floating point, by the names of their columns.
     path
         Of the picture: a PNG or a JPEG, as it ends in .png, .jpg or .jpeg.
 
@@ -336,8 +346,8 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
         raise UserError('captures: expected arrays by their names, such as {"wirtinger": image}')
     if not captures:
         raise UserError("no captures to compare")
-    wanted = tensor_of(target, "a target")
-    images = {name: tensor_of(capture, f"capture '{name}'") for name, capture in captures.items()}
+    wanted = tensor_of(target, "a target", LIGHT)
+    images = {name: tensor_of(capture, f"capture '{name}'", LIGHT) for name, capture in captures.items()}
     for name, image in images.items():
         if image.shape != wanted.shape:
             raise UserError(

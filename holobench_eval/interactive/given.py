@@ -12,8 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from ..core.errors import UserError
+from ..optics.colour import srgb_decode
 
 Numbers = ArrayLike | Tensor
+FULL = {"uint8": 255, "uint16": 65535}  # scale of the levels of pictures
+LIGHT = "linear light in [0, 1] as floating point; OpenDisplay.target makes it of a picture"
+RADIANS = "radians as floating point, as np.angle gives them"
 
 
 def array_of(values: Numbers, what: str) -> NDArray[Any]:
@@ -32,17 +36,37 @@ def array_of(values: Numbers, what: str) -> NDArray[Any]:
         raise UserError(f"{what} whose rows differ in length; expected an array") from None
 
 
-def tensor_of(values: Numbers, what: str, radians: bool = False) -> Tensor:
-    """Real numbers as a tensor of single precision, in memory of its own.
+def tensor_of(values: Numbers, what: str, right: str) -> Tensor:
+    """Floating-point numbers as a tensor of single precision, in memory of its own.
 
-    what: these numbers, in the UserError for complex ones and for what are none. radians: integers are refused, too,
-    since they would be levels of a panel.
+    what, right: these numbers and what is expected, in the UserError for others: integers may be levels of a panel or
+    of a picture as well as counts.
     """
     array = array_of(values, what)
-    if array.dtype.kind not in ("f" if radians else "fiub"):
-        right = "radians as floating point, as np.angle gives them" if radians else "real numbers"
+    if array.dtype.kind != "f":
         raise UserError(f"{what} of {array.dtype}; expected {right}")
     return torch.from_numpy(array.astype(np.float32, order="C"))
+
+
+def capture_of(values: Numbers, what: str, meaning: object) -> Tensor:
+    """A capture as linear light, single precision. UserError for numbers that may be light or levels of a picture.
+
+    what: the capture, in the UserError; meaning: of its numbers, ``linear`` or ``srgb``; None: linear, unless they are
+    integers.
+    """
+    if meaning not in (None, "linear", "srgb"):
+        raise UserError(f"values: expected 'linear' or 'srgb'; got {meaning!r}")
+    array = array_of(values, what)
+    if array.dtype.kind not in ("fiu" if meaning else "f"):
+        counts, levels = "values='linear' for counts of light", "values='srgb' for levels of a picture"
+        raise UserError(f"{what} of {array.dtype}; expected {counts}, {levels}, or floating point")
+    light = torch.from_numpy(array.astype(np.float32, order="C"))
+    if meaning != "srgb":
+        return light
+    encoded = light / FULL.get(str(array.dtype), 1)
+    if not (float(encoded.min()) >= 0 and float(encoded.max()) <= 1):  # nor NaN
+        raise UserError(f"{what} of {array.dtype}; as sRGB expected uint8, uint16, or floating point in [0, 1]")
+    return srgb_decode(encoded)
 
 
 def as_in_config(value: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from torch import Tensor
 
-MOST_SATURATED = 0.001  # fraction of saturated samples with which a capture is still used (protocol v1, step 1)
+MOST_SATURATED = 0.001  # fraction of saturated samples with which a capture is still used (protocol, step 1)
 BLUE_BELOW, RED_ABOVE = 490e-9, 580e-9  # metres
 
 

@@ -18,12 +18,12 @@ from ..display.api import (
     Exposure,
     RectifiedCapture,
     Simulation,
-    check_phase,
     efficiency,
     in_target_frame,
     white_irradiance,
 )
 from ..display.metered import MethodHandles
+from ..display.phases import check_phase
 from ..imaging.cross_check import disagreement, second_warp
 from ..imaging.grid import fiducial
 from ..imaging.register import Registration, register

@@ -7,8 +7,10 @@ the unexplained error is, per colour channel::
 
 where norms and cosine are those of the pixels as a vector. The factor ``|T|^2 / |Y|^2`` is the unit of light: it makes
 ``e(T) = min_s |s Y - T|^2``, the error of the capture against its target after the protocol's match and before its clip
-to [0, 1]. So the target is the first prediction of a capture, every better prediction leaves less, and the differences
-between the e of one prediction and of the next add up to e(T) exactly, whatever the predictions are.
+to [0, 1]. In a channel in which the target is black, the unit is the square of the factor that the protocol gives it:
+a leak is an error here, too. So the target is the first prediction of a capture, every better prediction leaves less,
+and the differences between the e of one prediction and of the next add up to e(T) exactly, whatever the predictions
+are.
 
 Two captures Y, Y' of the same hologram, each the noise-free picture M plus independent noise of the same power, have
 cos(Y, Y') = cos^2(Y, M) up to the noise's own chance. So ``|T|^2 (1 - cos(Y, Y'))`` is e(M), what the best prediction
@@ -19,6 +21,8 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor
+
+from .protocol import factors_of
 
 SMALLEST = 1e-12  # error that counts as none, a PSNR of 120 dB
 
@@ -50,7 +54,7 @@ def unexplained(capture: Tensor, prediction: Tensor, target: Tensor) -> float:
     >>> round(unexplained(torch.tensor([[[3.0, 1.0]]]), target, target), 6)
     0.2
     """
-    return float((_power(target) * (1 - _cosine(capture, prediction).square())).mean())
+    return float((_power(capture, target) * (1 - _cosine(capture, prediction).square())).mean())
 
 
 def temporal(capture: Tensor, again: Tensor, target: Tensor) -> float:
@@ -58,11 +62,14 @@ def temporal(capture: Tensor, again: Tensor, target: Tensor) -> float:
 
     capture, again: of the same hologram under independent noise, ``(C, h, w)`` each in any unit; target: as above.
     """
-    return float((_power(target) * (1 - _cosine(capture, again))).mean())
+    return float((_power(capture, target) * (1 - _cosine(capture, again))).mean())
 
 
-def _power(image: Tensor) -> Tensor:
-    return image.double().square().mean((-2, -1))
+def _power(capture: Tensor, target: Tensor) -> Tensor:
+    """That of each channel of a capture at matched brightness, ``(C,)``: the target's, unless that is black."""
+    capture, target = capture.double(), target.double()
+    _, common, share = factors_of(capture, target)
+    return torch.lerp((common * capture).square().mean((-2, -1)), target.square().mean((-2, -1)), share)
 
 
 def _cosine(first: Tensor, second: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""The metric protocol, version 1: everything between a rectified capture and its scores.
+"""The metric protocol, version 2: everything between a rectified capture and its scores.
 
 Any change to a value that ``score`` gives is a new version.
 """
@@ -22,8 +22,9 @@ from .base import Domain, Metric, gaussian_blur, remembered
 from .catalogue import catalogue
 from .speckle import speckle_contrast
 
-VERSION = "v1"
+VERSION = "v2"
 SMALLEST_SCORED = 16
+DIMMEST = 0.02  # of the light of the brightest colour; no colour of the photographs here has less than 0.07
 
 Image = Tensor | NDArray[np.floating]
 
@@ -42,7 +43,8 @@ _REPEATED = ("psnr", "ssim")  # also given after refinement and after blur
 def match(capture: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     """Match the brightness of each colour channel by least squares, then clip to [0, 1].
 
-    The factor is sum(I T) / sum(I I) in linear light over the entire region, without an offset, and never negative.
+    The factor is sum(I T) / sum(I I) in linear light over the entire region, without an offset, and never negative. A
+    channel in which the target is black gets the factor of the others, see ``factors_of``.
 
     Parameters
     ----------
@@ -56,26 +58,61 @@ def match(capture: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     image
         ``(C, h, w)``, matched.
     factors
-        ``(C,)``; a black channel has factor 0 and stays black.
+        ``(C,)``; a channel in which the capture is black stays black.
 
     Examples
     --------
     >>> image, factors = match(torch.full((1, 2, 2), 4.0), torch.full((1, 2, 2), 0.5))
     >>> float(factors), float(image.mean())
     (0.125, 0.5)
+
+    Where only the first channel of the target has light, light in the second is an error:
+
+    >>> target = torch.tensor([0.5, 0.0, 0.0]).view(3, 1, 1).expand(3, 2, 2)
+    >>> image, factors = match(torch.tensor([4.0, 2.0, 0.0]).view(3, 1, 1).expand(3, 2, 2), target)
+    >>> factors.tolist(), image[:, 0, 0].tolist()
+    ([0.125, 0.125, 0.125], [0.5, 0.25, 0.0])
     """
-    factors = _factors(capture, target)
+    own, common, share = factors_of(capture, target)
+    factors = torch.lerp(common, own, share)
     return (factors.view(-1, 1, 1) * capture).clamp_(0, 1), factors
 
 
-def _factors(capture: Tensor, target: Tensor) -> Tensor:
+def factors_of(capture: Tensor, target: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The parts of the factors of a match.
+
+    A factor of its own would dim a channel in which the target is black until its light is gone, and so forgive any
+    leak. The share goes to zero in proportion to the target's light, since a few pixels that are not black would bring
+    such a factor back. It depends on the target alone, so no capture can choose.
+
+    Parameters
+    ----------
+    capture, target
+        As of ``match``.
+
+    Returns
+    -------
+    own
+        ``(C,)``, the least-squares factor of each channel alone.
+    common
+        ``()``, the mean of these, weighted by the target's light: one that a leak made small counts for little.
+    share
+        ``(C,)``, of its own in the factor of a channel: 1 where the target's mean in it is at least `DIMMEST` of the
+        mean in its brightest channel, 0 where the target is black, linear in between.
+    """
     # Divided by the peak first, so that the squares neither overflow nor vanish.
     peak = torch.maximum(capture.amax(dim=(1, 2), keepdim=True), -capture.amin(dim=(1, 2), keepdim=True))
     peak = torch.where(peak > 0, peak, 1.0)
     scaled = capture / peak
-    power = scaled.square().sum(dim=(1, 2))
-    shared = (scaled * target).sum(dim=(1, 2)).clamp_min(0)
-    return torch.where(power > 0, shared / torch.where(power > 0, power, 1.0), 0.0) / peak.flatten()
+    product = (scaled * target).sum(dim=(1, 2)).clamp_min(0)
+    own = _ratio(product, scaled.square().sum(dim=(1, 2))) / peak.flatten()
+    light = target.mean(dim=(1, 2))
+    return own, _ratio((light * own).sum(), light.sum()), _ratio(light, DIMMEST * light.max()).clamp(0, 1)
+
+
+def _ratio(dividend: Tensor, divisor: Tensor) -> Tensor:
+    """The quotient, and zero where it is divided by zero."""
+    return torch.where(divisor > 0, dividend / torch.where(divisor > 0, divisor, 1.0), 0.0)
 
 
 @torch.no_grad()
@@ -89,7 +126,7 @@ def score(
     lpips_weights: str | Path | None = None,
     stored: bool = False,
 ) -> dict[str, float]:
-    """All scores of a capture against its target, after the intensity match (protocol v1).
+    """All scores of a capture against its target, after the intensity match (protocol v2).
 
     Parameters
     ----------
@@ -121,7 +158,7 @@ def score(
     Raises
     ------
     ValueError
-        Wrong shapes, values that are not finite, a target outside [0, 1].
+        Wrong shapes, values that are not finite, a target outside [0, 1] or black in all channels.
     UserError
         Unknown metric names, LPIPS weights that are named but cannot be used.
 
@@ -160,8 +197,7 @@ def score(
     if "speckle_contrast" in names and not stored:
         contrast = speckle_contrast(light, wanted)
         scores |= {} if math.isnan(contrast) else {"speckle_contrast": contrast}
-    if float(wanted.mean()) > 0:
-        scores["brightness_ratio"] = float(light.mean() / wanted.mean())
+    scores["brightness_ratio"] = float(light.mean() / wanted.mean())
     return scores | {f"scale_{channel}": float(factor) for channel, factor in enumerate(factors)}
 
 
@@ -174,9 +210,12 @@ def _softened(sigma: float) -> Callable[[Tensor], Tensor]:
 def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
     """Both as float64 tensors on one device; float64, since SSIM subtracts nearly equal squares."""
     light, wanted = (
-        (side if isinstance(side, Tensor) else torch.from_numpy(np.array(side, dtype=np.float64))).detach().double()
-        for side in (capture, target)
+        side if isinstance(side, Tensor) else torch.from_numpy(np.array(side)) for side in (capture, target)
     )
+    for name, side in (("capture", light), ("target", wanted)):
+        if not side.is_floating_point():  # levels of a picture, or counts
+            raise ValueError(f"the {name} is of {side.dtype}; expected linear light as floating point")
+    light, wanted = light.detach().double(), wanted.detach().double()
     light = light.to(wanted.device)
     if light.shape != wanted.shape or light.ndim != 3 or light.shape[0] not in (1, 3):
         raise ValueError(
@@ -189,6 +228,8 @@ def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
     low, high = (float(value) for value in wanted.aminmax())
     if not (low >= -1e-6 and high <= 1 + 1e-6):
         raise ValueError(f"target values must be in [0, 1], got [{low:.6g}, {high:.6g}]")
+    if high <= 0:
+        raise ValueError("the target is black; expected light in at least one of its colours")
     return light, wanted if low >= 0 and high <= 1 else wanted.clamp(0, 1)  # a copy of a large one counts
 
 

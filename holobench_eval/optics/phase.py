@@ -10,6 +10,7 @@ from torch import Tensor
 TAU = 2 * math.pi
 BEYOND_RADIANS = 20.0  # whole numbers of radians that reach this far do not occur
 HIGHEST_LEVEL = 65536.0
+FARTHEST = 2.0**18  # rad; beyond it the steps of float32 are larger than a level of 8 bits, 2 pi / 256
 
 Matrix = tuple[float, float, float]
 """A symmetric 2 x 2 matrix: along rows (vertical), along columns (horizontal), and between the two."""
@@ -44,12 +45,18 @@ def gray_level(phase: Tensor, bits: int) -> Tensor:
     return (phase * (levels / TAU)).round_().remainder_(levels)
 
 
+def farthest(values: Tensor) -> float:
+    """The largest magnitude among real numbers of any shape."""
+    low, high = values.detach().aminmax()
+    return max(-float(low), float(high))
+
+
 def are_levels(values: Tensor) -> bool:
     """Whether real numbers of any shape are a panel's levels and no radians: all are whole, some go beyond three turns,
     and they differ (a constant shifts no light, whatever its unit). False for a panel of so few levels as 16."""
     low, high = values.detach().aminmax()
-    largest = max(-float(low), float(high))
-    return BEYOND_RADIANS < largest <= HIGHEST_LEVEL and bool(low < high) and bool((values == values.round()).all())
+    in_range = BEYOND_RADIANS < farthest(values) <= HIGHEST_LEVEL
+    return in_range and bool(low < high) and bool((values == values.round()).all())
 
 
 def quantise(phase: Tensor, bits: int) -> Tensor:

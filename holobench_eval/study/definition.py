@@ -160,7 +160,7 @@ class Protocol:
     of 1080 x 1920 pixels); lpips_weights: a file or folder of LPIPS trunk weights (None: torch's hub cache).
     """
 
-    version: Literal["v1"] = "v1"
+    version: Literal["v2"] = "v2"
     metrics: tuple[Text, ...] | None = None
     lpips_weights: Text | None = None
 

@@ -193,6 +193,12 @@ def is_current(name: str, version: str) -> bool:
     return version.partition(";")[0] == versions().get(name)
 
 
+def parted(version: str) -> tuple[str, str]:
+    """The versions of the protocol and of the metric that are in that of a score; of the match the second is empty."""
+    protocol, _, metric = version.partition(";")[0].partition(", ")
+    return protocol, metric
+
+
 def named(metrics: Collection[str]) -> list[str]:
     """The names that ``metrics.score`` has to be given for scores by these names."""
     own = [name for name in metrics if name not in (MATCH, REFINED, INFOCUS)]

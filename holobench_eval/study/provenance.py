@@ -98,11 +98,15 @@ def end(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:
     return _write(output, {**provenance, "ended": now()})
 
 
-def restate(output: Path, study: Study, plan: Plan) -> dict[str, Any]:
+def restate(output: Path, study: Study, plan: Plan, as_scored: bool = False) -> dict[str, Any]:
     """Note the text of the config that a report is written from again, and what its cells were computed with, beside
-    the provenance of the runs; all cells of the plan have a record."""
+    the provenance of the runs; all cells of the plan have a record.
+
+    as_scored: whether the scores are those of then, of whatever versions, as a committed records.csv has them.
+    """
     known = read(output)
-    return _write(output, {**known, **_basis(study, plan, output)}) if known else known
+    scores = {"scores": known["scores"]} if as_scored and "scores" in known else {}
+    return _write(output, {**known, **_basis(study, plan, output), **scores}) if known else known
 
 
 def _basis(study: Study, plan: Plan, output: Path) -> dict[str, Any]:

@@ -55,7 +55,8 @@ class Record:
     solution [MiB]; cpu_s: its time of all processors;
     registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
     saturated samples; learned: sha256, captures and seconds of the training that the method needed first; stopped: why
-    the display ended the solution, whose best hologram so far was scored (empty: it did not); reads, uncovered: what a
+    the display ended the solution, whose best hologram so far was scored (empty: it did not); remark: what is odd
+    about the phase (``display.phases``), empty where nothing is or it was not looked at; reads, uncovered: what a
     user's code was seen to read, see ``isolation.Reads``. None: does not apply, as to a floor cell.
     """
 
@@ -77,6 +78,7 @@ class Record:
     saturated: Annotated[float, Interval(ge=0, le=1)] | None = None
     learned: dict[str, Any] | None = None
     stopped: str = ""
+    remark: str = ""
     reads: dict[str, str] = field(default_factory=dict)
     uncovered: tuple[str, ...] = ()
 

@@ -12,14 +12,16 @@ from typer.testing import CliRunner
 
 from holobench_eval.commands import app
 from holobench_eval.commands.reports.check import problems_in
+from holobench_eval.commands.reports.report import report as write_again
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.real import RealBench
 from holobench_eval.lab.session import read_manifest
 from holobench_eval.metrics import catalogue
 from holobench_eval.report import build_report
 from holobench_eval.report.data import scores
-from holobench_eval.study import executors
+from holobench_eval.study import executors, identity, provenance
 from holobench_eval.study.config import load_study
+from holobench_eval.study.identity import parted
 from holobench_eval.study.phases import phases_of
 from holobench_eval.study.plan import plan
 from holobench_eval.study.store import Store
@@ -130,7 +132,7 @@ def test_a_report_of_another_version_of_a_metric_is_found_until_it_is_scored_aga
     add(2)
     _, problems = problems_in(report)
     assert problems == [
-        f"{report}: '{NAME}' was of version v1, 1, is now of v1, 2; score its captures again",
+        f"{report}: '{NAME}' was of version v2, 1, is now of v2, 2; score its captures again",
     ]
     rescored(config, "--output", report)
     assert problems_in(report) == (1, [])
@@ -170,3 +172,27 @@ def test_what_is_scored_again_has_one_record_and_one_capture_for_each_cell(repor
     grid = plan(load_study(config))
     assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in grid.cells}
     assert {path.stem for path in store.folder.glob("*.npy")} == {cell.id for cell in cells(config)}
+
+
+def test_scores_by_an_earlier_protocol_are_holes_until_the_kept_captures_are_scored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config, folder = tmp_path / "study.yaml", tmp_path / "out"
+    config.write_text(PICTURE)
+    with monkeypatch.context() as earlier:
+        earlier.setattr(identity, "PROTOCOL", "v1")
+        identity.versions.cache_clear()
+        outcome = compute(config)
+        build_report(load_study(config), outcome.records, folder, outcome.provenance)
+    identity.versions.cache_clear()
+    before = pd.read_csv(folder / "records.csv")
+    with pytest.raises(
+        UserError, match=r"no score 'psnr_linear' of today's versions \(protocol v2\); holoeval rescore"
+    ):
+        write_again(config, folder)
+    said, failure = rescored(config, "--output", folder)
+    assert not failure
+    assert "14 captures scored again, 0 solved" in said
+    pd.testing.assert_frame_equal(pd.read_csv(folder / "records.csv"), before)
+    assert {parted(version)[0] for version in provenance.read(folder)["scores"].values()} == {"v2"}
+    assert problems_in(folder) == (1, [])

@@ -265,6 +265,10 @@ def spoil_name_of_target(path: Path) -> None:
     target.rename(target.with_name("coffee.png.png"))
 
 
+def spoil_light_of_target(path: Path) -> None:
+    Image.new("RGB", (64, 48)).save(path.parents[2] / "targets" / "coffee.png")
+
+
 @pytest.mark.parametrize(
     ("spoil", "line"),
     [
@@ -282,6 +286,7 @@ def spoil_name_of_target(path: Path) -> None:
         (lambda path: shutil.rmtree(path.parent), "no folders in it"),
         (lambda path: path.rename(path.parents[1] / "loose.png"), "outside a method's folder"),
         (lambda path: shutil.rmtree(path.parents[2] / "targets"), "no such folder"),
+        (spoil_light_of_target, r"targets/coffee.png: black; expected a target with light"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path, spoil, line):
@@ -294,6 +299,16 @@ def test_bad_input_is_one_line(tmp_path, spoil, line):
         read_folders(tmp_path / "bench" / "captures", tmp_path / "bench" / "targets")
     assert "\n" not in str(error.value)
     assert "expected" in str(error.value) or "allowed" in str(error.value) or ";" in str(error.value)
+
+
+@pytest.mark.parametrize(("lit", "names"), [((1, 0, 0), ["red"]), ((0, 1, 1), ["green and blue"]), ((1, 1, 1), [])])
+def test_that_light_in_a_colour_which_the_target_lacks_is_an_error_is_noted(tmp_path, lit, names):
+    small = photograph("coffee", (48, 64))
+    save(tmp_path / "captures" / "m" / "coffee.png", small[:, ::-1])
+    save(tmp_path / "targets" / "coffee.png", small * np.array(lit)[:, None, None])
+    notes = read_folders(tmp_path / "captures", tmp_path / "targets").notes
+    said = "Scored in three colours, where light that the target has not is an error: coffee has light in {} alone."
+    assert list(notes) == [said.format(name) for name in names]
 
 
 def test_what_is_suspicious_is_noted(tmp_path):

@@ -87,3 +87,12 @@ def test_luminance_of_white_is_one_and_other_counts_are_refused():
     assert float(with_channels(torch.ones(3, 2, 2), 1).max()) == pytest.approx(1.0)
     with pytest.raises(UserError, match="not 4"):
         with_channels(torch.ones(3, 2, 2), 4)
+
+
+@pytest.mark.parametrize("colour", range(3))
+def test_a_picture_with_light_in_one_colour_is_on_one_laser_what_it_is_in_gray(colour):
+    light = torch.rand(8, 9, generator=torch.Generator().manual_seed(3))
+    picture = torch.zeros(3, 8, 9)
+    picture[colour] = light
+    assert torch.equal(with_channels(picture, 1), light[None])
+    assert torch.allclose(with_channels(light.expand(3, -1, -1), 1), light[None])

@@ -111,7 +111,7 @@ RECORD = Record(
     {"phase": {"code": "Wirtinger 1", "params": {"iterations": 5}}, "noise": [0, "astronaut", 0]},
     "done",
     "wirtinger",
-    scores={"psnr": {"version": "v1, 1", "values": {"psnr_linear": 19.5}}},
+    scores={"psnr": {"version": "v2, 1", "values": {"psnr_linear": 19.5}}},
     seconds=1.5,
     captures=3,
 )

@@ -26,7 +26,8 @@ from holobench_eval.core import plugins, seeds
 from holobench_eval.display import DisplaySpec, load_profile
 from holobench_eval.display.simulated import profile as profiles
 from holobench_eval.imaging.align import align
-from holobench_eval.metrics import catalogue, score
+from holobench_eval.metrics import catalogue, match, score
+from holobench_eval.metrics.protocol import VERSION as PROTOCOL
 from holobench_eval.study.opening import open_bench
 from holobench_eval.study.versions import ALIGNMENT, HARNESS, method_version
 from tests.support import photographed
@@ -113,7 +114,7 @@ def complaint(name: str, case: Case, numbers: Numbers, recorded: Mapping[str, An
         "metric": "`version` of the `Metric`",
         "profile": "`version` in the profile's YAML, or HARNESS where the bench is another",
         "alignment": "ALIGNMENT",
-        "protocol": "HARNESS",
+        "protocol": "VERSION in holobench_eval/metrics/protocol.py, or HARNESS",
     }[name.split()[0]]
     return (
         f"numbers of '{name}' changed ({', '.join(changed)}): raise its declared version ({declared}; see "
@@ -134,7 +135,7 @@ def cases() -> dict[str, Case]:
     known = {
         f"profile {name}": Case(_with_harness(load_profile(name).version), partial(_profile, name)) for name in shipped
     }
-    known["protocol"] = Case(HARNESS, partial(_scores, None), EXACT)
+    known["protocol"] = Case(_with_harness(PROTOCOL), partial(_scores, None), EXACT)
     for metric in catalogue():
         if not metric.name.startswith("lpips"):  # its weights are in no package
             known[f"metric {metric.name}"] = Case(_with_harness(metric.version), partial(_scores, metric.name), EXACT)
@@ -189,6 +190,9 @@ def _scores(metric: str | None) -> dict[str, Tensor]:
     scores |= {f"stored {key}": value for key, value in score(capture, target, metrics=wanted, stored=True).items()}
     own = {key: value for key, value in scores.items() if key.removeprefix("stored ").startswith(f"{wanted[0]}_")}
     kept = own if metric else {key: value for key, value in scores.items() if key not in own}
+    if not metric:  # black in one colour, nearly so in another
+        factors = match(capture, target * torch.tensor([1.0, 0.01, 0.0]).view(3, 1, 1))[1].tolist()
+        kept |= {f"scale_{channel} of a target in red": factor for channel, factor in enumerate(factors)}
     return {name: torch.tensor(value, dtype=torch.float64) for name, value in kept.items()}
 
 

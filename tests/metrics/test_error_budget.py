@@ -19,8 +19,9 @@ def noise(seed: int, deviation: float, side: int = 64) -> Tensor:
     return deviation * torch.randn((3, side, side), generator=draw, dtype=torch.float64)
 
 
-def test_what_the_target_leaves_is_the_error_of_the_protocol_before_its_clip() -> None:
-    target = picture(0)
+@pytest.mark.parametrize("lit", [(1, 1, 1), (1, 0, 1), (0, 1, 0)])
+def test_what_the_target_leaves_is_the_error_of_the_protocol_before_its_clip(lit: tuple[int, ...]) -> None:
+    target = picture(0) * torch.tensor(lit).view(3, 1, 1)
     capture = 3 * (target + noise(1, 0.05))
     _, factors = match(capture, target)
     protocol = (factors.view(-1, 1, 1) * capture - target).square().mean()

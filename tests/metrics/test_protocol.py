@@ -122,10 +122,76 @@ def test_an_all_black_capture_gives_finite_scores(target: Tensor) -> None:
     assert "speckle_contrast" not in scores
 
 
-def test_a_black_target_gives_finite_scores(capture: Tensor, target: Tensor) -> None:
-    scores = score(capture, torch.zeros_like(target))
-    assert all(math.isfinite(value) for value in scores.values())
-    assert "brightness_ratio" not in scores
+def test_a_black_target_is_refused(capture: Tensor, target: Tensor) -> None:
+    with pytest.raises(ValueError, match="the target is black; expected light in at least one of its colours"):
+        score(capture, torch.zeros_like(target))
+
+
+@pytest.fixture
+def red(target: Tensor) -> Tensor:
+    """With light in its first colour alone."""
+    return target * torch.tensor([1.0, 0.0, 0.0]).view(3, 1, 1)
+
+
+@pytest.mark.parametrize("unit", [1e-30, 1.0, 1e30])
+@pytest.mark.parametrize("leak", [0.0, 0.1, 1.0, 10.0])
+def test_light_where_the_target_is_black_is_an_error_at_the_factor_of_the_colours_that_have_light(
+    capture: Tensor, red: Tensor, leak: float, unit: float
+) -> None:
+    shown = capture.clone()
+    shown[1:] = leak * shown[0]
+    factor = float((shown[0] * red[0]).sum() / shown[0].square().sum())
+    wrong = float(((factor * shown).clamp(0, 1) - red).square().mean())
+    scores = score(unit * shown, red, metrics=("psnr",))
+    assert scores["psnr_linear"] == pytest.approx(-10 * math.log10(wrong), abs=1e-4)
+    assert [scores[f"scale_{channel}"] * unit for channel in range(3)] == pytest.approx([factor] * 3, rel=1e-9)
+
+
+def test_two_colours_with_light_give_a_black_one_their_mean_factor(capture: Tensor, target: Tensor) -> None:
+    wanted = target * torch.tensor([1.0, 0.0, 1.0]).view(3, 1, 1)
+    _, factors = match(capture, wanted)
+    own = (capture * wanted).sum((1, 2)) / capture.square().sum((1, 2))
+    light = wanted.mean((1, 2))
+    assert torch.allclose(factors[[0, 2]], own[[0, 2]], rtol=1e-12, atol=0)
+    assert float(factors[1]) == pytest.approx(float((light * own).sum() / light.sum()), rel=1e-12)
+    assert min(own[0], own[2]) < factors[1] < max(own[0], own[2])
+
+
+def test_a_leak_in_a_nearly_black_colour_hides_none_in_a_black_one(capture: Tensor, red: Tensor) -> None:
+    shown, wanted = capture.clone(), red.clone()
+    shown[1:] = 10 * shown[0]
+    wanted[1] = 0.01 * red[0]
+    assert float(match(shown, wanted)[1][2]) > 0.98 * float(match(shown, red)[1][2])
+
+
+def test_a_few_pixels_that_are_not_black_forgive_no_leak(capture: Tensor, red: Tensor) -> None:
+    shown = capture.clone()
+    shown[1:] = shown[0]
+    black = score(shown, red, metrics=("psnr",))["psnr_linear"]
+    forgiven = []
+    for pixels in (1, 4, 16):
+        wanted = red.clone()
+        wanted[1:, 80, 80 : 80 + pixels] = 1.0
+        forgiven.append(score(shown, wanted, metrics=("psnr",))["psnr_linear"] - black)
+    assert forgiven == sorted(forgiven)
+    assert forgiven[0] < 0.2
+    assert forgiven[-1] < 2
+
+
+def test_a_colour_with_a_fiftieth_of_the_brightest_s_light_has_a_factor_of_its_own(
+    capture: Tensor, target: Tensor
+) -> None:
+    light = target.mean((1, 2), keepdim=True)
+    dim = target * torch.tensor([1.0, 0.0200001, 0.0200001]).view(3, 1, 1) * light[0] / light
+    _, factors = match(capture, dim)
+    own = (capture * dim).sum((1, 2)) / capture.square().sum((1, 2))
+    assert torch.allclose(factors, own, rtol=1e-12, atol=0)
+
+
+def test_one_colour_has_the_score_of_the_same_picture_in_three_equal_ones(capture: Tensor, target: Tensor) -> None:
+    one, three = ((capture[:1].expand(n, -1, -1), target[:1].expand(n, -1, -1)) for n in (1, 3))
+    alone, gray = score(*one, metrics=QUICK), score(*three, metrics=QUICK)
+    assert {name: gray[name] for name in alone} == pytest.approx(alone, abs=1e-6)
 
 
 def test_gray_images_are_scored_in_every_column(capture: Tensor, target: Tensor) -> None:
@@ -203,6 +269,15 @@ def test_values_that_are_not_finite_are_errors(capture: Tensor, target: Tensor, 
     broken[2, 3, 4] = spoil
     with pytest.raises(ValueError, match="target values"):
         score(capture, broken)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_integers_may_be_levels_or_counts_and_are_refused(target: Tensor, side: int) -> None:
+    pair = [target, target]
+    pair[side] = (255 * target).byte()
+    for sides in (pair, [tensor.numpy() for tensor in pair]):
+        with pytest.raises(ValueError, match=r"is of torch\.uint8; expected linear light as floating point"):
+            score(*sides)
 
 
 def test_wrong_shapes_ranges_and_names_are_errors(capture: Tensor, target: Tensor) -> None:

@@ -66,7 +66,7 @@ def test_a_metric_without_its_weights_is_refused_by_a_run_and_not_by_reading_the
     config = write_config(tmp_path)
     config.write_text(f"{config.read_text()}\n{asked}\n")
     study = load_study(config)
-    assert plan(study).metrics["lpips_alex"] == "v1, 0.1"  # the same column on a machine that has the weights
+    assert plan(study).metrics["lpips_alex"] == "v2, 0.1"  # the same column on a machine that has the weights
     with pytest.raises(UserError, match="metric 'lpips_alex' cannot be computed here: no trunk weights"):
         run(study, plan(study), tmp_path / "out", Serial(), Lines(lambda _: None), 1, tmp_path / "artifacts")
     assert not solves(tmp_path)

@@ -145,7 +145,7 @@ CHANGES = [
     ("GS: {psnr", "gS: {psnr", "15:38: no method has the label 'gS'"),
     ("rows: {GS", "beside: idael, rows: {GS", "15:39: 'idael' is not in display.profiles; did you mean 'ideal'?"),
     ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
-    ("repeats: 2", "protocol: {version: v2}", "11:21: protocol.version should be 'v1'"),
+    ("repeats: 2", "protocol: {version: v1}", "11:21: protocol.version should be 'v2'"),
     ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),
     ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
     ("headline: ssim_srgb", "headline: ms_ssim_linear", "13:11: 'ideal' scores 104 x 208 pixels; ms_ssim needs 161"),

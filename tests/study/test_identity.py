@@ -208,7 +208,7 @@ def test_a_metric_more_is_in_no_name_and_in_the_scores_of_the_plan(
     before = grid(tmp_path, BLIND, *changes)
     another_metric.add(tmp_path, monkeypatch)
     after = grid(tmp_path, BLIND, *changes)
-    assert after.metrics == {**before.metrics, another_metric.NAME: "v1, 1"}
+    assert after.metrics == {**before.metrics, another_metric.NAME: "v2, 1"}
     assert [cell.id for cell in after.cells] == [cell.id for cell in before.cells]
     assert [cell.phase_id for cell in after.cells] == [cell.phase_id for cell in before.cells]
 
@@ -218,7 +218,7 @@ def test_a_metric_of_another_version_is_in_no_name(tmp_path: Path, monkeypatch: 
     before = grid(tmp_path)
     another_metric.add(tmp_path, monkeypatch, version=2)
     after = grid(tmp_path)
-    assert after.metrics == {**before.metrics, another_metric.NAME: "v1, 2"}
+    assert after.metrics == {**before.metrics, another_metric.NAME: "v2, 2"}
     assert [cell.id for cell in after.cells] == [cell.id for cell in before.cells]
 
 
@@ -240,7 +240,7 @@ def test_scores_are_grouped_by_the_metric_that_gives_them_and_columns_of_no_metr
     }
     assert identity.flat(found) == columns
     assert identity.lacking(found, known) == {}
-    old = {**found, "ssim": {"version": "v1, 0", "values": {"ssim_srgb": 3.0}}}
+    old = {**found, "ssim": {"version": "v2, 0", "values": {"ssim_srgb": 3.0}}}
     assert identity.lacking(old, known) == {"ssim": known["ssim"]}
     assert identity.flat(old) == {name: value for name, value in columns.items() if name != "ssim_srgb"}
 

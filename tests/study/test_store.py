@@ -76,7 +76,7 @@ def corrupt(text: str) -> dict[str, str]:
         "back in time": edited(seconds=-1.0),
         "more than all": edited(saturated=1.5),
         "infinite": json.dumps({**content, "captures": 1}).replace('"seconds": null', '"seconds": 1e999'),
-        "score": edited(scores={"psnr": {"version": "v1, 1", "values": {"<script>": 1.0}}}),
+        "score": edited(scores={"psnr": {"version": "v2, 1", "values": {"<script>": 1.0}}}),
         "figure": edited(figures={"<script>": 1.0}),
         "score without a version": edited(scores={"psnr": {"values": {"psnr_linear": 1.0}}}),
         "truth": edited(saturated=True),
@@ -195,7 +195,7 @@ def test_the_state_of_a_cell_is_that_of_its_record_unless_it_has_to_be_timed_or_
     store.write(Record(first.description(), "failed", "Toy", reason="ZeroDivisionError"))
     store.write(Record(second.description(), "done", "Toy", alone=False, scores=psnr(20.0)))
     store.write(Record(third.description(), "skipped", "Toy", reason="no camera"))
-    store.write(Record(fourth.description(), "done", "Toy", alone=True, scores=psnr(20.0, "v1, 0")))
+    store.write(Record(fourth.description(), "done", "Toy", alone=True, scores=psnr(20.0, "v2, 0")))
 
     def states(*timed: Cell, metrics: Mapping[str, str] | None = None) -> list[str]:
         return [*store.states(grid.cells, frozenset(cell.id for cell in timed), metrics).values()]
@@ -205,11 +205,11 @@ def test_the_state_of_a_cell_is_that_of_its_record_unless_it_has_to_be_timed_or_
     assert states(second, third, fourth) == ["failed", "untimed", "skipped", "done", *missing]
     today = {"psnr": identity.versions()["psnr"]}
     assert states(metrics=today) == ["failed", "done", "skipped", "unscored", *missing]
-    assert states(second, metrics=today | {"ssim": "v1, 1"}) == ["failed", "untimed", "skipped", "unscored", *missing]
+    assert states(second, metrics=today | {"ssim": "v2, 1"}) == ["failed", "untimed", "skipped", "unscored", *missing]
 
 
 def test_a_score_of_another_version_of_its_metric_is_a_hole(tmp_path: Path, grid: Plan) -> None:
-    old = psnr(20.0, "v1, 0") | {"ssim": {"version": identity.versions()["ssim"], "values": {"ssim_linear": 0.5}}}
+    old = psnr(20.0, "v2, 0") | {"ssim": {"version": identity.versions()["ssim"], "values": {"ssim_linear": 0.5}}}
     record = record_of(grid, scores=old, figures={"efficiency": 0.4})
     assert record.values() == {"ssim_linear": 0.5, "efficiency": 0.4}
     assert record.row(grid.cells[-1].facts())["scores"] == record.values()

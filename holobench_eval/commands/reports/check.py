@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +35,8 @@ def check(
         problems += rerun_in(folder, rerun, seed, artifacts, print)
     for problem in problems:
         print(problem)
+    for line in _earlier(folder):
+        print(line)
     print(f"{reports} report{'s' * (reports > 1)}, {len(problems)} problem{'s' * (len(problems) != 1)}")
     if problems:
         raise typer.Exit(1)
@@ -53,6 +57,27 @@ def problems_in(folder: Path) -> tuple[int, list[str]]:
     return len(reports) + len(timed), problems
 
 
+def _earlier(folder: Path) -> Iterator[str]:
+    """A line for each other version of the protocol by which reports were scored; they stand as they are."""
+    from ...metrics.protocol import VERSION as PROTOCOL
+    from ...study import provenance
+    from ...study.identity import parted
+
+    versions = Counter[str]()
+    for report in committed.reports_in(folder):
+        with suppress(UserError):  # what is wrong with its provenance is a problem already
+            scores = provenance.read(report).get("scores")
+            versions.update(
+                {parted(str(scored))[0] for scored in (scores if isinstance(scores, dict) else {}).values()}
+            )
+    for version, count in sorted(versions.items()):
+        if version != PROTOCOL:
+            yield (
+                f"{count} report{'s' * (count > 1)} of scores by metric protocol {version}, as their pages say; now it "
+                f"is {PROTOCOL}, by which the next 'holoeval run' of their studies scores"
+            )
+
+
 def _problems(report: Path) -> Iterator[str]:
     try:
         yield from _changes(report, *committed.read(report))
@@ -64,7 +89,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     """What is different from when the report was made, of which its provenance is ``known``."""
     from ...report import difference, layout_of, read_records, recompute_files
     from ...study.displays import displays
-    from ...study.identity import is_current, versions
+    from ...study.identity import parted, versions
     from ...study.plan import plan
     from ...study.provenance import text_digest
 
@@ -74,7 +99,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
         if then != now:
             yield f"profile '{display.name}' was {then}, is now {now}; run the study again"
     for name, version in dict(known["scores"]).items():
-        if not is_current(name, version):
+        if name not in versions() or parted(version)[1] != parted(versions()[name])[1]:
             yield f"'{name}' was of version {version}, is now of {versions().get(name)}; score its captures again"
     records = (report / "records.csv").read_text(encoding="utf-8")
     if differs := difference(read_records(records), plan(study)):

@@ -43,7 +43,12 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
     if missing == len(records):
         changed = "the study or the code has changed"
         raise UserError(f"{folder}: no cell of this study has a record here ({changed}); {again} computes them")
-    known = provenance.read(folder) if missing else provenance.restate(folder, study, grid)
+    if not any(study.headline in record["scores"] for record in records if record["state"] == "done"):
+        raise UserError(
+            f"{folder}: no score '{study.headline}' of today's versions (protocol {study.protocol.version}); "
+            f"holoeval rescore {typed} --output {shlex.quote(str(folder))} makes it from the kept captures"
+        )
+    known = provenance.read(folder) if missing else provenance.restate(folder, study, grid, as_scored=not raw)
     results = write_report(console(), study, records, folder, known, keep_pictures=not raw)
     if print_to is not None:
         for path in print_figures(Report(results, records, folder, known, describe(study)), print_to):

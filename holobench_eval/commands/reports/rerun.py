@@ -249,6 +249,7 @@ def _judge(
     chosen: Sequence[Planned], again: Mapping[Key, Mapping[Any, Any]], scores: Sequence[str], verdict: Verdict
 ) -> None:
     """Count the numbers of the chosen cells that are reproduced, and note the others."""
+    from ...metrics.protocol import VERSION as PROTOCOL
     from ...report.data.tables import DONE
 
     others = sum(each.cell.id != each.row["cell"] for each in chosen)
@@ -257,6 +258,8 @@ def _judge(
             f"{others} of the cells in records.csv have another identity: the study, a method, a display or the "
             "harness have changed since"
         )
+    if earlier := {str(each.row["protocol"]) for each in chosen} - {PROTOCOL}:
+        verdict.notes.append(f"scores by metric protocol {', '.join(sorted(earlier))} beside those by {PROTOCOL} now")
     known = {name for row in again.values() for name, value in row.items() if value == value}  # NaN is not itself
     lacking = [
         name for name in scores if name not in known and any(each.row[name] == each.row[name] for each in chosen)

@@ -22,7 +22,7 @@ from .manifest import DARK, REPEAT, Pattern
 from .prediction import predicted
 from .sign import sign_hint
 
-FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol v1, point 3)
+FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol, point 3)
 FINENESS = 20  # steps a pixel of the correlation that measures drift
 
 Say = Callable[[str], None]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...study.plan import REFERENCE
+from ..data.phrases import remarks
 from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, words
 from ..markdown import Markdown
@@ -25,6 +26,7 @@ def _all(report: Report) -> Iterator[str]:
     yield f"Sample: {_sample(report)}"
     if report.layout.text.caution:
         yield f"Measured: {report.layout.text.caution}"
+    yield from remarks(report.results)
     yield from _displays(report)
     yield from _form(report)
     yield from _tuned(report)

@@ -89,6 +89,9 @@ def _differences(comparison: Comparison) -> Part:
         f"number of rows, the p values in compare.csv are. Of {comparison.cells} paired cells, {same} have one "
         "identity in both runs: the same settings, target, display and declared versions of the code."
     )
+    protocols = [words(sorted(set(map(str, run.records.get("protocol", ()))))) for run in (comparison.a, comparison.b)]
+    if protocols[0] != protocols[1]:
+        sentence += f" A is scored by metric protocol {protocols[0]} and B by {protocols[1]}."
     headings = ("method", "display", "targets", "A", "B", "B - A", "verdict")
     return Part("Differences", sentence, headings, tuple(_difference(row, score) for row in rows))
 

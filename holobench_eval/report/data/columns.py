@@ -297,6 +297,12 @@ def stop_reason(record: Record, layout: Layout) -> str:
 
 
 @column(FIGURES, kept=if_known)
+def phase_remark(record: Record, layout: Layout) -> str:
+    """What is odd about the phase of a file or of a method of your own, on the nominal model."""
+    return _one_line(record.get("remark", ""))
+
+
+@column(FIGURES, kept=if_known)
 def fell_back(record: Record, layout: Layout) -> str:
     """`yes` where a trained method fell back to Wirtinger holography, else empty."""
     return "yes" if (record.get("learned") or {}).get("fell_back") else ""

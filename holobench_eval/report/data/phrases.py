@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...study.plan import REFERENCE
+from .column import DONE
 from .results import Results
 from .scores import Score
 from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
@@ -103,3 +104,18 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
         rows.insert(0, ("the constant image", CONSTANT, REFERENCE))
     ours, better = results.values(label, condition).mean(), results.headline.better
     return [text for text, name, where in rows if better(results.values(name, where).mean(), ours)]
+
+
+def remarks(results: Results) -> list[str]:
+    """A sentence for all that is odd about phases; remarks that differ in numbers alone share one."""
+    if "phase_remark" not in results.frame:
+        return []
+    odd = results.frame[(results.frame["state"] == DONE) & (results.frame["phase_remark"] != "")]
+    alike = odd["phase_remark"].str.replace(r"-?\d+\.\d+", "0", regex=True)
+    sentences = []
+    for (name, _), cells in odd.groupby(["label", alike], sort=False):
+        displays, targets = words(list(cells["condition"].unique())), cells["target"].unique()
+        others = f" and {len(targets) - 1} more" * (len(targets) > 1)
+        remark = f"for {targets[0]}{others}, the phase {cells['phase_remark'].iloc[0]}"
+        sentences.append(f"Check the phases of {name} on {displays}: {remark}.")
+    return sentences

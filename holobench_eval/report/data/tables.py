@@ -229,7 +229,7 @@ def committed_records(frame: pd.DataFrame, plan: Plan) -> list[dict[str, Any]]:
         found.append(
             {
                 "id": cell.id,
-                "cell": cell.facts(),
+                "cell": {**cell.facts(), "protocol": row["protocol"]},  # of then, as its scores
                 "label": label,
                 "state": row["state"],
                 "scores": {key: row[name] for key, name in scores.items() if not pd.isna(row[name])},

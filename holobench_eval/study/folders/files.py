@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ...core.errors import UserError, listed, suggest
 from .exposure import NAMES
-from .pairing import Pairing, paired
+from .pairing import Pairing, lit, paired
 from .pictures import RAW_SUFFIXES, SUFFIXES, Picture, checked
 
 CAPTURE_SUFFIXES = (*SUFFIXES, *RAW_SUFFIXES)
@@ -55,6 +55,9 @@ def read_folders(captures: Path, targets: Path) -> Folders:
             right = twice or f"{suggest(name, target_paths)}; rename it or take it away"
             raise UserError(f"{path}: no target of this name in {targets}; {right}")
     pictures = {name: checked(path) for name, path in target_paths.items()}
+    for picture in pictures.values():
+        if not lit(picture):
+            raise UserError(f"{picture.path}: black; expected a target with light in at least one of its colours")
     photographs = {key: checked(path) for key, path in capture_paths.items()}
     pairings = {key: paired(picture, pictures[key[1]]) for key, picture in photographs.items()}
     return Folders(pictures, photographs, pairings, tuple(_notes(pictures, photographs, pairings)))
@@ -125,6 +128,9 @@ def _notes(
             yield f"The capture {'/'.join(key)} is the same picture as {'/'.join(same)}: one of them is misplaced."
     if opaque := [picture.path.name for picture in pictures if picture.opaque]:
         yield f"An alpha channel that is opaque everywhere was left out: {named(opaque)}."
+    lights = {name: lit(target) for name, target in targets.items() if len(lit(target)) < target.shape[0]}
+    if dark := [f"{name} has light in {' and '.join(colours)} alone" for name, colours in lights.items()]:
+        yield f"Scored in three colours, where light that the target has not is an error: {named(dark)}."
     alone = "on the {} channel alone, which has nearly all of the light, as of a single laser"
     ways = {name: alone.format(name) for name in NAMES}
     ways["gray"] = "in gray, since the channels of the capture, or of its target, are equal"

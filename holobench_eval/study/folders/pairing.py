@@ -64,6 +64,12 @@ def paired(capture: Picture, target: Picture) -> Pairing:
     )
 
 
+def lit(target: Picture) -> list[str]:
+    """The colours in which a target is not black; of a gray one the first."""
+    colours = zip(NAMES, target.structure, target.levels, strict=False)
+    return [name for name, structure, levels in colours if structure or levels.top]
+
+
 def too_few_levels(capture: Picture, target: Picture, frame: Values, shown: Values, warp: Warp) -> str:
     """Why a capture has too few levels where it shows its target; empty where it has enough.
 

@@ -192,4 +192,6 @@ def _target(source: TargetSource, shape: tuple[int, int], channels: int) -> tupl
         if dataset.digest(item) != sha256:
             raise CellError(f"target '{item}' {AGAIN}")
         target: Tensor = dataset.load(item, shape, channels=channels)
+    if not target.any():
+        raise CellError(f"target '{item}' is black; expected light in at least one of its colours")
     return target, reads_of_dataset(dataset, seen)

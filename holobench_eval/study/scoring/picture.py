@@ -9,10 +9,12 @@ from typing import Any
 
 from torch import Tensor
 
+from ...core import plugins
 from ...core.errors import CellError
 from ...core.io import file_name
 from ...display import CalibratedBench, RectifiedCapture
 from ...display.learned import LearnedBench
+from ...display.phases import phase_doubt
 from ...lab.photograph import MOST_SATURATED
 from ...lab.real import RealBench
 from ...metrics import floor_captures, match, score
@@ -52,6 +54,8 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
     keep_pictures(job, cell, capture.image, target, solved.phase)
     keep_capture(job, cell, capture.image, lasting=display.real is not None)
     timed = isolation.traits(cell.method, job.setting.folder).timed
+    is_own = timed and plugins.is_shipped("methods", cell.method)  # none of those here has a doubtful phase
+    looked_at = not is_own and cell.measure == "picture"  # else the phase is for other planes, too
     return job.record(
         cell,
         scores=scores_of(job, cell, capture.image, target, job.setting.metrics),
@@ -63,6 +67,7 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
         saturated=capture.saturated,
         learned=account(job.learned(job.task.preparation)),
         stopped=solved.stopped,
+        remark=phase_doubt(solved.phase, target, display.spec) if looked_at else "",
         reads=solved.covered,
         uncovered=solved.uncovered,
         **asdict(solved.cost) if timed else {},

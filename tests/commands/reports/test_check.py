@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import pytest
+import typer
 
-from holobench_eval.commands.reports.check import problems_in
+from holobench_eval.commands.reports.check import check, problems_in
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import build_report
 from holobench_eval.study.config import load_study
@@ -113,3 +115,28 @@ def test_a_damaged_provenance_is_found(report: Path) -> None:
 def test_a_folder_without_reports_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no report, and none in its folders"):
         problems_in(tmp_path)
+
+
+def test_scores_by_an_earlier_protocol_are_no_problem_and_said_in_one_line(
+    report: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = report / "provenance.json"
+    known = json.loads(file.read_text())
+    known["scores"] = {name: version.replace("v2", "v1") for name, version in known["scores"].items()}
+    file.write_text(json.dumps(known))
+    check(report.parent)
+    assert capsys.readouterr().out.splitlines() == [
+        "1 report of scores by metric protocol v1, as their pages say; now it is v2, by which the next 'holoeval run' "
+        "of their studies scores",
+        "1 report, 0 problems",
+    ]
+
+
+@pytest.mark.parametrize("text", ["{", '{"scores": 3}', '{"scores": {"psnr": 1}}'])
+def test_a_provenance_that_is_no_provenance_ends_the_check_with_its_problem_alone(
+    report: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (report / "provenance.json").write_text(text)
+    with pytest.raises(typer.Exit):
+        check(report.parent)
+    assert "1 report, 1 problem" in capsys.readouterr().out

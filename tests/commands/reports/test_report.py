@@ -63,3 +63,19 @@ def test_cells_that_the_committed_files_lack_are_computed_and_never_made_up(comm
     with pytest.raises(UserError, match=r"planned cells are not in records\.csv.*holoeval run .* computes them"):
         report(config, folder)
     assert (folder / "report.md").read_bytes() == before
+
+
+def test_a_report_written_again_from_committed_files_keeps_the_protocol_that_its_scores_are_of(
+    committed: tuple[Path, Path],
+) -> None:
+    config, folder = committed
+    for name in ("provenance.json", "records.csv"):
+        file = folder / name
+        file.write_text(file.read_text().replace("v2", "v1"))
+    before = json.loads((folder / "provenance.json").read_text())["scores"]
+    records = (folder / "records.csv").read_bytes()
+    report(config, folder)
+    assert json.loads((folder / "provenance.json").read_text())["scores"] == before
+    assert (folder / "records.csv").read_bytes() == records
+    assert "| metric protocol | v1 |" in (folder / "report.md").read_text()
+    assert problems_in(folder.parent)[1] == []

@@ -75,6 +75,12 @@ def test_a_number_that_was_changed_is_named(toys: Committed) -> None:
     assert was - now == pytest.approx(0.5, abs=1e-3)
 
 
+def test_scores_by_an_earlier_protocol_are_judged_with_a_word(toys: Committed) -> None:
+    records = toys.report / "records.csv"
+    records.write_text(records.read_text().replace(",v2", ",v1"))
+    assert toys.check(count=2).notes == ["scores by metric protocol v1 beside those by v2 now"]
+
+
 def test_a_difference_between_machines_is_within_tolerance(toys: Committed) -> None:
     change(toys.config, toys.report, "other", 0.02)
     verdict = toys.check()

@@ -54,3 +54,16 @@ def test_a_hostile_name_stays_text(tmp_path: Path, name: str) -> None:
     cell = next(reader.DictReader(io.StringIO(csv(comparison))))["method"]
     assert cell.lstrip("'") == name
     assert not cell.startswith("=")
+
+
+@pytest.mark.parametrize("protocols", [("v1", "v2"), ("v2", "v2")])
+def test_scores_of_two_protocols_are_never_compared_without_a_word(tmp_path: Path, protocols: tuple[str, str]) -> None:
+    runs = []
+    for run, protocol in zip("ab", protocols, strict=True):
+        folder = write_report(tmp_path / run, {("toy", "bench"): A})
+        records = (folder / "records.csv").read_text().splitlines()
+        lines = [records[0], *(f"{line.rpartition(',')[0]},{protocol}" for line in records[1:])]
+        (folder / "records.csv").write_text("\n".join(lines) + "\n")
+        runs.append(read_run(folder))
+    text = markdown(compare(*runs))
+    assert ("A is scored by metric protocol v1 and B by v2." in text) == (protocols[0] != protocols[1])

@@ -1,0 +1,158 @@
+"""What is odd about a phase is said, and nothing of a right one."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from skimage import data
+from torch import Tensor
+from typer.testing import CliRunner
+
+import holobench_eval as hb
+from holobench_eval.commands import app
+from holobench_eval.display.phases import check_phase, phase_doubt
+from holobench_eval.optics.phase import FARTHEST
+
+TAU = math.tau
+PANEL = (128, 128)
+OPEN = (
+    "double_phase",
+    "double_phase_aa",
+    "double_phase_bl",
+    "gerchberg_saxton",
+    "hio",
+    "wirtinger",
+    "sgd",
+    "multi_plane",
+)
+FEW = {"wirtinger": 30, "sgd": 30, "multi_plane": 30}  # iterations
+
+DEGREES, LEVELS = np.degrees(1.0), 255.99 / TAU
+ODD = {
+    "the other sign": (lambda phase: -phase, "fits its target better with the opposite sign (correlation"),
+    "left to right": (lambda phase: phase.flip(-1), "better mirrored left to right"),
+    "top to bottom": (lambda phase: phase.flip(-2), "better mirrored top to bottom"),
+    "half a turn": (lambda phase: phase.flip((-1, -2)), "better turned by 180 degrees"),
+    "transposed": (lambda phase: phase.mT, "better transposed"),
+    "both": (lambda phase: -phase.flip(-1), "better with the opposite sign, mirrored left to right"),
+    "blue first": (lambda phase: phase.flip(0), "better with red and blue exchanged"),
+    "degrees": (lambda phase: DEGREES * phase, "better read as degrees"),
+    "degrees of both signs": (lambda phase: DEGREES * ((phase + math.pi) % TAU - math.pi), "better read as degrees"),
+    "levels": (lambda phase: LEVELS * phase, "better read as levels of 8 bits"),
+    "turns": (lambda phase: phase / TAU, "better read as turns"),
+    "noise": (
+        lambda phase: 6 * torch.rand(phase.shape, generator=torch.Generator().manual_seed(1)),
+        "makes nothing like",
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=["ideal", "leto-2020"])
+def display(request: pytest.FixtureRequest) -> hb.OpenDisplay:
+    return hb.open_display(request.param, panel=PANEL)
+
+
+@pytest.fixture(scope="module", params=["astronaut", "coffee"])
+def target(request: pytest.FixtureRequest, display: hb.OpenDisplay) -> Tensor:
+    return torch.from_numpy(display.target(getattr(data, request.param)()))
+
+
+def solved(display: hb.OpenDisplay, target: Tensor, method: str) -> Tensor:
+    few = {"iterations": FEW[method]} if method in FEW else {}
+    return torch.from_numpy(display.solve(method, target, **few))
+
+
+@pytest.fixture(scope="module")
+def phase(display: hb.OpenDisplay, target: Tensor) -> Tensor:
+    return solved(display, target, "gerchberg_saxton") % TAU
+
+
+@pytest.mark.parametrize("method", OPEN)
+def test_a_right_phase_is_not_remarked_on(display: hb.OpenDisplay, target: Tensor, method: str) -> None:
+    assert phase_doubt(solved(display, target, method), target, display.spec) == ""
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_what_fits_better_is_named(display: hb.OpenDisplay, target: Tensor, phase: Tensor, kind: str) -> None:
+    change, remark = ODD[kind]
+    assert remark in phase_doubt(change(phase), target, display.spec)
+
+
+@pytest.mark.parametrize(
+    ("largest", "remark"), [(1.0, "to 1.00, as turns or amplitudes have"), (2.5, "as amplitudes are")]
+)
+def test_an_amplitude_in_the_place_of_a_phase_is_remarked_on(
+    display: hb.OpenDisplay, target: Tensor, largest: float, remark: str
+) -> None:
+    spec = display.spec
+    planes = [spec.region.embed(plane.sqrt(), spec.shape).to(torch.complex64) for plane in target]
+    back = torch.stack([spec.propagator(c).adjoint(plane) for c, plane in enumerate(planes)]).abs()
+    assert remark in phase_doubt(largest * back / back.max(), target, spec)
+
+
+def test_nothing_is_said_where_there_is_nothing_to_compare(display: hb.OpenDisplay, target: Tensor) -> None:
+    shape = (3, *display.spec.shape)
+    draw = torch.rand(shape, generator=torch.Generator().manual_seed(2))
+    assert phase_doubt(torch.full(shape, 3.0), target, display.spec) == ""
+    assert phase_doubt(6 * draw, torch.full_like(target, 0.5), display.spec) == ""
+
+
+def test_a_colour_without_light_has_no_part(display: hb.OpenDisplay, target: Tensor, phase: Tensor) -> None:
+    red = target * torch.tensor([1.0, 0.0, 0.0]).view(3, 1, 1)
+    assert phase_doubt(phase, red, display.spec) == ""
+    assert "opposite sign" in phase_doubt(-phase, red, display.spec)
+
+
+def test_a_phase_is_shown_as_long_as_single_precision_has_its_place_in_the_turn(display: hb.OpenDisplay) -> None:
+    inside = torch.full((3, *display.spec.shape), FARTHEST)
+    check_phase(inside, display.spec, "")
+    assert float(np.spacing(np.float32(0.99 * FARTHEST))) < TAU / 256 < float(np.spacing(np.float32(FARTHEST)))
+
+
+def test_a_capture_in_python_warns_of_an_odd_phase_alone(
+    display: hb.OpenDisplay, target: Tensor, phase: Tensor
+) -> None:
+    with pytest.warns(UserWarning, match="^the phase fits its target better with the opposite sign"):
+        display.capture(-phase, target)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        display.capture(phase, target)
+
+
+STUDY = """
+title: Files
+seed: 3
+display: {profiles: [ideal], panel: [128, 128]}
+targets: {dataset: photographs, params: {names: [coffee, astronaut]}}
+protocol: {metrics: [psnr]}
+methods:
+  - {name: gerchberg_saxton, params: {iterations: 5}}
+  - {name: phases, label: right, params: {file: "{target}.npy"}}
+  - {name: phases, label: wrong, params: {file: "{target}.npy", sign: -1}}
+"""
+
+
+def test_a_study_names_odd_files_on_the_terminal_and_in_its_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    opened = hb.open_display("ideal", panel=PANEL)
+    for name in ("coffee", "astronaut"):
+        target = opened.target(getattr(data, name)())
+        np.save(f"{name}.npy", opened.solve("gerchberg_saxton", target, iterations=5))
+    Path("study.yaml").write_text(STUDY)
+    done = CliRunner().invoke(app, ["run", "study.yaml", "--executor", "serial", "--threads", "1", "--output", "out"])
+    assert done.exit_code == 0, done.output
+    for said in (done.output, Path("out/report.md").read_text()):
+        (line,) = (line.replace("*", "") for line in said.splitlines() if "Check the phases of" in line)
+        assert "Check the phases of wrong on ideal" in line
+        assert "or coffee and 1 more, the phase fits its target better with the opposite sign (correlation" in line
+    remarks = pd.read_csv("out/records.csv").set_index("label")["phase_remark"]
+    assert remarks["wrong"].str.startswith("fits its target better").all()
+    assert remarks.drop("wrong").isna().all()
