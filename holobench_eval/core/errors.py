@@ -58,7 +58,12 @@ def reason(error: BaseException) -> str:
 
 def one_line(text: str) -> str:
     """A text in one line, with question marks in the place of signs that a terminal would obey."""
-    return "".join(sign if sign.isprintable() else "?" for sign in " ".join(text.split()))
+    return printable(" ".join(text.split()))
+
+
+def printable(text: str) -> str:
+    """A text with question marks in the place of line ends and of signs that a terminal would obey."""
+    return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 
 def out_of_memory(error: BaseException) -> bool:
