@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
-from ..core.errors import UserError, suggest
-from ..core.io import decode_levels
+from ..core.errors import PictureError, UserError, suggest
+from ..core.pictures import open_picture
 from . import still_life
 from .base import fit, from_srgb, known, named_digest, refuse_repeats, with_channels
 from .defocus import defocus
-from .images import decode, opened, read
+from .images import decode, read
 from .shipped import shipped
 
 VERSION = 1  # part of every digest: raise it when stacks are rendered differently
@@ -223,12 +223,14 @@ def _files(scene: str) -> tuple[bytes, bytes]:
 
 
 def _depth_levels(content: bytes, name: str) -> NDArray[np.float64]:
-    if opened(content, name).format != "PNG":
-        raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")
-    levels = decode_levels(content)
-    if levels is None or levels.ndim != 2:
-        raise UserError(f"{name}: expected a gray PNG of 8 or 16 bits, bright where it is near")
-    return levels.astype(np.float64)
+    right = "expected a gray PNG of 8 or 16 bits, bright where it is near"
+    try:
+        stored = open_picture(content)
+        if (stored.format, stored.channels) != ("PNG", 1) or stored.has_alpha or stored.bits < 8:
+            raise PictureError("another kind of image")
+        return stored.upright().astype(np.float64)
+    except PictureError as error:
+        raise UserError(f"{name}: {right} ({error})") from error
 
 
 def _without_holes(disparity: NDArray[np.float64]) -> NDArray[np.float64]:

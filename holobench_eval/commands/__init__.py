@@ -40,8 +40,9 @@ COMMANDS = {
         "score",
         "session",
     ),
-    "Your own methods, and this program": (
+    "Your own methods and displays, and this program": (
         "new_method",
+        "new_display",
         "conformance",
         "calibrate",
         "bench",

@@ -32,8 +32,8 @@ def list_(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="studies, methods, datasets, profiles, metrics, conditions; or one by its name, such as wirtinger or "
-            "mine.py:solve."
+            help="studies, methods, datasets, profiles, metrics, conditions; or one by its name, such as wirtinger, "
+            "mine.py:solve or mine.yaml."
         ),
     ] = None,
 ) -> None:
@@ -46,7 +46,8 @@ def list_(
                 table.add_row(entry, escape(text))
             screen.print(table)
         return
-    found = ["methods"] if ".py:" in name else [kind for kind in KINDS if name in dict(KINDS[kind]())]
+    of_a_file = "methods" if ".py:" in name else "profiles" if name.endswith((".yaml", ".yml")) else ""
+    found = [of_a_file] if of_a_file else [kind for kind in KINDS if name in dict(KINDS[kind]())]
     if not found:
         raise UserError(_unknown(name))
     for kind in found:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import keyword
 import re
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -42,16 +43,28 @@ def write_method(name: str, folder: Path, kind: str = "method") -> tuple[Path, P
     if importlib.util.find_spec(name) is not None:
         raise UserError(f"'{name}' is the name of an installed module, which {name}.py would hide; choose another")
     cls = "".join(word.capitalize() for word in name.split("_"))
-    paths = folder / f"{name}.py", folder / f"test_{name}.py"
+    words = {"name": name, "cls": cls, "title": name.replace("_", " ").capitalize()}
+    texts = {}
+    for file, template in ((f"{name}.py", f"{kind}.txt"), (f"test_{name}.py", "test_method.txt")):
+        text = files(__package__).joinpath("templates", template).read_text(encoding="utf-8")
+        texts[file] = Template(text).substitute(words)
+    method, test = write_new(folder, texts)
+    return method, test, f"{method}:{cls}"
+
+
+def write_new(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write files of a person's own, by their names in a folder; nothing is ever overwritten.
+
+    UserError for files that exist, and for a folder that cannot be written.
+    """
+    paths = [folder / name for name in texts]
     for path in paths:
         if path.exists():
             raise UserError(f"{path} exists already; choose another name or --folder")
-    words = {"name": name, "cls": cls, "title": name.replace("_", " ").capitalize()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for path, template in zip(paths, (f"{kind}.txt", "test_method.txt"), strict=True):
-            text = files(__package__).joinpath("templates", template).read_text(encoding="utf-8")
-            path.write_text(Template(text).substitute(words), encoding="utf-8")
+        for path, text in zip(paths, texts.values(), strict=True):
+            path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written: {error.strerror}; choose another --folder") from error
-    return *paths, f"{paths[0]}:{cls}"
+    return paths

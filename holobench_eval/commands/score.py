@@ -45,12 +45,18 @@ def score(
     aligned: Annotated[
         bool, typer.Option("--aligned", help="The captures lie on their targets already, pixel to pixel.")
     ] = False,
+    dark: Annotated[
+        str | None,
+        typer.Option(metavar="FILE|LEVEL", help="Counts without light, taken off the captures (with --values linear)."),
+    ] = None,
     lpips_weights: Annotated[Path | None, typer.Option(help="File or folder of the LPIPS trunk.")] = None,
 ) -> None:
     """Score pictures that were taken long ago: align each with its target by what it shows, and write a report."""
     weights = None if lpips_weights is None else str(lpips_weights)
     console = open_console()
-    report, results = score_folders(captures, targets, output, values, baseline, weights, console, visible, aligned)
+    report, results = score_folders(
+        captures, targets, output, values, baseline, weights, console, visible, aligned, dark
+    )
     print_headline(console, results)
     for hole in results.holes.to_dict("records"):
         text = f"{hole['state']}: {hole['label']} · {hole['target']}: {hole['reason']}"
@@ -70,14 +76,16 @@ def score_folders(
     console: Console,
     visible: bool = False,
     aligned: bool = False,
+    dark: str | None = None,
 ) -> tuple[Path, Results]:
     """Score ``captures/<method>/<target>.png`` against ``targets/<target>.png``: path and numbers of the report.
 
-    visible, aligned: as in `Scoring`.
+    visible, aligned: as in `Scoring`; dark: counts without light, a level or a file.
 
     What was computed before in ``output`` for the same files by the same code is taken from there. UserError for input
     that cannot be used, in one line; a capture that cannot be aligned is a hole in the report, with its reason.
     """
+    from ..lab.dark import given_dark
     from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
     from ..study import provenance
@@ -94,17 +102,22 @@ def score_folders(
             raise UserError(f"--output {output}: {mixed}; expected another folder")
     if visible and aligned:
         raise UserError("--visible --aligned: an aligned capture shows all of its target; expected one of the two")
-    folders = read_folders(captures, targets)
+    if dark is not None and values != "linear":
+        raise UserError(
+            f"--dark {dark}: is taken off counts of light, not off encoded values; expected --values linear"
+        )
+    taken_off, told = (None, "") if dark is None else given_dark(dark, upright=True)
+    folders = read_folders(captures, targets, values == "linear", taken_off)
     if baseline is not None and baseline not in folders.methods:
         raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
     for picture in folders.captures.values():
         if values == "linear" and picture.is_lossy:
             raise UserError(f"{picture.path}: compressed with loss, no linear light; expected --values stored or srgb")
-        if values != "linear" and picture.is_raw:
-            raise UserError(f"{picture.path}: a RAW file holds linear light; expected --values linear")
-    scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned)
+        if values != "linear" and picture.is_linear:
+            raise UserError(f"{picture.path}: RAW files and floating point hold linear light; expected --values linear")
+    scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned, told)
     with scoring.store.locked():
-        known = provenance.begin(output, described(folders, values), resumed=True)
+        known = provenance.begin(output, described(folders, values, told), resumed=True)
         console.print(f"--values {values}: {VALUES[values]}.", markup=False, highlight=False, soft_wrap=True)
         with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
             found = scoring.records(step)
@@ -115,6 +128,7 @@ def score_folders(
         known = provenance.end(output, known)
         words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
         words += ["--visible"] * visible + ["--aligned"] * aligned + (["--baseline", baseline] if baseline else [])
+        words += [] if dark is None else ["--dark", dark]
         description = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
         layout = _layout(folders, scoring.domain, values, baseline, output.resolve().name, " ".join(notes))
         return write_report(layout, records, output, known, description)

@@ -27,13 +27,16 @@ def export(
     bench: Annotated[Path | None, typer.Option(help="File of the bench that will show the patterns.")] = None,
     display: Annotated[str | None, typer.Option(help="Without --bench: the study's display to stand for it.")] = None,
     fixed_exposure: Annotated[bool, typer.Option("--fixed-exposure", help="One exposure time for all.")] = False,
+    dark: Annotated[
+        str | None, typer.Option(metavar="FILE|LEVEL", help="Counts without light, in the place of dark frames.")
+    ] = None,
 ) -> None:
     """Write the patterns of a study: what to show, in which order, and under which names to save photographs."""
     from ..study.folders.session import export as begin
     from ..study.progress import watching
 
     with watching(console()) as watch:
-        advance = begin(config, folder, watch, bench, display, fixed_exposure)
+        advance = begin(config, folder, watch, bench, display, fixed_exposure, dark)
     _finish(advance, folder)
 
 
@@ -53,6 +56,7 @@ def import_(
 
 def _finish(advance: Advance, folder: Path) -> None:
     """Name the photographs to take next; where there are none, write the report."""
+    from ..lab.session import read_manifest
     from ..study.folders.session import REPORT
 
     records = advance.outcome.records
@@ -64,4 +68,6 @@ def _finish(advance: Advance, folder: Path) -> None:
     readme = f"{folder}/patterns/round-{number}/README.txt"
     if number == 1:
         print(f"to check the bench first: {folder}/patterns/checks/README.txt")
+        if line := read_manifest(folder).phase.out_of_reach:
+            print(line)
     print(f"round {number}: {len(advance.patterns)} patterns to photograph, see {readme}")

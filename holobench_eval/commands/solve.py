@@ -32,6 +32,7 @@ def solve(
 ) -> None:
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from ..core.io import file_name
+    from ..datasets.images import decode, read
     from ..study.config import load_study
     from ..study.plan import plan
     from .run import run
@@ -39,6 +40,7 @@ def solve(
     names = [name.strip() for name in methods.split(",") if name.strip()]
     if not picture.is_file() and Path(methods).is_file():
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
+    decode(read(picture), str(picture), gray=True)  # what is wrong with it is said of the file that was named
     study_in = partial(_study, names, picture, display, panel)
     folder = output or next(folder for folder in _folders(picture) if _is_free(folder, picture, study_in(folder)))
     is_new, config = not folder.exists(), folder / STUDY
@@ -78,11 +80,10 @@ def _is_free(folder: Path, picture: Path, study: str) -> bool:
 
 
 def _copy(picture: Path, folder: Path) -> None:
-    """Copy a picture into a folder. UserError for one that is no such file, and where other files are there."""
-    from ..datasets.images import SUFFIXES, decode, read
+    """Copy a picture into a folder. UserError for one whose name is not of a picture, and where other files are."""
+    from ..datasets.images import SUFFIXES, read
 
     content = read(picture)
-    decode(content, str(picture), gray=True)  # what is wrong with it is said of the file that was named
     if picture.suffix.lower() not in SUFFIXES or picture.name.startswith("."):
         raise UserError(
             f"{picture}: not a picture by its name; expected one that ends in {', '.join(sorted(SUFFIXES))}"
@@ -102,9 +103,10 @@ def _copy(picture: Path, folder: Path) -> None:
 def _study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> str:
     """The study of a picture that lies in a folder."""
     from ..core.installed import shipped_configs
-    from ..datasets.images import opened, read
+    from ..core.pictures import open_picture
+    from ..datasets.images import read
 
-    gray = {"gray": True} if opened(read(picture), str(picture)).mode == "L" else {}
+    gray = {"gray": True} if open_picture(read(picture)).channels == 1 else {}
     profile = str(Path(display).resolve()) if Path(display).is_file() else display
     table3 = yaml.safe_load(shipped_configs()["table3"].read_bytes())  # whose trained methods serve here, too
     study = {

@@ -14,6 +14,10 @@ class UserError(Exception):
     """Bad input: one line that says what is wrong, where, and what would be right. The command line exits 2."""
 
 
+class PictureError(UserError):
+    """What is wrong with a picture, without the name of its file."""
+
+
 class CellError(Exception):
     """A single cell cannot give a valid score (saturated capture, failed registration): a visible hole."""
 

@@ -8,11 +8,9 @@ import re
 import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
 from .errors import StorageError
@@ -101,21 +99,3 @@ def write_png(path: Path, levels: Tensor, bits: int, lasting: bool = True) -> No
     if not encoded:
         raise OSError(f"{path}: a picture of the shape {tuple(levels.shape)} cannot be written as PNG")
     write_atomically(path, buffer.tobytes(), lasting)
-
-
-def decode_levels(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16] | None:
-    """The levels of an encoded picture as they are stored, ``(H, W)`` or ``(H, W, C)`` with red first.
-
-    None for what OpenCV cannot read, for samples of more than 8 bits and not 16, and for other than 1, 3 or 4 channels.
-    Fewer bits come as 8, and of several pages the first. Pillow would give RGB of 16 bits as 8.
-    """
-    if not content:
-        return None  # OpenCV raises
-    levels: NDArray[Any] | None = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if levels is None or levels.dtype not in (np.uint8, np.uint16):
-        return None
-    if levels.ndim == 3 and levels.shape[2] not in (3, 4):
-        return None
-    if levels.ndim == 3:  # OpenCV: blue first; the usual three channels are not copied
-        levels = levels[..., ::-1] if levels.shape[2] == 3 else levels[..., [2, 1, 0, 3]]
-    return levels

@@ -72,9 +72,12 @@ def _entries(
     cls: type[Any] | None, schema: Schema, definitions: Schema, prefix: str, given: Any
 ) -> Iterator[Parameter]:
     definitions = schema.get("$defs", definitions)
-    known = meanings(cls) if cls else {}
+    known, fields = meanings(cls) if cls else {}, getattr(cls, "__dataclass_fields__", {})
     for name, entry in schema.get("properties", {}).items():
-        default = given[name] if isinstance(given, Mapping) and name in given else entry.get("default", _NONE_GIVEN)
+        if name in fields and not fields[name].metadata.get("key", True):
+            continue
+        default = entry.get("default", _NONE_GIVEN if name in schema.get("required", ()) else {})
+        default = given[name] if isinstance(given, Mapping) and name in given else default
         inner = _mapping(entry, definitions)
         meaning = entry.get("description") or known.get(name, "")
         if "properties" in inner:

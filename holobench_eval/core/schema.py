@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from functools import cache
@@ -81,8 +81,8 @@ def checked(cls: type[T], data: Any, owner: str = "", adapter: TypeAdapter[T] | 
     try:
         return (adapter or TypeAdapter(cls)).validate_json(text, strict=True)
     except ValidationError as error:
-        fault = error.errors()[0]
-        raise FieldError(fault["loc"], _value_line(fault["loc"], fault, owner)) from None
+        where, fault = _deepest(data, error.errors())
+        raise FieldError(where, _value_line(where, fault, owner)) from None
 
 
 @cache
@@ -137,6 +137,25 @@ def placed(document: Document, name: Keys, *params: Keys) -> Iterator[None]:
         raise document.error(where, str(error), at_key=isinstance(error, FieldError) and error.at_key) from error
 
 
+def _deepest(data: Any, faults: Sequence[Any]) -> tuple[Keys, Any]:
+    """The first fault and its place; where a value may be of several kinds, that of the kind which it comes nearest."""
+    placed = [(_place(data, fault), fault) for fault in faults]
+    first = placed[0][0]
+    return max((each for each in placed if each[0][: len(first)] == first), key=lambda each: len(each[0]))
+
+
+def _place(data: Any, fault: Mapping[str, Any]) -> Keys:
+    """The keys of a fault, without the names that pydantic gives to the kinds that a value may be of."""
+    where: Keys = ()
+    for part in fault["loc"]:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            continue
+        where = (*where, part)
+    return (*where, fault["loc"][-1]) if fault["type"] == "missing" else where
+
+
 def _unknown_keys(cls: Any, mappings: list[tuple[Keys, Any]]) -> Iterator[tuple[Keys, list[str]]]:
     """Keys in ``mappings`` that are no fields of ``cls`` or of the dataclasses nested in it, and what is allowed.
 
@@ -178,6 +197,9 @@ def _value_line(where: Keys, fault: Mapping[str, Any], owner: str) -> str:
         if isinstance(where[-1], str):
             return f"missing key '{where[-1]}' in {_dotted(where[:-1])}"
         return f"{_dotted(where[:-1])} has too few values: {str(fault['input'])[:LONGEST_VALUE]}"
+    if fault["type"] == "value_error":  # a sentence of our own
+        place = f"{owner}: parameter '{_joined(where)}'" if owner else _dotted(where)
+        return f"{place}: {fault['ctx']['error']}"
     message = str(fault["msg"])
     for ours, theirs in PLAIN_WORDS:
         message = message.replace(theirs, ours)

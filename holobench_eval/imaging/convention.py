@@ -1,18 +1,36 @@
-"""How a phase becomes the levels of a real panel: sign, origin, the level of a full turn, mirrors (``phase:``)."""
+"""How a phase becomes the levels of a real panel and back: sign, origin, full turn, correction map, mirrors."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
-from annotated_types import Interval
+from annotated_types import Interval, MaxLen, MinLen
 from numpy.typing import NDArray
 from torch import Tensor
 
 Levels = NDArray[np.uint8]
+Level = Annotated[float, Interval(gt=1, le=65536)]
+FullTurn = Level | Annotated[tuple[Level, ...], MinLen(1), MaxLen(3)]
+"""The level that lags a full turn behind level 0: one for all colours, or one for each."""
+
+LAST = 255  # level of a panel
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A map that levens the panel, as its maker gives it: what is added to every hologram, modulo a turn.
+
+    file: picture of levels, of the panel's rows and columns as they are sent to it, one plane for all colours or one
+    for each; two_pi_level: the level of the map that is a full turn, one for all colours or one for each.
+    """
+
+    file: Annotated[str, MinLen(1)]
+    two_pi_level: FullTurn = 256.0
 
 
 @dataclass(frozen=True)
@@ -22,38 +40,60 @@ class Convention:
     The methods' convention is ``exp(+i phase)`` with light travelling as ``exp(+i k z)``; row 0 is the top of the
     picture and column 0 its left, seen from where the camera stands. sign: -1 for a panel whose phase grows as its
     level falls (or a path with the other sign); origin: phase [rad] of level 0; two_pi_level: the level, counted from
-    0 and possibly beyond the last, that lags a full turn behind level 0; flip_horizontal, flip_vertical: the picture
-    is sent to the panel mirrored.
+    0 and possibly beyond the last, that lags a full turn behind level 0, one for all colours or one for each;
+    correction: map that is added to what is sent to the panel; flip_horizontal, flip_vertical: the picture is sent to
+    the panel mirrored; turns: that the correction adds, ``(H, W)`` or ``(C, H, W)``.
     """
 
     sign: Literal[1, -1] = 1
     origin: float = 0.0
-    two_pi_level: Annotated[float, Interval(gt=1, le=4096)] = 256.0
+    two_pi_level: FullTurn = 256.0
+    correction: Correction | None = None
     flip_horizontal: bool = False
     flip_vertical: bool = False
+    turns: Any = field(default=0.0, metadata={"key": False}, repr=False, compare=False)
+
+    def of(self, channel: int) -> Convention:
+        """The convention of a colour alone."""
+        own = self.two_pi_level[channel] if isinstance(self.two_pi_level, tuple) else self.two_pi_level
+        return replace(self, two_pi_level=own, turns=self.turns[channel] if np.ndim(self.turns) == 3 else self.turns)
 
     def levels(self, phase: Tensor) -> Levels:
-        """The uint8 levels ``(..., H, W)`` of a phase [rad].
+        """The uint8 levels of a phase [rad], ``(C, H, W)``, or ``(H, W)`` where colours do not differ.
 
         With ``two_pi_level`` beyond 256 the panel cannot reach a full turn; phases beyond its reach go to the nearest
         end of it.
         """
-        turns = (self.sign * (phase.detach().cpu().double().numpy() - self.origin) / math.tau) % 1.0
-        steps = np.round(turns * self.two_pi_level)
-        reach = min(self.two_pi_level, 256)
-        steps = np.where(steps >= self.two_pi_level, steps - self.two_pi_level, steps)
-        beyond = steps > reach - 1 if self.two_pi_level > 256 else np.zeros_like(steps, dtype=bool)
-        nearest = np.where(steps - 255 > self.two_pi_level - steps, 0, 255)
-        levels = np.where(beyond, nearest, steps.clip(0, 255)).astype(np.uint8)
-        return np.ascontiguousarray(self._flipped(levels))
+        turns = self.sign * (phase.detach().cpu().double().numpy() - self.origin) / math.tau
+        full = per_colour(self.two_pi_level)
+        steps = np.round((self._flipped(turns) + self.turns) % 1.0 * full)
+        steps = np.where(steps >= full, steps - full, steps)
+        nearest = np.where(steps - LAST > full - steps, 0, LAST)
+        return np.ascontiguousarray(np.where(steps > LAST, nearest, steps).astype(np.uint8))
 
-    def phase(self, levels: Levels) -> Tensor:
-        """The phase ``(..., H, W)`` [rad] float32 that levels stand for, in the methods' convention."""
-        turns = self._flipped(levels).astype(np.float32) / np.float32(self.two_pi_level)
-        phase = self.sign * turns * np.float32(math.tau) + np.float32(self.origin)
-        return torch.from_numpy(np.ascontiguousarray(phase))
+    def phase(self, levels: NDArray[Any]) -> Tensor:
+        """The phase [rad] in float64 that levels of any type stand for, in the methods' convention; see ``levels``."""
+        radians = levels.astype(np.float64) * (math.tau / per_colour(self.two_pi_level)) - math.tau * self.turns
+        return torch.from_numpy(np.ascontiguousarray(self.sign * self._flipped(radians) + self.origin))
 
-    def _flipped(self, levels: Levels) -> Levels:
+    @property
+    def out_of_reach(self) -> str:
+        """One line where the panel's last level is short of a full turn; empty where it is not."""
+        full = np.atleast_1d(self.two_pi_level)
+        if full.max() <= LAST + 1:
+            return ""
+        shares = ", ".join(f"{max(0.0, 1 - (LAST + 0.5) / level):.0%}" for level in full)
+        return (
+            f"phase.two_pi_level: level {LAST} is the last; {shares} of a turn is shown as the nearer end of the range"
+        )
+
+    def _flipped(self, values: NDArray[Any]) -> NDArray[Any]:
         if self.flip_horizontal:
-            levels = levels[..., ::-1]
-        return levels[..., ::-1, :] if self.flip_vertical else levels
+            values = values[..., ::-1]
+        return values[..., ::-1, :] if self.flip_vertical else values
+
+
+def per_colour(level: float | Sequence[float]) -> NDArray[np.float64]:
+    """Levels that broadcast to ``(C, H, W)``."""
+    values = np.asarray(level, dtype=np.float64)
+    return values[:, None, None] if values.ndim else values

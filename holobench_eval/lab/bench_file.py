@@ -10,12 +10,14 @@ from typing import Annotated, Any
 
 from annotated_types import Interval, MinLen
 
-from ..core.errors import UserError
+from ..core.errors import CellError, UserError
 from ..core.schema import typed
 from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL
 from ..display.simulated.stages import Panel
 from ..imaging.convention import Convention
+from ..methods.files.correction import on_panel
+from .dark import given_dark
 from .laser import LaserSettings
 from .settings import CaptureSettings
 
@@ -53,4 +55,14 @@ def load_bench_file(path: Path) -> BenchFile:
         raise document.error(("panel", "shape"), f"a panel has at least {SMALLEST_PANEL} pixels a side")
     if bench.panel.bits != 8:
         raise document.error(("panel", "bits"), f"levels are written with 8 bits, got {bench.panel.bits}")
-    return replace(bench, digest=hashlib.sha256(document.text.encode()).hexdigest())
+    told, capture = document.text, bench.capture
+    if isinstance(capture.dark, str):
+        file = path.parent / capture.dark
+        told += given_dark(str(file))[1]
+        capture = replace(capture, dark=str(file.resolve()))
+    try:
+        phase = on_panel(bench.phase, bench.panel.shape, len(bench.panel.wavelengths), path.parent)
+    except CellError as error:
+        raise document.error(("phase", "correction"), f"phase: {error}") from error
+    correction = (path.parent / phase.correction.file).read_bytes() if phase.correction else b""
+    return replace(bench, phase=phase, capture=capture, digest=hashlib.sha256(told.encode() + correction).hexdigest())

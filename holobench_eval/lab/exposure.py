@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..imaging.warp import Array
+from .dark import Dark
 from .devices import Camera, Counts, DeviceError
 
 FILL, PERCENTILE = 0.7, 99.9  # where auto exposure puts which samples, as a part of the range from dark to white
@@ -122,23 +123,6 @@ def auto_exposure(camera: Camera, plane: int) -> float:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Dark:
-    """Counts without light: bias and, for every second of exposure, rate; ``(Hs, Ws)``, or numbers for all samples."""
-
-    bias: Array
-    rate: Array
-
-    def at(self, seconds: float) -> Array:
-        """Counts of an exposure of ``seconds``."""
-        return self.bias + self.rate * seconds
-
-
-def dark_level(counts: float) -> Dark:
-    """The same number of counts everywhere, whatever the exposure."""
-    return Dark(np.array(counts), np.array(0.0))
-
-
 def dark_frames(camera: Camera, count: int, seconds: tuple[float, float], plane: int) -> Dark:
     """Measure the dark counts, the light being off: means of ``count`` frames at a short and a long exposure.
 
@@ -149,7 +133,7 @@ def dark_frames(camera: Camera, count: int, seconds: tuple[float, float], plane:
         if np.mean(each.counts) > 0.25 * camera.white:
             raise DeviceError(f"{camera.name}: dark frames are bright; is the laser really off, the room dark?")
     if long.seconds < 1.5 * short.seconds:
-        return Dark((short.counts + long.counts) / 2, np.zeros_like(long.counts))
+        return Dark((short.counts + long.counts) / 2)
     rate = (long.counts - short.counts) / (long.seconds - short.seconds)
     return Dark(short.counts - rate * short.seconds, rate)
 
@@ -164,8 +148,8 @@ def combined(bracket: Sequence[Averaged], dark: Dark) -> tuple[Array, float]:
     counts, seconds = np.zeros_like(shortest.counts), np.zeros_like(shortest.counts)
     for each in bracket:
         good = ~each.saturated
-        counts += np.where(good, each.counts - dark.at(each.seconds), 0.0)
+        counts += np.where(good, dark.off(each.counts, each.seconds), 0.0)
         seconds += np.where(good, each.seconds, 0.0)
     lost = seconds == 0
-    least = (shortest.counts - dark.at(shortest.seconds)) / shortest.seconds
+    least = dark.off(shortest.counts, shortest.seconds) / shortest.seconds
     return np.where(lost, least, counts / np.where(lost, 1.0, seconds)), float(lost.mean())

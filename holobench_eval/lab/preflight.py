@@ -19,7 +19,8 @@ from torch import Tensor
 
 from ..imaging.convention import Convention
 from ..imaging.warp import Array, Frame
-from .exposure import Averaged, Dark
+from .dark import Dark
+from .exposure import Averaged
 from .photograph import MOST_SATURATED
 from .test_pattern import PatternFit, find_pattern
 
@@ -60,7 +61,7 @@ def linearity(take: Callable[[float], Averaged], seconds: float, dark: Dark) -> 
     if times[-1] < 4 * times[0]:
         given = f"{times[0]:.2g} to {times[-1]:.2g} s"
         return Check(False, f"linearity: the camera gave exposures of {given} only; it needs a factor of eight to tell")
-    light = np.array([float(np.mean((each.counts - dark.at(each.seconds))[bright])) for each in taken])
+    light = np.array([float(np.mean(dark.off(each.counts, each.seconds)[bright])) for each in taken])
     straight, offset = _affine(times, light)
     figures = f"r^2 {straight:.5f}, offset {offset:+.1%} of the longest exposure"
     if straight > STRAIGHTEST and abs(offset) <= FURTHEST_OFFSET:
@@ -110,25 +111,32 @@ def full_turn(show: Show, phase: Tensor, convention: Convention) -> Check:
     """Is ``two_pi_level`` the level at which the letter of `phase_sign` gets most light?
 
     Each level is shown with two constant phases half a turn apart, whose mean has no interference with unmodulated
-    light. A panel with a crooked look-up table has its best level elsewhere, so that a small difference is reported
-    and not refused.
+    light. Every colour has a best level of its own. A panel with a crooked look-up table has its best level elsewhere,
+    so that a small difference is reported and not refused.
     """
     fits: list[PatternFit] = []
-    light = []
+    levels, light = [], []
     for ratio in (1.0, *(each for each in FULL_TURNS if each != 1)):
-        level = min(max(convention.two_pi_level * ratio, 2.0), 4096.0)
-        tried = replace(convention, two_pi_level=level)
-        picture = (show(phase, tried) + show(phase + math.pi, tried)) / 2
+        tried = np.clip(np.atleast_1d(convention.two_pi_level) * ratio, 2.0, 65536.0).tolist()
+        turn = replace(convention, two_pi_level=tuple(tried) if len(tried) > 1 else tried[0])
+        picture = (show(phase, turn) + show(phase + math.pi, turn)) / 2
         fits = fits or [find_pattern(frame) for frame in _frames(picture)]
-        light.append((level, _light(fits, _frames(picture))))
-    levels, strengths = np.array([each[0] for each in light]), np.array([each[1] for each in light])
-    strengths = (strengths / np.maximum(strengths.max(0), 1e-12)).mean(1)
-    best, strongest = _peak(levels, strengths)
-    share = float(strengths[0] / strongest)
-    line = f"phase.two_pi_level: {convention.two_pi_level:g} gives {min(share, 1):.0%} of the light"
+        levels.append(np.resize(tried, len(fits)))
+        light.append(_light(fits, _frames(picture)))
+    strengths = np.array(light) / np.maximum(np.max(light, axis=0), 1e-12)
+    peaks = [_peak(*each) for each in zip(np.array(levels).T, strengths.T, strict=True)]
+    share = float(np.mean([strength / peak for strength, (_, peak) in zip(strengths[0], peaks, strict=True)]))
+    line = f"phase.two_pi_level: {_text(convention.two_pi_level, 'g')} gives {min(share, 1):.0%} of the light"
     if share >= DIMMER:
         return Check(True, f"{line} of the best level")
-    return Check(share >= DIM, f"{line} of {best:.0f}; {'set it to that' if share < DIM else 'consider that'}")
+    best = _text([level for level, _ in peaks], ".0f")
+    return Check(share >= DIM, f"{line} of {best}; {'set it to that' if share < DIM else 'consider that'}")
+
+
+def _text(levels: float | Sequence[float], form: str) -> str:
+    """A level, or a list of the colours' levels where they differ."""
+    texts = [format(level, form) for level in np.atleast_1d(levels)]
+    return texts[0] if len(set(texts)) == 1 else f"[{', '.join(texts)}]"
 
 
 def _peak(levels: Array, strengths: Array) -> tuple[float, float]:

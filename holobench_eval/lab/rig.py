@@ -14,8 +14,9 @@ from torch import Tensor
 
 from ..core.errors import CellError, LostDeviceError, UserError
 from ..imaging.convention import Convention
+from .dark import Dark, given_dark
 from .devices import Camera, DeviceError, Slm
-from .exposure import Dark, FreshCamera, auto_exposure, averaged, combined, dark_frames, dark_level
+from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
 from .preflight import Check, full_turn, linearity, phase_sign
@@ -117,7 +118,7 @@ class Rig:
         say(f"settling: {settle * 1e3:.0f} ms{'' if self.settings.settle == 'auto' else ' (as set)'}")
         darks = self._darks(exposures)
         level = ", ".join(f"{float(np.mean(dark.at(each))):.1f}" for dark, each in zip(darks, exposures, strict=True))
-        say(f"dark: {level} counts{'' if self.settings.dark else ' (as set)'}")
+        say(f"dark: {level} counts{'' if self.settings.dark_frames else ' (as set)'}")
         ready = Prepared(exposures, darks, settle, ())
         checks = []
         for check in self._checks(pattern, ready):
@@ -139,7 +140,7 @@ class Rig:
         if self.settings.settle != "auto":
             return self.settings.settle
         self.laser.select(0)
-        bright, dark = (self.convention.levels(each) for each in (phase[0], torch.zeros_like(phase[0])))
+        bright, dark = (self.convention.of(0).levels(each) for each in (phase[0], torch.zeros_like(phase[0])))
         toggle = Toggle(
             show=lambda lit: self.slm.show(bright if lit else dark),
             take=lambda: averaged(self.camera, seconds, 1, self.planes[0]).counts,
@@ -148,13 +149,14 @@ class Rig:
         return settle_time(toggle)
 
     def _darks(self, exposures: Sequence[float]) -> tuple[Dark, ...]:
-        if self.settings.dark_level is not None:
-            return (dark_level(self.settings.dark_level),) * len(exposures)
+        if self.settings.dark is not None:
+            dark, _ = given_dark(self.settings.dark)
+            return tuple(dark.plane(plane) for plane in self.planes)
         self.laser.select(None)
         least, darks = min(self.settings.hdr), []
         for seconds, plane in zip(exposures, self.planes, strict=True):
             span = (seconds * least * DARK_SPAN[0], seconds * DARK_SPAN[1])
-            darks.append(dark_frames(self.camera, self.settings.dark, span, plane))
+            darks.append(dark_frames(self.camera, self.settings.dark_frames, span, plane))
         return tuple(darks)
 
     def _checks(self, pattern: Request, ready: Prepared) -> Iterator[Check]:
@@ -169,6 +171,8 @@ class Rig:
             return self._take(replace(pattern, phase=phase), convention, ready, single).light
 
         yield phase_sign(show, pattern.phase, self.convention)
+        if self.convention.out_of_reach:
+            yield Check(True, self.convention.out_of_reach)
         yield full_turn(show, pattern.phase, self.convention)
 
     def _take(self, request: Request, convention: Convention, ready: Prepared, settings: CaptureSettings) -> Photograph:
@@ -189,7 +193,7 @@ class Rig:
 
     def _show(self, phase: Tensor, channel: int, convention: Convention, settle: float) -> None:
         self.laser.select(channel)
-        levels = convention.levels(phase[channel])
+        levels = convention.of(channel).levels(phase[channel])
         self._fresh.changed((channel, levels.tobytes()))
         self.slm.show(levels)
         self.wait(settle)

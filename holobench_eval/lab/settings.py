@@ -18,22 +18,23 @@ class CaptureSettings:
     """Exposure, averaging, dark frames, bracket and settling of every photograph.
 
     exposure: seconds, one for each colour channel or one for all, or ``auto``: as long as the test pattern allows;
-    average: frames whose mean is taken; dark: frames with the laser off whose mean is subtracted; dark_level: counts
-    without light, only where dark is 0; hdr: exposures of a bracket, relative to ``exposure``; settle: seconds from
-    showing a hologram to exposing, or ``auto``: measured.
+    average: frames whose mean is taken; dark_frames: frames with the laser off whose mean is taken off; dark: counts
+    without light, a level or a file beside the bench file, only where dark_frames is 0; hdr: exposures of a bracket,
+    relative to ``exposure``; settle: seconds from showing a hologram to exposing, or ``auto``: measured.
     """
 
     exposure: Literal["auto"] | float | tuple[float, ...] = "auto"
     average: Annotated[int, Interval(ge=1, le=1000)] = 4
-    dark: Annotated[int, Interval(ge=0, le=1000)] = 8
-    dark_level: Annotated[float, Interval(ge=0, le=65535)] | None = None
+    dark_frames: Annotated[int, Interval(ge=0, le=1000)] = 8
+    dark: float | str | None = None
     hdr: Annotated[tuple[Relative, ...], MinLen(1), MaxLen(8)] = (1.0,)
     settle: Literal["auto"] | float = "auto"
 
     def __post_init__(self) -> None:
-        if (self.dark == 0) != (self.dark_level is not None):
+        if (self.dark_frames == 0) != (self.dark is not None):
             raise UserError(
-                "capture: either dark frames (dark: 8) or, with dark: 0, the counts without light (dark_level: 64)"
+                "capture: either dark frames (dark_frames: 8) or, with dark_frames: 0, the counts without light "
+                "(dark: 64, or dark: a file)"
             )
         # by hand, since of a union only the first type's fault would be reported
         for seconds in self.exposure if isinstance(self.exposure, tuple) else (self.exposure,):

@@ -11,6 +11,7 @@ from typing import Any
 from ..core import plugins
 from ..core.hashing import digest
 from ..display import DisplaySpec, load_profile
+from ..display.resolution import refuse_far
 from ..display.simulated.changes import KINDS, Value, altered
 from ..lab.bench_file import load_bench_file
 from ..lab.session import read_manifest
@@ -174,15 +175,18 @@ def displays(study: Study) -> dict[str, Condition]:
 
 
 def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
-    """Read a profile without building its bench. UserError: unknown profile, or a panel it cannot have."""
+    """Read a profile without building its bench. UserError: unknown profile, or a panel or distance it cannot have."""
     profile = load_profile(source, folder=folder)
-    return Condition(source, folder, profile.name, profile.version, profile.digest, profile.spec(panel))
+    spec = profile.spec(panel)
+    refuse_far(spec, profile.panel.distance)
+    return Condition(source, folder, profile.name, profile.version, profile.digest, spec)
 
 
 def real_condition(source: str, folder: Path) -> Condition:
     """Read the file of a real bench without opening its devices. UserError for an invalid file."""
     bench, real = load_bench_file(folder / source), RealSource(bench=folder / source)
     spec = bench.panel.spec(bench.name)
+    refuse_far(spec, spec.distance)
     return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=real)
 
 

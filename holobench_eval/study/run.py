@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
-import time
-from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +24,7 @@ from .executors.remaining import Kind, Remaining
 from .phases import Phases, phases_of
 from .plan import Cell, Plan
 from .progress import Lines
+from .queue import Drawing, Queue, Step
 from .scoring import starts
 from .scoring.cell import work
 from .scoring.job import Job, Setting
@@ -34,9 +32,6 @@ from .scoring.scores import kept_capture
 from .store import Record, Store, appears, late
 from .training import TrainingJob, train
 
-DRAWING, DRAWING_SECONDS = "", 3.0  # the label of drawings in the queue, and about what one takes
-Drawing = Callable[[], None]  # of a picture that the report needs and that needs no cell
-Step = TrainingJob | Job | Drawing
 Result = str | list[Record] | None  # of a training the reason of its failure, empty for success; of a task its records
 
 
@@ -201,10 +196,7 @@ def _compute(
         names = [(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained]
         anew = {preparation.name: artifacts.outdated(preparation) for preparation in untrained}
         watch.training(names, [f"{name} is trained anew: {reason}" for name, reason in anew.items() if reason])
-    unready = {preparation.id for preparation in untrained} | missing
     trainings = [TrainingJob(preparation, setting) for preparation in untrained]
-    at_work: dict[int, float] = {}
-    expected = {DRAWING: DRAWING_SECONDS}
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
     jobs = list(_jobs(plan, missing, unscored, timed, single, setting))
     if single:  # one of each method first, so that the time left is known soon
@@ -213,29 +205,28 @@ def _compute(
     known = _known(jobs) if isinstance(executor, Serial | Local) else {}  # else other machines compute
     remaining = Remaining(((job.kind, job.alone) for job in jobs), known, executor.workers)
     watch.expects(remaining.seconds, remaining.is_whole)
-    steps = queue(trainings, jobs, unready, at_work, expected, drawings)
-    watched = _watched(steps, at_work, remaining, watch)
-    results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, watched)
+    queue = Queue(trainings, jobs, missing, drawings)
+    results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, _watched(queue, remaining, watch))
     solved = 0
     for job, result in results:
-        taken = time.monotonic() - at_work.pop(id(job))
         if isinstance(result, StopError):
             raise result
         if isinstance(job, TrainingJob):
+            queue.ends(job, {job.preparation.id})
             reason = result if isinstance(result, str) else artifacts.fail(job.preparation, _error(result))
-            unready.discard(job.preparation.id)
             watch.trained(job.preparation.name, reason)
         elif isinstance(job, Job):
+            # Of several workers none should begin the longest job at the end.
+            queue.ends(job, job.wanted, None if single else job.task.label)
             remaining.ends(id(job))
-            unready -= job.wanted
             records = result if isinstance(result, list) else _lost(job, _error(result), store)
             _refuse_unseen(records, store)
-            if not single:  # of several workers none should begin its longest job at the end
-                expected[job.task.label] = taken
             solved += any(
                 not record.reused and record.seconds is not None for record in records if record.id in missing
             )
             watch.finished(records)
+        else:
+            queue.ends(job)
     return solved
 
 
@@ -286,13 +277,11 @@ def _known(jobs: Iterable[Job]) -> dict[Kind, float]:
     return {kind: seconds for kind, seconds in measured.items() if seconds is not None}
 
 
-def _watched(
-    steps: Iterator[Step | None], at_work: dict[int, float], remaining: Remaining, watch: Lines
-) -> Iterator[Step | None]:
-    """The same steps; of one that an executor takes ``at_work`` gets ``id`` and time [s], and the watch the task."""
-    for job in steps:
+def _watched(queue: Queue, remaining: Remaining, watch: Lines) -> Iterator[Step | None]:
+    """The steps of a queue, which is told of each that an executor takes, as is the watch."""
+    for job in queue:
         if job is not None:
-            at_work[id(job)] = time.monotonic()
+            queue.begins(job)
         if isinstance(job, Job):
             remaining.begins(id(job), job.kind, job.alone)
             watch.started(job.task)
@@ -328,55 +317,6 @@ def step(job: Step) -> Result:
     if isinstance(job, TrainingJob):
         return train(job)
     return work(job) if isinstance(job, Job) else job()
-
-
-def queue(
-    trainings: Iterable[TrainingJob],
-    jobs: Iterable[Job],
-    unready: set[str],
-    at_work: Collection[object],
-    expected: Mapping[str, float],
-    drawings: Iterable[Drawing] = (),
-) -> Iterator[Step | None]:
-    """Trainings first, since they take longest; then drawings and jobs, the longest first, a job as soon as it needs
-    nothing of ``unready``; at the end, each by itself, the jobs that run alone, those that start from others last.
-
-    unready: ids of the preparations still to be trained and of the cells still to be computed; at_work: the steps that
-    an executor took; expected: seconds that a job takes by its label; a job of another label may take longer than all
-    others. The caller changes all three as results come. None: all remaining jobs wait for a step that is at work.
-    """
-    yield from trainings
-    alone, groups = list[Job](), dict[tuple[str, frozenset[str]], deque[Step]]()
-    late = set[str]()  # cells of jobs that run alone
-    for job in sorted(jobs, key=_follows):
-        if job.alone or not late.isdisjoint(_needs(job)):
-            alone.append(job)
-            late |= job.wanted
-        else:
-            groups.setdefault((job.task.label, _needs(job)), deque()).append(job)
-    if drawings:
-        groups[DRAWING, frozenset()] = deque(drawings)
-    while groups:
-        ready = [group for group in groups if unready.isdisjoint(group[1])]
-        if not ready:
-            yield None
-            continue
-        longest = max(ready, key=lambda group: expected.get(group[0], math.inf))
-        yield groups[longest].popleft()
-        if not groups[longest]:
-            del groups[longest]
-    for job in alone:
-        while at_work:
-            yield None
-        yield job
-
-
-def _needs(job: Job) -> frozenset[str]:
-    return frozenset(identity for cell, _ in job.cells for identity in (*cell.prepared, *cell.starts))
-
-
-def _follows(job: Job) -> bool:
-    return any(cell.starts for cell, _ in job.cells)
 
 
 def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> None:

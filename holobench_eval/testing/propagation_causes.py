@@ -1,4 +1,4 @@
-"""What makes an image wrong: it is compared with the images that well-known mistakes give."""
+"""What makes an image wrong: a mistake is named where its twin, with the mistake built in, gives the same image."""
 
 from __future__ import annotations
 
@@ -10,18 +10,28 @@ from itertools import product
 import torch
 from torch import Tensor
 
-from .propagation_reference import INSETS, Grid, Physics, Setting, Transform, difference, propagated, sampled_kernel
+from .propagation_reference import (
+    INSETS,
+    ROUNDED,
+    TAU,
+    Grid,
+    Physics,
+    Radius,
+    Setting,
+    Transform,
+    difference,
+    propagated,
+    sampled_kernel,
+)
 
-EXPLAINED = 0.3
-"""A mistake is the cause if it leaves at most this share of the difference."""
-
-EXPLAINED_WITH_REST, REST = 0.75, 0.01
-"""The share if a second mistake makes the rest, and the smallest rest, relative to the field, that it is named for."""
+EXPLAINED = 0.1
+"""A mistake is the cause if its twin leaves at most this share of the difference, and of the image."""
 
 CERTAIN = 0.01
 """No other mistake is tried after one that leaves at most this share."""
 
 UNKNOWN = "none of the mistakes known to the kit gives this image"
+SINGLE = "exp(ikz) formed in float32"
 MODELS: dict[Physics, str] = {
     "exact": "an exact model, where a paraxial one is claimed",
     "paraxial": "a paraxial (Fresnel) model",
@@ -31,6 +41,10 @@ GRIDS: dict[Grid, str] = {
     **dict.fromkeys(INSETS, "frequencies half a sample off (linspace for fftfreq)"),
     "one off": "frequencies one sample off (fftshift for ifftshift)",
 }
+RADII: dict[str, Radius] = {
+    " on each axis": lambda fy, fx: torch.maximum(fy.abs(), fx.abs()),
+    " in any direction": torch.hypot,
+}
 PADDINGS = {
     1: "circular, no zero padding: what leaves on one side comes back on the other",
     2: "padding to twice the size is too little without a band limit",
@@ -39,37 +53,34 @@ PADDINGS = {
 
 
 def cause(field: Tensor, image: Tensor, setting: Setting, physics: Physics) -> str:
-    """The likeliest reason, in one line, why ``image`` is not ``field`` propagated; ``(H, W)`` complex128, not zero."""
+    """Which mistake gives ``image`` in the place of ``field`` propagated, in one line, or that no known one does.
+
+    ``(H, W)`` complex128, not zero. Of twins that are about as near to the image, the simplest is named.
+    """
     right = propagated(field, setting, physics)
     wrong = difference(image, right, field)
-    factor = float(torch.vdot(right.flatten(), image.flatten()).abs() / right.norm() ** 2)
-    if factor > 0 and difference(image / factor, right) < EXPLAINED * min(1, abs(factor - 1)):
-        return f"right but for a factor of {factor:.3g} in amplitude{_normalisation(factor, setting)}"
-    words, left = _nearest(field, image, setting, physics, wrong)
-    rest = _carrier(left, setting)
-    if left < EXPLAINED * wrong or (rest and left < EXPLAINED_WITH_REST * wrong):
-        return f"{words}; {rest}" if rest else words
-    return _displaced(image, right, setting) or _carrier(wrong, setting) or _low_pass(image, right) or UNKNOWN
-
-
-def _nearest(field: Tensor, image: Tensor, setting: Setting, physics: Physics, wrong: float) -> tuple[str, float]:
-    """The mistake whose image is nearest, and how far that is, relative to the field; the simplest if several are."""
-    nearest = "", math.inf
-    for words, other in _mistaken(field, setting, physics):
-        left = difference(image, other, field)
-        if left < nearest[1] / 2:
-            nearest = words, left
+    nearest, least = UNKNOWN, EXPLAINED * wrong
+    for words, twin in _twins(field, image, right, setting, physics):
+        left = difference(image, twin, min(field, image, key=torch.norm))
+        if left < least / (1 if nearest == UNKNOWN else 2):
+            nearest, least = words, left
         if left < CERTAIN * wrong:
             break
     return nearest
 
 
-def _mistaken(field: Tensor, setting: Setting, physics: Physics) -> Iterator[tuple[str, Tensor]]:
-    """The images of mistakes, simple ones first, each with its name."""
-    turned = torch.roll(propagated(field, setting, physics).flip(0, 1), (1, 1), (0, 1))
+def _twins(
+    field: Tensor, image: Tensor, right: Tensor, setting: Setting, physics: Physics
+) -> Iterator[tuple[str, Tensor]]:
+    """The images of mistakes, simple ones first, each with its name; a figure is the one that fits best."""
+    factor = float(torch.vdot(right.flatten(), image.flatten()).abs() / right.norm() ** 2)
+    yield f"right but for a factor of {factor:.3g} in amplitude", factor * right
+    turned = torch.roll(right.flip(0, 1), (1, 1), (0, 1))
     yield "turned by 180 degrees: a second fft2 in the place of ifft2", turned
-    sampled = sampled_kernel(field, setting)
-    yield "a kernel steeper than the pixels sample: cut it there, and claim a smaller band", sampled
+    yield (
+        "a kernel steeper than the pixels sample: cut it there, and claim a smaller band",
+        sampled_kernel(field, setting),
+    )
     models: tuple[Physics, Physics] = ("exact", "paraxial") if physics == "exact" else ("paraxial", "exact")
     for sign, model, samples in product((1, -1), models, (4, 3, 2, 1)):
         given = replace(setting, distance=sign * setting.distance)
@@ -79,6 +90,9 @@ def _mistaken(field: Tensor, setting: Setting, physics: Physics) -> Iterator[tup
             words = [*whole, *_grid_and_padding(samples, grid, limited)]
             if words:
                 yield ", ".join(words), propagated(field, given, model, Transform(samples, grid, limited))
+    yield _displaced(image, right)
+    yield from _low_passes(field, image, right, setting, physics)
+    yield from _in_single_precision(field, setting, physics, difference(image, right, field))
 
 
 def _grid_and_padding(samples: int, grid: Grid, limited: bool) -> list[str]:
@@ -89,47 +103,20 @@ def _grid_and_padding(samples: int, grid: Grid, limited: bool) -> list[str]:
     return [PADDINGS[samples]] if samples in PADDINGS else []
 
 
-def displacement(dy: float, dx: float, setting: Setting) -> str:
-    """A displacement [px], and where it may come from."""
-    return f"({dy:z.2f}, {dx:z.2f}) px aside: {_frequency_offset(max(dy, dx, key=abs), setting)}"
+def _in_single_precision(
+    field: Tensor, setting: Setting, physics: Physics, wrong: float
+) -> Iterator[tuple[str, Tensor]]:
+    """Twins that round 2 pi z / lambda, if rounding makes errors of this size."""
+    step = 2.0 ** (math.floor(math.log2(TAU * abs(setting.distance) / setting.wavelength)) - 23)
+    if not 0.02 * step < wrong < step:  # to save time: these are many
+        return
+    for rounded, samples, limited in product(ROUNDED[physics], (4, 2), (False, True)):
+        how = Transform(samples, "fftfreq", limited, rounded)
+        yield f"{SINGLE} (steps of {step:.2g} rad)", propagated(field, setting, physics, how)
 
 
-def _frequency_offset(pixels: float, setting: Setting) -> str:
-    """What displaces light by so many pixels along one axis, as far as it can be told."""
-    offset = abs(pixels) / setting.travel(1.0)  # [1/m]; at low frequencies light goes aside in proportion to them
-    for padding, samples in product((1, 2, 3, 4), (0.5, 1.0)):
-        if math.isclose(offset * padding * setting.shape[0] * setting.pitch, samples, rel_tol=0.06):
-            known = GRIDS["ends" if samples < 1 else "one off"]
-            return f"{known}, padded {padding}x"
-    if min(abs(pixels - whole) for whole in (-1, -0.5, 0.5, 1)) < 0.02:
-        return "a wrong pair of shifts, or the padding cropped at another place"
-    return "a wrong frequency grid, or padding cropped at another place"
-
-
-def _carrier(error: float, setting: Setting) -> str:
-    """Whether an error is as large as that of 2 pi z / lambda in single precision; empty if not."""
-    phase = math.tau * abs(setting.distance) / setting.wavelength
-    step = 2.0 ** (math.floor(math.log2(phase)) - 23)
-    if error < REST or not 0.3 < error / (step / math.sqrt(12)) < 6:
-        return ""
-    return f"exp(ikz) formed in float32 (steps of {step:.2g} rad)"
-
-
-def _normalisation(factor: float, setting: Setting) -> str:
-    pixels = math.prod(setting.shape)
-    known = {"H W": pixels, "1 / (H W)": 1 / pixels, "sqrt(H W)": pixels**0.5, "1 / sqrt(H W)": pixels**-0.5}
-    known["pitch^2"], known["1 / pitch^2"] = setting.pitch**2, setting.pitch**-2
-    for name, value in known.items():
-        for padding in (1, 4, 16):
-            if math.isclose(factor, value * padding, rel_tol=0.02) or math.isclose(
-                factor, value / padding, rel_tol=0.02
-            ):
-                return f", {name}: normalisation of the transform or of the kernel"
-    return ": normalisation of the transform or of the kernel"
-
-
-def _displaced(image: Tensor, right: Tensor, setting: Setting) -> str:
-    """The displacement of the image, if that is most of what is wrong."""
+def _displaced(image: Tensor, right: Tensor) -> tuple[str, Tensor]:
+    """The right image, moved to where it fits best."""
     spectra = torch.fft.fft2(image), torch.fft.fft2(right)
     correlation = spectra[0] * spectra[1].conj()
     peak = int(torch.fft.ifft2(correlation).abs().argmax())
@@ -143,17 +130,25 @@ def _displaced(image: Tensor, right: Tensor, setting: Setting) -> str:
     best = int((to_rows @ correlation @ to_columns).abs().argmax())
     dy, dx = float(rows[best // len(near)]), float(columns[best % len(near)])
     shift = torch.exp(-2j * math.pi * (fy[:, None] * dy + fx * dx))
-    left = difference(image, torch.fft.ifft2(spectra[1] * shift)) / difference(image, right)
-    return displacement(dy, dx, setting) if math.hypot(dy, dx) > 0.05 and left < 0.5 else ""
+    return f"right but ({dy:z.2f}, {dx:z.2f}) px aside", torch.fft.ifft2(spectra[1] * shift)
 
 
-def _low_pass(image: Tensor, right: Tensor) -> str:
-    """The share of the spectrum that is missing, if the rest is as it should be."""
-    seen, wanted = (torch.fft.fftshift(torch.fft.fft2(each)) for each in (image, right))
-    powers = [torch.nn.functional.avg_pool2d(each.abs().square()[None], 5, 1, 2)[0] for each in (seen, wanted)]
-    present = powers[1] > 0.1 * powers[1].mean()
-    passed = present & (powers[0] > 0.3 * powers[1])
-    missing = 1 - float(passed.sum() / present.sum())
-    if missing < 0.05 or not passed.any() or difference(seen[passed], wanted[passed]) > EXPLAINED:
-        return ""
-    return f"a low pass: {missing:.0%} of the spectrum is missing"
+def _low_passes(
+    field: Tensor, image: Tensor, right: Tensor, setting: Setting, physics: Physics
+) -> Iterator[tuple[str, Tensor]]:
+    """The field without its highest frequencies, from where on as much light is missing as the image lacks."""
+    present = float(image.norm() / right.norm()) ** 2
+    if not 0.02 < present < 0.98:
+        return
+    power = torch.fft.fft2(right).abs().square().flatten()
+    fy, fx = (torch.fft.fftfreq(size, setting.pitch, dtype=torch.float64) for size in right.shape)
+    for name, radius in RADII.items():
+        order = torch.argsort(radius(fy[:, None], fx).flatten())
+        last = int((power[order].cumsum(0) < present * power.sum()).sum())
+        near = float(radius(fy[:, None], fx).flatten()[order[min(last, len(order) - 1)]])
+        limits = (near * (1 + step / 100) for step in range(-6, 7))  # an image's edges hide some of the light
+        twins = {
+            limit: propagated(field, setting, physics, Transform(4, radius=radius, limit=limit)) for limit in limits
+        }
+        limit, twin = min(twins.items(), key=lambda each: difference(image, each[1], field))
+        yield f"a low pass: the band ends at {2 * limit * setting.pitch:.2f} of that of the pixels{name}", twin

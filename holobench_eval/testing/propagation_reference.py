@@ -6,8 +6,10 @@ The second also does what well-known mistakes do, so that a wrong propagator can
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
+from typing import Any, Literal
 
 import torch
 from torch import Tensor
@@ -15,6 +17,7 @@ from torch import Tensor
 from ..core.seeds import generator
 
 PITCH, WAVELENGTH = 6.4e-6, 517e-9
+TAU = math.tau
 
 Physics = Literal["exact", "paraxial"]
 """Exact scalar diffraction (Goodman, Introduction to Fourier Optics, 3.10), or its Fresnel approximation (4.2)."""
@@ -43,19 +46,59 @@ class Setting:
         """``(shape, pitch, wavelength, distance)``."""
         return self.shape, self.pitch, self.wavelength, self.distance
 
-    def travel(self, frequency: float) -> float:
-        """Pixels that light of a spatial frequency [1/m] goes aside."""
-        sine = self.wavelength * frequency
-        return self.distance * sine / math.sqrt(1 - sine**2) / self.pitch
+
+Rounded = Callable[[Tensor, Tensor, Setting], Tensor]
+"""The phase 2 pi z sqrt(1 / lambda^2 - f^2), carrier included, as code forms it in float32."""
+
+
+Root = Callable[[Tensor, Tensor, float], Tensor]
+ROOTS: tuple[tuple[Root, Callable[[float], float]], ...] = (
+    (lambda y, x, w: torch.sqrt(1 - w**2 * (y**2 + x**2)), lambda w: TAU / w),
+    (lambda y, x, w: torch.sqrt(1 - w**2 * (y**2 + x**2)).float(), lambda w: TAU / w),
+    (lambda y, x, w: torch.sqrt(1 - (w * x.float()) ** 2 - (w * y.float()) ** 2), lambda w: TAU / w),
+    (lambda y, x, w: torch.sqrt(1 - w**2 * (x.float() ** 2 + y.float() ** 2)), lambda w: TAU / w),
+    (lambda y, x, w: torch.sqrt(1 / w**2 - x.float() ** 2 - y.float() ** 2), lambda w: TAU),
+    (lambda y, x, w: torch.sqrt(1 / w**2 - (x.float() ** 2 + y.float() ** 2)), lambda w: TAU),
+    (lambda y, x, w: torch.sqrt((TAU / w) ** 2 - (TAU * x.float()) ** 2 - (TAU * y.float()) ** 2), lambda w: 1.0),
+)
+"""The square root as code writes it, of frequencies y and x and wavelength w, and what it is multiplied by."""
+
+
+def _rounded(root: Root, scale: Callable[[float], float], stepwise: bool, *given: Any) -> Tensor:
+    fy, fx, setting = given
+    factor, z = scale(setting.wavelength), setting.distance
+    values = root(fy, fx, setting.wavelength)
+    return values * factor * z if stepwise else values * (factor * z)
+
+
+def _rounded_paraxial(fy: Tensor, fx: Tensor, setting: Setting) -> Tensor:
+    w, z = setting.wavelength, setting.distance
+    return TAU / w * z - (math.pi * w * z) * (fx.float() ** 2 + fy.float() ** 2)
+
+
+Radius = Callable[[Tensor, Tensor], Tensor]
+
+ROUNDED: dict[Physics, list[Rounded]] = {
+    "exact": [partial(_rounded, *root, stepwise) for root in ROOTS for stepwise in (False, True)],
+    "paraxial": [_rounded_paraxial],
+}
+"""Ways in which code rounds to single precision: each has errors of its own, which differ from bit to bit."""
 
 
 @dataclass(frozen=True)
 class Transform:
-    """How `propagated` computes: samples of the transform in sizes of the field, its frequencies, a band limit."""
+    """How `propagated` computes: samples of the transform in sizes of the field, its frequencies, a band limit.
+
+    rounded: how the phase is formed in single precision, one of `ROUNDED`; in double precision unless given;
+    radius, limit: what passes is where this measure of the frequencies is at most the limit [1/m].
+    """
 
     samples: int = 8
     grid: Grid = "fftfreq"
     limited: bool = False  # by Matsushima & Shimobaba, Opt. Express 17, 19662 (2009), Eq. 13
+    rounded: Rounded | None = None
+    radius: Radius | None = None
+    limit: float = math.inf
 
 
 def gaussian_beam(
@@ -137,7 +180,12 @@ def propagated(field: Tensor, setting: Setting, physics: Physics = "exact", how:
     inside = axial > 0
     if how.limited:
         inside &= _below_limit(fy, setting)[:, None] & _below_limit(fx, setting)
-    transfer = torch.polar(inside.double(), -2 * math.pi * setting.distance * f_squared / slope)
+    if how.radius is not None:
+        inside &= how.radius(fy[:, None], fx) <= how.limit
+    phase = -TAU * setting.distance * f_squared / slope
+    if how.rounded:
+        phase = how.rounded(fy[:, None], fx, setting).float().double()
+    transfer = torch.polar(inside.double(), phase)
     spectrum = torch.fft.fft2(field.to(torch.complex128), s=padded)
     return torch.fft.ifft2(spectrum * transfer)[:height, :width]
 

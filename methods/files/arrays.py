@@ -6,7 +6,6 @@ import io
 import json
 import subprocess
 import sys
-import warnings
 import zipfile
 from collections.abc import Mapping
 from math import prod
@@ -15,25 +14,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 
-from ...core.errors import CellError
-from ...core.io import decode_levels
+from ...core.errors import CellError, PictureError
+from ...core.pictures import open_picture
 
 PICTURES = (".png", ".tif", ".tiff", ".bmp")
 FORMATS = ("PNG", "TIFF", "BMP")
 SUFFIXES = (*PICTURES, ".npy", ".npz", ".mat")
 SECONDS = 120.0  # that reading a .mat file may take
-BITS_PER_SAMPLE = 258  # TIFF 6.0, section 8
-ORIENTATION = 274  # Exif 2.32, section 4.6.4
+MOST_PIXELS = 200_000_000  # of a picture
 LARGEST_BYTES = 1_000_000_000  # a complex field of three colours on a panel of 4K in double precision takes 400 MB
 
 
-def read_array(path: Path, variable: str = "") -> NDArray[Any]:
+def read_array(path: Path, variable: str = "", content: bytes | None = None) -> NDArray[Any]:
     """The array of a file, as it is stored; a picture's levels as ``(H, W)`` or ``(H, W, C)`` with red first.
 
-    variable: the name of the array in a .npz or .mat file; empty where there is only one. CellError, one line, for a
-    file that is missing, damaged, of another kind or too large, and for an array that does not hold plain numbers.
+    variable: the name of the array in a .npz or .mat file; empty where there is only one; content: of the file, where
+    it was read before. CellError, one line, for a file that is missing, damaged, of another kind or too large, and for
+    an array that does not hold plain numbers.
     """
     if not path.is_file():
         raise CellError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}")
@@ -43,7 +41,10 @@ def read_array(path: Path, variable: str = "") -> NDArray[Any]:
     if suffix not in SUFFIXES:
         raise CellError(f"{path}: phases are read from {', '.join(SUFFIXES)}")
     try:
-        array = _matlab(path, variable) if suffix == ".mat" else _content(path.read_bytes(), suffix, variable)
+        if suffix == ".mat":
+            array = _matlab(path, variable)
+        else:
+            array = _content(path.read_bytes() if content is None else content, suffix, variable)
     except CellError as error:
         raise CellError(f"{path}: {error}") from None
     except Exception as error:  # whatever a reader trips over in a damaged file
@@ -59,40 +60,25 @@ def _content(content: bytes, suffix: str, variable: str) -> NDArray[Any]:
 
 
 def _picture(content: bytes) -> NDArray[Any]:
-    levels = decode_levels(content)
-    if levels is None:
-        raise CellError("no picture of 8 or 16 bits that can be read, or a damaged one")
-    if levels.ndim == 3 and levels.shape[2] == 4:
-        raise CellError("a picture with alpha; expected gray or RGB")
-    _refuse_altered(content)
-    return levels
-
-
-def _refuse_altered(content: bytes) -> None:
-    """CellError for a picture that OpenCV gives otherwise than it is stored: one page of several, turned by its EXIF
-    orientation (a TIFF, and no PNG), or with fewer than 8 bits stretched to 8."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large panels are no attack
-        try:
-            image = Image.open(io.BytesIO(content), formats=FORMATS)
-        except UnidentifiedImageError:
-            raise CellError(f"no picture of 8 or 16 bits that can be read as {', '.join(FORMATS)}") from None
-    frames, orientation = getattr(image, "n_frames", 1), image.getexif().get(ORIENTATION, 1)
-    if frames != 1:
-        raise CellError(f"{frames} frames or pages; expected a file with one picture")
-    if orientation != 1:
-        raise CellError(f"a picture with EXIF orientation {orientation}; expected one that is stored upright")
-    if (bits := _bits(image, content)) < 8:
-        raise CellError(f"a {bits}-bit picture; expected 8 or 16 bits")
-
-
-def _bits(image: Image.Image, content: bytes) -> int:
-    """Bits a sample, or an index of a palette, in the file."""
-    if image.format == "PNG":
-        return content[24]  # PNG specification, section 11.2.1 (IHDR)
-    if image.format == "TIFF":
-        return int(min(image.tag_v2.get(BITS_PER_SAMPLE, (1,))))  # type: ignore[attr-defined]
-    return min(content[28], 8)  # BITMAPINFOHEADER, biBitCount: of a whole pixel
+    """The levels of a picture that are stored as they are: not turned, and not stretched to 8 bits."""
+    try:
+        stored = open_picture(content, MOST_PIXELS)
+        if stored.format not in FORMATS:
+            raise CellError(f"no picture of 8 or 16 bits that can be read as {', '.join(FORMATS)}")
+        if stored.has_alpha:
+            raise CellError("a picture with alpha; expected gray or RGB")
+        if stored.orientation != 1:
+            raise CellError(
+                f"a picture with EXIF orientation {stored.orientation}; expected one that is stored upright"
+            )
+        if stored.is_floating or stored.bits not in (8, 16):
+            kind = "floating-point " if stored.is_floating else ""
+            raise CellError(f"a {stored.bits}-bit {kind}picture; expected 8 or 16 bits")
+        if stored.is_lossy:
+            raise CellError("a picture that is compressed with loss; expected its levels as they are")
+        return stored.values()
+    except PictureError as error:
+        raise CellError(f"no picture of 8 or 16 bits that can be read: {error}") from None
 
 
 def _numbers(content: bytes, suffix: str, variable: str) -> NDArray[Any]:

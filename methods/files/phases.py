@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 import torch
-from annotated_types import Interval, MinLen
+from annotated_types import MinLen
 from numpy.typing import NDArray
 from torch import Tensor
 
 from ...core.errors import CellError, UserError
 from ...core.io import file_name
 from ...display.api import DisplaySpec
+from ...imaging.convention import Convention, Correction, FullTurn
 from ...optics.phase import are_levels
 from ..common import Bench
 from ..double_phase import encode
 from .arrays import SUFFIXES, read_array
+from .correction import on_panel
 
 COLOURS = ("red", "green", "blue")
 
@@ -63,9 +64,14 @@ class Phases:
     levels : {"integers", "all"}
         Which real numbers are levels: integers, or all (MATLAB keeps levels as double). Floating point that is whole
         throughout and goes beyond 20 is no file of radians, and is refused unless all are levels.
-    two_pi_level : float, optional
-        The level whose phase is a full turn, 2 pi; by default 256 or 65536, by the bits of the file. A file of radians
-        is refused with it.
+    two_pi_level : float or list of float, optional
+        The level whose phase is a full turn, 2 pi, one for all colours or one for each; by default 256 or 65536, by the
+        bits of the file. A file of radians is refused with it.
+    correction : mapping, optional
+        The correction map of a panel that is in the levels, and is taken off them modulo a turn: ``file``, a picture of
+        the panel's rows and columns, and ``two_pi_level``, the level of the map that is a full turn (256 unless given),
+        one for all colours or one for each. It lies as the file does, before ``flip_horizontal`` and
+        ``flip_vertical``. A file of radians is refused with it.
     sign : {1, -1}
         -1 for phases of the opposite convention.
     origin : float
@@ -83,7 +89,8 @@ class Phases:
     channels: tuple[str, ...] = COLOURS
     variable: str = ""
     levels: Literal["integers", "all"] = "integers"
-    two_pi_level: Annotated[float, Interval(gt=1, le=65536)] | None = None
+    two_pi_level: FullTurn | None = None
+    correction: Correction | None = None
     sign: Literal[1, -1] = 1
     origin: float = 0.0
     flip_horizontal: bool = False
@@ -109,7 +116,8 @@ class Phases:
     def files(self, target_name: str) -> list[str]:
         """The files that hold the phase of a target; those of all colours where each has its own."""
         patterns = [pattern for pattern in (self.file, self.amplitude) if pattern]
-        return [path for pattern in patterns for path in self._paths(pattern, target_name)]
+        paths = [path for pattern in patterns for path in self._paths(pattern, target_name)]
+        return paths if self.correction is None else [*paths, self.correction.file]
 
     def refuse_shared(self, target_names: Iterable[str]) -> None:
         """UserError where a pattern with ``{target}`` or ``{stem}`` gives several targets the same file."""
@@ -163,12 +171,15 @@ class Phases:
             raise CellError(f"channels: {len(paths)} names for the {colours} colours of '{spec.name}'")
         if (missing := next((path for path in paths if not Path(path).is_file()), None)) is not None:
             raise CellError(f"{missing}: no such file{self._altered(pattern, target_name)}{self._hint(missing)}")
+        convention = Convention(self.sign, self.origin, self.two_pi_level or 256.0, self.correction)
+        panel = on_panel(convention, spec.shape, colours, Path()) if phases else None
         if len(paths) > 1:
-            planes = [self._planes(path, spec, 1, phases) for path in paths]
+            planes = [self._planes(path, spec, 1, panel and panel.of(index)) for index, path in enumerate(paths)]
             return torch.cat(planes)
-        return self._planes(paths[0], spec, colours, phases)
+        return self._planes(paths[0], spec, colours, panel)
 
-    def _planes(self, path: str, spec: DisplaySpec, colours: int, phases: bool) -> Tensor:
+    def _planes(self, path: str, spec: DisplaySpec, colours: int, panel: Convention | None) -> Tensor:
+        """What a file holds, ``(C, H, W)``; panel: the meaning of its levels, None for amplitudes."""
         array = read_array(Path(path), self.variable)
         if array.ndim == 3 and array.shape[-1] == colours and array.shape[:2] == spec.shape:
             array = np.moveaxis(array, -1, 0)
@@ -178,11 +189,11 @@ class Phases:
             raise CellError(f"{path}: {_described(array)}; {_wanted(spec, colours)}")
         if self.order == "bgr":
             array = array[::-1]
+        values = self._radians(array, path, panel) if panel else _real(array, path)
         if self.flip_horizontal:
-            array = array[..., ::-1]
+            values = values[..., ::-1]
         if self.flip_vertical:
-            array = array[..., ::-1, :]
-        values = self._radians(array, path) if phases else _real(array, path)
+            values = values[..., ::-1, :]
         if not np.isfinite(values).all():
             raise CellError(f"{path}: holds values that are NaN or infinite")
         return torch.from_numpy(np.ascontiguousarray(values))
@@ -198,18 +209,21 @@ class Phases:
         short = Path(path).with_suffix("").with_suffix(Path(path).suffix)
         return f"; {{stem}} in the place of {{target}} names {short}" if short.is_file() else ""
 
-    def _radians(self, array: NDArray[Any], path: str) -> NDArray[Any]:
-        if array.dtype.kind == "c":
-            field = array if self.sign == 1 else array.conj()
-            return field * np.exp(1j * self.origin)
-        if array.dtype.kind != "f" or self.levels == "all":
+    def _radians(self, array: NDArray[Any], path: str, panel: Convention) -> NDArray[Any]:
+        if array.dtype.kind not in "fc" or (array.dtype.kind == "f" and self.levels == "all"):
             bits = 8 * array.dtype.itemsize
             if self.two_pi_level is None and (array.dtype.kind != "u" or bits > 16):
                 raise CellError(f"{path}: levels of type {array.dtype}; say which level is a full turn: two_pi_level")
-            array = array.astype(np.float64) * (math.tau / (self.two_pi_level or 2**bits))
-        elif self.two_pi_level is not None:
-            raise CellError(f"{path}: two_pi_level is set, but {array.dtype} holds radians; levels need 'levels: all'")
-        elif are_levels(torch.from_numpy(array.astype(np.float64))):
+            panel = panel if self.two_pi_level else replace(panel, two_pi_level=2.0**bits)
+            return panel.phase(array).numpy()
+        for key in ("two_pi_level", "correction"):
+            if getattr(self, key) is not None:
+                held = "radians; levels need 'levels: all'" if array.dtype.kind == "f" else "a field, not levels"
+                raise CellError(f"{path}: {key} is set, but {array.dtype} holds {held}")
+        if array.dtype.kind == "c":
+            field = array if self.sign == 1 else array.conj()
+            return field * np.exp(1j * self.origin)
+        if are_levels(torch.from_numpy(array.astype(np.float64))):
             raise CellError(
                 f"{path}: {array.dtype}, but whole numbers up to {np.abs(array).max():g}, so levels, not radians; set "
                 "'levels: all' and two_pi_level (radians that are whole: store them modulo 2 pi)"

@@ -202,6 +202,8 @@ def test_gray_and_colour_do_not_mix_and_gray_alone_is_scored(pictures, quick):
 @pytest.mark.parametrize(("values", "key"), [("srgb", "psnr_linear"), ("linear", "psnr_amplitude")])
 def test_values_may_be_light_as_well(pictures, quick, values, key):
     shutil.rmtree(pictures / "captures" / "coarse")
+    for path in (pictures / "captures").glob("*/*.png"):  # clipped ones would have no score in linear light
+        Image.open(path).point(lambda level: 0.9 * level).save(path)
     text = run(pictures, values=values)
     assert key in (pictures / "out" / "table.csv").read_text()
     assert "values as stored" not in text

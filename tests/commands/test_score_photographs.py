@@ -8,14 +8,17 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 from rich.console import Console
 
 from holobench_eval.commands.score import score_folders
 from holobench_eval.core.errors import UserError
 from holobench_eval.metrics import score
+from holobench_eval.optics.colour import srgb_decode
 from holobench_eval.study.folders import scoring as scored_pictures
 from tests.support.bayer import bayer_dng
 from tests.support.photographed import Picture, captured, drowned, photograph, pose, save
@@ -92,7 +95,7 @@ def test_raw_files_are_scored_as_linear_light_alone(tmp_path):
     mosaic[::2, ::2] += np.round(light * 15000).astype(np.uint16)
     (tmp_path / "captures" / "m").mkdir(parents=True)
     (tmp_path / "captures" / "m" / "astronaut.dng").write_bytes(bayer_dng(mosaic))
-    with pytest.raises(UserError, match="a RAW file holds linear light; expected --values linear"):
+    with pytest.raises(UserError, match="RAW files and floating point hold linear light; expected --values linear"):
         run(tmp_path)
     _, _, records = run(tmp_path, values="linear")
     assert records.loc[("m", "astronaut"), "psnr_linear_db"] > 18
@@ -258,6 +261,49 @@ def test_clipped_captures_are_named_with_their_share(tmp_path):
         assert "more than 0.1% of the scored samples at full scale: clipped/astronaut" in said
         assert f"clipped/astronaut {share:.2%}" in said
     assert "fair/" not in terminal.partition("Clipped")[2]
+
+
+def linear_counts(root: Path, black: int) -> None:
+    """Captures of one target on a black level of 65535 counts: "bright" is worse than "dim", which has less light."""
+    target, draw = photograph("astronaut", SHAPE).mean(axis=0, keepdims=True), np.random.default_rng(4)
+    save(root / "targets" / "astronaut.png", target)
+    light = srgb_decode(torch.from_numpy(np.round(target * 255) / 255)).numpy()
+    for method, gain, contrast in (("bright", 0.6, 0.30), ("dim", 0.12, 0.20)):
+        seen = 65535 * gain * light * (1 + contrast * draw.standard_normal(light.shape)).clip(0, 1.4)
+        path = root / "captures" / method / "astronaut.tif"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(str(path), np.clip(seen[0] + black + 40 * draw.standard_normal(SHAPE), 0, 65535).astype(np.uint16))
+
+
+def test_a_black_level_that_turns_the_order_is_told_and_dark_takes_it_off(tmp_path):
+    for root, black in ((tmp_path / "none", 0), (tmp_path / "black", 4096)):
+        linear_counts(root, black)
+    key = "psnr_linear_db"
+    right = run(tmp_path / "none", "linear", aligned=True)
+    wrong = run(tmp_path / "black", "linear", aligned=True)
+    text, terminal, taken = run(tmp_path / "black", "linear", aligned=True, dark="4096")
+    true, lifted, off = (records[key].droplevel("target") for records in (right[2], wrong[2], taken))
+    assert true["dim"] > true["bright"] + 1
+    assert lifted["dim"] < lifted["bright"]
+    assert off["dim"] == pytest.approx(true["dim"], abs=0.1)
+    assert off["bright"] == pytest.approx(true["bright"], abs=0.1)
+    assert "Bright where the target is darkest, by more than 5% of its white: bright/astronaut" in wrong[1]
+    for said in wrong[:2]:
+        assert "take it off with --dark" in said
+    assert "Bright where" not in right[1] + terminal
+    assert "--dark 4096" in text
+    with pytest.raises(UserError, match="not off encoded values; expected --values linear"):
+        run(tmp_path / "black", "srgb", dark="4096")
+
+
+def test_a_clipped_capture_of_linear_light_is_refused_as_in_a_study_though_dark_counts_are_taken_off(tmp_path):
+    linear_counts(tmp_path, 4096)
+    path = tmp_path / "captures" / "bright" / "astronaut.tif"
+    cv2.imwrite(str(path), np.minimum(cv2.imread(str(path), -1).astype(int) * 3, 65535).astype(np.uint16))
+    records = run(tmp_path, "linear", aligned=True, dark="4096")[2].droplevel("target")
+    assert records.loc["bright", "state"] == "failed"
+    assert "of the scored samples are clipped, more than 0.1%" in records.loc["bright", "reason"]
+    assert records.loc["dim", "state"] == "done"
 
 
 def test_aligned_captures_that_are_not_alike_are_named_with_their_correlation(tmp_path):

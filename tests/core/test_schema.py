@@ -116,3 +116,29 @@ def test_an_error_of_a_plug_in_is_placed_at_its_parameter_or_at_its_name(error, 
     document = parse("table.yaml", DOCUMENT)
     with pytest.raises(UserError, match=rf"^table.yaml:{position}: {error}$"), placed(document, ("name",), ("lens",)):
         raise error
+
+
+@pytest.mark.parametrize(
+    ("value", "where", "message"),
+    [
+        (0, (), "level should be greater than 1, got 0"),
+        ([3, 0], (1,), "level[1] should be greater than 1, got 0"),
+        ([3, "a"], (1,), "level[1] should be a valid number, got"),
+        ({"depth": 0}, ("depth",), "level.depth should be greater than 1, got 0"),
+    ],
+)
+def test_a_value_of_several_kinds_has_the_fault_of_the_one_that_it_comes_nearest(value, where, message):
+    high = Annotated[float, Interval(gt=1)]
+
+    @dataclass(frozen=True)
+    class Deep:
+        depth: high
+
+    @dataclass(frozen=True)
+    class Many:
+        level: high | tuple[high, ...] | Deep = 2.0
+
+    with pytest.raises(FieldError) as error:
+        checked(Many, {"level": value})
+    assert error.value.where == ("level", *where)
+    assert message in str(error.value)

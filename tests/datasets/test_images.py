@@ -7,6 +7,7 @@ import zlib
 import cv2
 import numpy as np
 import pytest
+import tifffile
 import torch
 from PIL import Image, ImageCms, ImageOps
 
@@ -158,11 +159,19 @@ def test_the_exif_orientation_is_applied(orientation, kind):
     assert torch.allclose(decode(content, "x"), wanted, atol=1e-6)
 
 
-def test_a_16_bit_image_that_is_not_stored_upright_is_refused():
+def test_the_exif_orientation_of_16_bits_is_applied():
     exif = Image.Exif()
     exif[274] = 6
     turned = encoded(Image.fromarray(DEEP[..., 0]), "TIFF", exif=exif)
-    assert "stored upright" in refusal(turned, gray=True, sixteen_bit="srgb")
+    wanted = torch.from_numpy(np.rot90(DEEP[..., 0], 3) / 65535).float().expand(3, -1, -1)
+    assert torch.allclose(decode(turned, "x", gray=True, sixteen_bit="linear"), wanted, atol=1e-7)
+
+
+def test_16_bit_colours_in_separate_planes_are_the_same_image():
+    planar, file = io.BytesIO(), np.ascontiguousarray(DEEP.transpose(2, 0, 1))
+    tifffile.imwrite(planar, file, photometric="rgb", planarconfig="separate")
+    as_linear = decode(planar.getvalue(), "x", sixteen_bit="linear")
+    assert torch.allclose(as_linear, torch.from_numpy(DEEP / 65535).float().permute(2, 0, 1), atol=1e-7)
 
 
 def test_an_srgb_profile_is_taken_and_another_is_refused():

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from holobench_eval.commands.schema import study_schema
-from holobench_eval.core.json_schema import resolved
-from holobench_eval.core.parameters import allowed
+from tests.docs.sections import mappings, section
 
 PAGE = Path(__file__).parents[2] / "docs" / "config.md"
-LONGEST = 5  # names that a cell lists; of more, holoeval list has them
 
 INTRODUCTION = """\
 # The config of a study
@@ -91,63 +86,11 @@ alone.
 def page() -> str:
     """The text of the page."""
     schema = study_schema()
-    parts = [INTRODUCTION, *_section("The document", schema, schema["$defs"])]
+    parts = [INTRODUCTION, *section("The document", schema, schema["$defs"])]
     for key, entry in schema["properties"].items():
-        for name, inner in _mappings(key, entry, schema["$defs"]):
-            parts += _section(f"`{name}`", inner, schema["$defs"])
+        for name, inner in mappings(key, entry, schema["$defs"]):
+            parts += section(f"`{name}`", inner, schema["$defs"])
     return "\n".join(parts).rstrip("\n") + "\n"
-
-
-def _mappings(key: str, entry: Any, definitions: Any) -> Iterator[tuple[str, Any]]:
-    """The mappings with keys of their own in a value, by the name of their key."""
-    if isinstance(entry, dict):
-        inner = resolved(entry, definitions)
-        if "properties" in inner:
-            yield key, inner
-            for name, part in inner["properties"].items():
-                yield from _mappings(f"{key}.{name}", part, definitions)
-        else:
-            for part in entry.values():
-                yield from _mappings(key, part, definitions)
-    elif isinstance(entry, list):
-        for part in entry:
-            yield from _mappings(key, part, definitions)
-
-
-def _section(title: str, schema: Any, definitions: Any) -> Iterator[str]:
-    yield f"## {title}\n\n| key | may be | default | what it is |\n|---|---|---|---|"
-    needed = schema.get("required", ())
-    for name, entry in schema["properties"].items():
-        inside = any(True for _ in _mappings(name, entry, definitions))
-        default = "needed" if name in needed else "below" if inside and entry.get("default") else _default(entry)
-        words = _words(entry, definitions)
-        yield f"| `{name}` | {words} | {default} | {_text(entry['description'])} |".replace("  ", " ")
-    yield ""
-
-
-def _default(entry: Any) -> str:
-    return f"`{json.dumps(entry['default'])}`" if entry.get("default", "") not in ("", [], {}) else ""
-
-
-def _words(entry: Any, definitions: Any) -> str:
-    return allowed(_short(entry), definitions)
-
-
-def _text(text: str) -> str:
-    return text.replace("None: ", "null: ").replace("|", "\\|")
-
-
-def _short(entry: Any) -> Any:
-    """A value's schema with words in the place of many names and of patterns of files."""
-    if isinstance(entry, list):
-        return [_short(part) for part in entry]
-    if not isinstance(entry, dict):
-        return entry
-    if len(entry.get("enum", ())) > LONGEST:
-        return {"type": "a name of `holoeval list`"}
-    if "pattern" in entry:
-        return {"type": "`path/to/file.py:Name`" if "py" in entry["pattern"] else "`path/to/file.yaml`"}
-    return {key: _short(part) for key, part in entry.items()}
 
 
 if __name__ == "__main__":

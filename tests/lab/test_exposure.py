@@ -2,16 +2,15 @@ import numpy as np
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.lab.dark import Dark, given_dark
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.exposure import (
     Averaged,
-    Dark,
     FreshCamera,
     auto_exposure,
     averaged,
     combined,
     dark_frames,
-    dark_level,
 )
 from holobench_eval.lab.settings import CaptureSettings
 from tests.support.simulated_devices import SimulatedCamera, Still
@@ -129,7 +128,7 @@ def test_dark_counts_are_subtracted_at_the_photographs_own_exposure():
         light, lost = combined([averaged(device, seconds, 4, 0)], dark)
         assert lost == 0
         assert abs(light.mean() - 1000 * speckle().mean()) < 0.02 * 1000 + 0.2 / seconds
-    nothing, _ = combined([Averaged(np.array([[30.0]]), np.array([[False]]), 1.0)], dark_level(64.0))
+    nothing, _ = combined([Averaged(np.array([[30.0]]), np.array([[False]]), 1.0)], given_dark(64.0)[0])
     assert nothing[0, 0] == -34.0
 
 
@@ -159,16 +158,16 @@ def test_a_bracket_measures_what_one_exposure_cannot():
 def test_samples_saturated_in_every_exposure_count_as_saturated():
     device = camera(np.pad(np.full((10, 10), 1e6), 20))
     bracket = [averaged(device, seconds, 1, 0) for seconds in (0.1, 0.01)]
-    light, lost = combined(bracket, dark_level(64.0))
+    light, lost = combined(bracket, given_dark(64.0)[0])
     assert lost == pytest.approx(100 / 2500)
     assert np.isfinite(light).all()
     assert light[25, 25] == pytest.approx((4095 - 64) / 0.01)
 
 
 def test_a_procedure_needs_dark_frames_or_a_dark_level():
-    assert CaptureSettings().dark > 0
-    assert CaptureSettings(dark=0, dark_level=64.0).dark_level == 64.0
-    for wrong in ({"dark": 0}, {"dark": 4, "dark_level": 64.0}):
+    assert CaptureSettings().dark_frames > 0
+    assert CaptureSettings(dark_frames=0, dark=64.0).dark == 64.0
+    for wrong in ({"dark_frames": 0}, {"dark_frames": 4, "dark": 64.0}, {"dark": 8}):
         with pytest.raises(UserError, match="either dark frames"):
             CaptureSettings(**wrong)
 

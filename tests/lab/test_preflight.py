@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from holobench_eval.imaging.convention import Convention
-from holobench_eval.lab.exposure import averaged, dark_level
+from holobench_eval.lab.dark import given_dark
+from holobench_eval.lab.exposure import averaged
 from holobench_eval.lab.preflight import full_turn, linearity, phase_sign
 from holobench_eval.lab.test_pattern import draw_pattern, find_pattern
 from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, Still, bench, pattern_phase
@@ -34,7 +35,7 @@ def green(initial_phase="random"):
 def check_linearity(exposure=0.02, picture=None, **camera):
     still = Still(np.random.default_rng(0).exponential(size=(100, 100)) if picture is None else picture)
     device = SimulatedCamera(still, **{"noise": 2.0, "bits": 14, **camera})
-    return linearity(partial(averaged, device, count=2, plane=0), exposure, dark_level(64.0))
+    return linearity(partial(averaged, device, count=2, plane=0), exposure, given_dark(64.0)[0])
 
 
 def test_a_linear_camera_passes():
@@ -155,6 +156,23 @@ def test_a_level_that_costs_much_light_is_refused_and_the_best_is_named():
     named = float(check.line.split("light of ")[1].split(";")[0])
     assert abs(named - 175) < 0.08 * 175
     assert full_turn(photographer(two_pi_level=175.0), green(), Convention(two_pi_level=named)).passed
+
+
+def test_every_laser_has_a_best_level_of_its_own():
+    cameras = [photographer(two_pi_level=level) for level in (175.0, 256.0)]
+
+    def show(phase, convention):
+        frames = [
+            camera(part[None], convention.of(i)) for i, (camera, part) in enumerate(zip(cameras, phase, strict=True))
+        ]
+        return torch.cat(frames)
+
+    both = green().expand(2, -1, -1)
+    line = full_turn(show, both, Convention()).line
+    first, second = (float(each) for each in line.split("light of [")[1].split("]")[0].split(","))
+    assert abs(first - 175) < 0.08 * 175
+    assert second > 1.3 * first
+    assert full_turn(show, both, Convention(two_pi_level=(first, second))).line.endswith("of the best level")
 
 
 def test_a_level_that_costs_little_light_is_only_remarked_on():

@@ -10,7 +10,7 @@ from holobench_eval.lab.rig import Rig
 from holobench_eval.lab.settings import CaptureSettings
 from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
 
-FAST = CaptureSettings(average=1, dark=2)
+FAST = CaptureSettings(average=1, dark_frames=2)
 
 
 def rig(procedure=FAST, convention=None, truth=None, channels=(GREEN,), **camera):
@@ -71,7 +71,7 @@ def test_preparing_says_one_line_for_each_step_in_order():
 
 def test_photographs_are_light_per_second_of_the_channels_own_laser():
     bench_rig = rig(
-        CaptureSettings(average=4, dark=4),
+        CaptureSettings(average=4, dark_frames=4),
         truth={"latency": 0.03, "lag": 0.01},
         channels=(0, 1, 2),
         colour=True,
@@ -94,7 +94,7 @@ def test_photographs_are_light_per_second_of_the_channels_own_laser():
 
 
 def test_a_bracket_measures_a_picture_that_saturates_one_exposure():
-    bench_rig = rig(CaptureSettings(exposure=0.02, average=1, dark=2, settle=0.0, hdr=(1.0, 0.1)), noise=1.0)
+    bench_rig = rig(CaptureSettings(exposure=0.02, average=1, dark_frames=2, settle=0.0, hdr=(1.0, 0.1)), noise=1.0)
     bench_rig.prepare(asked(), quiet)
     taken = bench_rig.photograph(asked(relative=8.0))
     expected = truth(bench_rig, asked().phase[0]) * bench_rig.camera.gain
@@ -104,7 +104,7 @@ def test_a_bracket_measures_a_picture_that_saturates_one_exposure():
 
 
 def test_an_exposure_that_saturates_the_letter_ends_the_preparation():
-    bench_rig = rig(CaptureSettings(exposure=0.2, average=1, dark=2, settle=0.0))
+    bench_rig = rig(CaptureSettings(exposure=0.2, average=1, dark_frames=2, settle=0.0))
     with pytest.raises(UserError, match=r"saturated; shorten capture\.exposure"):
         bench_rig.prepare(asked(), quiet)
 
@@ -120,7 +120,7 @@ def test_a_wrong_sign_or_a_bent_camera_ends_the_preparation_in_one_line():
 
 
 def test_what_is_set_is_not_measured():
-    bench_rig = rig(CaptureSettings(exposure=0.01, average=1, dark=0, dark_level=64.0, settle=0.25))
+    bench_rig = rig(CaptureSettings(exposure=0.01, average=1, dark_frames=0, dark=64.0, settle=0.25))
     lines = []
     ready = bench_rig.prepare(asked(), lines.append)
     assert ready.exposures == (0.01,)

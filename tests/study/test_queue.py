@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from holobench_eval.study.run import DRAWING, DRAWING_SECONDS, queue
+import pytest
+
+from holobench_eval.study.queue import DRAWING_SECONDS, Queue
 
 
 @dataclass(frozen=True)
@@ -35,78 +37,120 @@ class FakeJob:
         return [(FakeCell(self.needs, self.starts), None)]
 
 
+@dataclass(frozen=True)
+class FakeTraining:
+    name: str
+
+    @property
+    def preparation(self) -> SimpleNamespace:
+        return SimpleNamespace(id=self.name)
+
+
 JOBS: Any = [FakeJob("a", ("one",)), FakeJob("b"), FakeJob("c", ("two",)), FakeJob("d", ("one", "two"))]
-TRAININGS: Any = ["one", "two"]
+TRAININGS: Any = [FakeTraining("one"), FakeTraining("two")]
+
+
+class Executor:
+    """Takes steps of a queue, and ends them when it is told."""
+
+    def __init__(self, trainings: Any, jobs: Any, missing: Any = (), drawings: Any = ()) -> None:
+        self.queue = Queue(trainings, jobs, missing, drawings)
+        self.steps = iter(self.queue)
+
+    def take(self) -> Any:
+        if (step := next(self.steps)) is not None:
+            self.queue.begins(step)
+        return step
+
+    def end(self, step: Any, label: str | None = None) -> None:
+        self.queue.ends(step, step.wanted if isinstance(step, FakeJob) else {step.name}, label)
+
+    def rest(self) -> list[Any]:
+        """What is left, one after the other."""
+        left = []
+        for step in self.steps:
+            left.append(step)
+            if step is not None:
+                self.queue.begins(step)
+                self.queue.ends(step, step.wanted if isinstance(step, FakeJob) else ())
+        return left
 
 
 def test_cells_that_wait_for_nothing_come_right_after_the_trainings() -> None:
-    steps = queue(TRAININGS, JOBS, {"one", "two"}, [], {})
-    assert [next(steps) for _ in range(3)] == ["one", "two", JOBS[1]]
+    executor = Executor(TRAININGS, JOBS)
+    assert [executor.take() for _ in range(3)] == [*TRAININGS, JOBS[1]]
 
 
 def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_none_is_lost() -> None:
-    unlearned = {"one", "two"}
-    steps = queue(TRAININGS, JOBS, unlearned, [], {})
-    assert [next(steps) for _ in range(3)][-1] is JOBS[1]
-    assert next(steps) is None
-    unlearned.discard("two")
-    assert next(steps) is JOBS[2]
-    assert next(steps) is None
-    assert next(steps) is None
-    unlearned.discard("one")
-    assert list(steps) == [JOBS[0], JOBS[3]]
+    executor = Executor(TRAININGS, JOBS)
+    assert [executor.take() for _ in range(3)][-1] is JOBS[1]
+    assert executor.take() is None
+    executor.end(TRAININGS[1])
+    assert executor.take() is JOBS[2]
+    assert executor.take() is None
+    assert executor.take() is None
+    executor.end(TRAININGS[0])
+    assert executor.rest() == [JOBS[0], JOBS[3]]
 
 
 def test_without_trainings_cells_keep_the_order_of_the_plan() -> None:
-    assert list(queue([], JOBS, set(), [], {})) == JOBS
+    assert Executor([], JOBS).rest() == JOBS
 
 
 def test_a_job_that_is_to_be_alone_comes_last_and_only_when_nothing_is_at_work() -> None:
-    quiet: Any = [FakeJob("x", ("one",), alone=True), FakeJob("y", alone=True)]
-    at_work: Any = ["a", "one"]
-    unlearned = {"one"}
-    steps = queue([], [quiet[0], FakeJob("a"), quiet[1]], unlearned, at_work, {})
-    assert next(steps) == FakeJob("a")
-    assert next(steps) is None
-    at_work.remove("a")
-    assert next(steps) is None
-    at_work.remove("one")
-    unlearned.remove("one")
-    assert next(steps) is quiet[0]
-    at_work.append("x")
-    assert next(steps) is None
-    at_work.remove("x")
-    assert list(steps) == [quiet[1]]
+    first, other, last = jobs = [FakeJob("x", ("one",), alone=True), FakeJob("a"), FakeJob("y", alone=True)]
+    executor = Executor(TRAININGS[:1], jobs)
+    assert [executor.take() for _ in range(3)] == [TRAININGS[0], other, None]
+    executor.end(other)
+    assert executor.take() is None
+    executor.end(TRAININGS[0])
+    assert executor.take() is first
+    assert executor.take() is None
+    executor.end(first)
+    assert executor.rest() == [last]
 
 
-def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length() -> None:
-    jobs: Any = [FakeJob("short 1"), FakeJob("short 2"), FakeJob("long 1"), FakeJob("long 2"), FakeJob("new 1")]
-    expected = {"short": 1.0, "long": 5.0}
-    steps = queue([], jobs, set(), [], expected)
-    assert next(steps) is jobs[4]
-    assert next(steps) is jobs[2]
-    expected["long"] = 0.5
-    assert list(steps) == [jobs[0], jobs[1], jobs[3]]
+def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+    labels = ("short 1", "short 2", "short 3", "long 1", "long 2", "long 3", "new 1")
+    jobs: Any = [FakeJob(label) for label in labels]
+    executor = Executor([], jobs)
+
+    def ended(seconds: float) -> Any:
+        job = executor.take()
+        clock[0] += seconds
+        executor.end(job, job.task.label)
+        return job
+
+    assert [ended(1.0), ended(5.0), ended(2.0)] == [jobs[0], jobs[3], jobs[6]]  # of no label is the time known
+    assert ended(0.5) is jobs[4]
+    assert executor.rest() == [jobs[1], jobs[2], jobs[5]]
 
 
-def test_a_drawing_comes_before_the_jobs_that_are_shorter() -> None:
-    jobs: Any = [FakeJob("long"), FakeJob("short")]
-    drawing: Any = "drawing"
-    steps = queue([], jobs, set(), [], {"long": 5.0, "short": 1.0, DRAWING: DRAWING_SECONDS}, [drawing])
-    assert list(steps) == [jobs[0], drawing, jobs[1]]
+def test_a_drawing_comes_before_the_jobs_that_are_shorter(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+    jobs: Any = [FakeJob("long 1"), FakeJob("short 1"), FakeJob("long 2"), FakeJob("short 2")]
+    drawing: Any = FakeTraining("drawing")
+    executor = Executor([], jobs, drawings=[drawing])
+    for job, seconds in ((jobs[0], DRAWING_SECONDS + 1), (jobs[1], DRAWING_SECONDS - 1)):
+        assert executor.take() is job
+        clock[0] += seconds
+        executor.end(job, job.task.label)
+    assert executor.rest() == [jobs[2], drawing, jobs[3]]
 
 
 def test_a_job_that_starts_from_others_waits_for_them() -> None:
-    jobs: Any = [FakeJob("oracle", starts=("a", "b")), FakeJob("a"), FakeJob("b")]
-    unready = {"a", "b", "oracle"}
-    steps = queue([], jobs, unready, [], {})
-    assert [next(steps) for _ in range(3)] == [jobs[1], jobs[2], None]
-    unready -= {"a"}
-    assert next(steps) is None
-    unready -= {"b"}
-    assert list(steps) == [jobs[0]]
+    oracle, a, b = jobs = [FakeJob("oracle", starts=("a", "b")), FakeJob("a"), FakeJob("b")]
+    executor = Executor([], jobs, {"a", "b", "oracle"})
+    assert [executor.take() for _ in range(3)] == [a, b, None]
+    executor.end(a)
+    assert executor.take() is None
+    executor.end(b)
+    assert executor.rest() == [oracle]
 
 
 def test_a_job_that_starts_from_one_that_runs_alone_comes_after_it() -> None:
     jobs: Any = [FakeJob("oracle", starts=("a",)), FakeJob("a", alone=True), FakeJob("b")]
-    assert list(queue([], jobs, {"a", "oracle"}, [], {})) == [jobs[2], jobs[1], jobs[0]]
+    assert Executor([], jobs, {"a", "oracle"}).rest() == [jobs[2], jobs[1], jobs[0]]

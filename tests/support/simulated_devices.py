@@ -222,7 +222,7 @@ panel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [6.36e-7, 5.17e-7, 4.46e-
 pupil: 0.8, region: 0.8}
 slm: {driver: simulated}
 camera: {driver: simulated}
-capture: {average: 1, dark: 1, settle: 0.0}
+capture: {average: 1, dark_frames: 1, settle: 0.0}
 laser: {callable: "switch.py:switch"}
 """
 

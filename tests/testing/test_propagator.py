@@ -77,5 +77,5 @@ def test_the_example_of_the_docs_passes_every_check(capsys):
 def test_the_example_of_a_mistake_fails_with_its_cause(capsys):
     assert exit_code(f"{EXAMPLES / 'half_bin.py'}:HalfBin") == 1
     out = capsys.readouterr().out
-    assert "(0.37, 0.37) px aside: frequencies half a sample off (linspace for fftfreq), padded 2x" in out
+    assert "frequencies half a sample off (linspace for fftfreq), padded 2x" in out
     assert max(len(line) for line in out.splitlines()[1:]) <= 100

@@ -47,12 +47,18 @@ class Profile:
 
     Parameters
     ----------
-    name, version, seed, description
-        What the profile is called; name and seed draw every random pattern, and a change of any value is a new version.
+    name
+        What the display is called; with the seed it draws every random pattern.
+    version
+        A change of any value is a new version.
+    seed
+        Of the random patterns.
+    description
+        One sentence for reports.
     panel
-        The nominal, public part.
+        The nominal, public part: what methods are told.
     sampling
-        Sub-samples per pixel and axis at the panel; crosstalk and fill factor need at least 3.
+        Sub-samples a pixel and axis at the panel; crosstalk and fill factor need at least 3 [count].
     lens to drift
         The stages. ``dust_plane`` has no keys of its own: its parameters are in ``coherent_noise``.
     residual_bound

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ...core.errors import UserError
 from ...imaging.convention import Convention
-from ..exposure import Averaged, Dark
+from ..exposure import Averaged
 from ..preflight import Check, linearity, phase_sign
 from .folder import FolderPhotographer
 from .frames import find
@@ -54,8 +54,7 @@ def _linear(photographer: FolderPhotographer, patterns: list[Pattern]) -> Iterat
             counts = photographer.counts(pattern).astype(np.float64)
             return Averaged(counts, np.zeros(counts.shape, dtype=bool), pattern.exposure)
 
-        bias, rate = (part.astype(np.float64) for part in photographer.dark_of(CHECKS, colour))
-        check = linearity(take, 1.0, Dark(bias, rate))
+        check = linearity(take, 1.0, photographer.dark_of(CHECKS, colour))
         yield replace(check, line=f"channel {colour}: {check.line}") if len(colours) > 1 else check
 
 

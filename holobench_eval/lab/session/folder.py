@@ -7,7 +7,7 @@ import hashlib
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from ...core.errors import CellError, Pending, UserError
 from ...core.hashing import digest
 from ...core.io import write_atomically, write_png
 from ...imaging.convention import Levels
+from ..dark import Dark, given_dark
 from ..photograph import Photograph, Request, plane_of
 from .checks import Series, check_present, check_series
 from .frames import Frame, Plane, facts, find, read_frame
@@ -25,6 +26,7 @@ from .manifest import (
     CAPTURES,
     CHECKS,
     DARK,
+    DARK_FILE,
     FIDUCIAL,
     LETTER,
     PATTERNS,
@@ -45,8 +47,8 @@ class FolderPhotographer:
     """Photographs that people take with their own software.
 
     What is asked for and not there is noted in ``wanted``; ``write_round`` writes the patterns for it. The dark level
-    comes from a round's dark frames, pixel by pixel. ``series`` of a round is known once its photographs were
-    checked.
+    comes from a round's dark frames, pixel by pixel, or is given. ``series`` of a round is known once its photographs
+    were checked.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -56,7 +58,7 @@ class FolderPhotographer:
         self.repeated: Request | None = None
         self._series: dict[int, Series] = {}
         self._contents: dict[str, str] = {}
-        self._dark: dict[tuple[int, int], tuple[Plane, Plane]] = {}
+        self._dark: dict[tuple[int, int], Dark] = {}
         self._known = {(pattern.key, pattern.colour): pattern for pattern in self.manifest.patterns}
 
     def announce(self, requests: Sequence[Request]) -> None:
@@ -83,12 +85,13 @@ class FolderPhotographer:
 
     def light(self, pattern: Pattern) -> Plane:
         """A photograph ``(Hs, Ws)`` with the dark level taken off, in counts per relative exposure, float32."""
-        bias, rate = self.dark_of(pattern.round, pattern.colour)
-        dark = bias + rate * np.float32(pattern.exposure)
-        return np.asarray((self.counts(pattern) - dark) / np.float32(pattern.exposure))
+        dark = self.dark_of(pattern.round, pattern.colour)
+        return np.asarray(dark.off(self.counts(pattern), pattern.exposure) / np.float32(pattern.exposure))
 
-    def dark_of(self, round_: int, colour: int) -> tuple[Plane, Plane]:
-        """Counts without light, and by how much they grow with the relative exposure, sample by sample."""
+    def dark_of(self, round_: int, colour: int) -> Dark:
+        """Counts without light, as given or, by the relative exposure, from a round's dark frames."""
+        if self.manifest.dark is not None:
+            return self._given.plane(plane_of(self.manifest.wavelengths[colour]))
         if (round_, colour) not in self._dark:
             frames: dict[float, list[Plane]] = {}
             for pattern in self.manifest.of_round(round_):
@@ -97,8 +100,20 @@ class FolderPhotographer:
             short, long = min(frames), max(frames)
             low, high = (np.asarray(np.mean(frames[exposure], axis=0), dtype=np.float32) for exposure in (short, long))
             rate = np.asarray((high - low) / np.float32(max(long - short, 1e-9)), dtype=np.float32)
-            self._dark[round_, colour] = np.asarray(low - rate * np.float32(short), dtype=np.float32), rate
+            self._dark[round_, colour] = Dark(np.asarray(low - rate * np.float32(short), dtype=np.float32), rate)
         return self._dark[round_, colour]
+
+    @cached_property
+    def _given(self) -> Dark:
+        """The dark counts that were given with the export. UserError where their file has changed."""
+        given = self.manifest.dark
+        if isinstance(given, str):
+            path = next(self.folder.glob(f"{DARK_FILE}.*"), self.folder / DARK_FILE)
+            dark, sha256 = given_dark(str(inside(self.folder, path.name)))
+            if sha256 != given:
+                raise UserError(f"{path}: has changed since the session was exported; put the file back")
+            return dark
+        return given_dark(given or 0.0)[0]
 
     def counts(self, pattern: Pattern) -> Plane:
         """A photograph ``(Hs, Ws)`` as the camera counted it. CellError for one that is gone or has changed."""
@@ -161,7 +176,8 @@ class FolderPhotographer:
         number = self.manifest.rounds + 1
         wanted = list(self.wanted.values())
         exposures = [1.0, *(self._exposure(request) for request in wanted)]
-        showings = ordered(wanted, self.repeated, f"{self.manifest.session} {number}", exposures)
+        dark = self.manifest.dark is None
+        showings = ordered(wanted, self.repeated, f"{self.manifest.session} {number}", exposures, dark)
         patterns: list[Pattern] = []
         for showing in showings:
             patterns += self._written(showing, number, len(patterns))
@@ -211,6 +227,8 @@ class FolderPhotographer:
         phase, patterns = self.manifest.phase, list[Pattern]()
         as_set, other = phase.levels(letter), replace(phase, sign=-phase.sign).levels(letter)
         for index, (role, exposure) in enumerate(check_showings(self.manifest.fixed_exposure)):
+            if role == DARK and self.manifest.dark is not None:
+                continue
             levels = {LETTER: as_set, REVERSED: other}.get(role)
             key = digest([role, index])
             patterns += self._shown(role, levels, exposure, key, "", (CHECKS, len(patterns)))

@@ -10,17 +10,14 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from PIL import Image
 
 from ...core.errors import UserError
-from ...core.io import decode_levels
 from ...optics.colour import srgb_decode
+from ..counts import read_counts
 from .manifest import SUFFIXES, inside
 
 MOST_PIXELS = 200_000_000  # more would be the bomb of a hostile file
 LARGEST_FILE = 1 << 30  # bytes
-LOSSY = (".jpg", ".jpeg")
-PLAIN = (".png", ".tif", ".tiff")
 
 Plane = NDArray[np.float32]
 
@@ -94,36 +91,15 @@ def read_frame(path: Path, colour: int) -> Frame:
         raise UserError(f"{path}: larger than {LARGEST_FILE >> 20} MiB, no photograph")
     content = path.read_bytes()
     sha256 = hashlib.sha256(content).hexdigest()
-    if path.suffix.lower() not in (*PLAIN, *LOSSY):
-        return _raw(path, colour, sha256)
-    try:
-        with Image.open(path) as header:
-            if header.width * header.height > MOST_PIXELS:
-                raise UserError(f"{path}: {header.width} x {header.height} pixels are too many for a photograph")
-            if getattr(header, "n_frames", 1) > 1:
-                raise UserError(f"{path}: holds several pictures; save one frame a file")
-    except UserError:
-        raise
-    except Exception as error:  # whatever a decoder trips over in a damaged file
-        raise UserError(f"{path}: not a picture that can be read ({' '.join(str(error).split())[:80]})") from None
-    levels = decode_levels(content)
-    if levels is None:
-        raise UserError(f"{path}: damaged, or not of 8 or 16 bits a sample")
-    if levels.ndim == 3 and levels.shape[2] != 3:
-        raise UserError(f"{path}: {levels.shape[2]} channels; save gray or RGB without transparency")
-    plane = levels[..., colour] if levels.ndim == 3 else levels
-    top = 255.0 if levels.dtype == np.uint8 else 65535.0
-    if path.suffix.lower() in LOSSY:
-        light = srgb_decode(torch.from_numpy(plane / np.float32(255))).numpy() * np.float32(255)
+    frame = read_counts(content, path, linear=True, upright=False, largest=MOST_PIXELS)
+    if frame.values.dtype.kind == "f":
+        raise UserError(f"{path}: floating point, which has no full scale; expected counts of 8 or 16 bits")
+    plane = frame.values[colour if len(frame.values) > 1 else 0]
+    counts = np.ascontiguousarray(plane, dtype=np.float32)
+    if frame.is_lossy:
+        light = srgb_decode(torch.from_numpy(counts / np.float32(255))).numpy() * np.float32(255)
         return Frame(light, 255.0, 1, sha256, linear=False)
-    return Frame(np.ascontiguousarray(plane, dtype=np.float32), top, _step(plane), sha256, linear=True)
-
-
-def _raw(path: Path, colour: int, sha256: str) -> Frame:
-    from ..raw import read_raw
-
-    raw = read_raw(path)
-    return Frame(np.ascontiguousarray(raw.counts[..., colour], dtype=np.float32), raw.white, 1, sha256, linear=True)
+    return Frame(counts, frame.white, 1 if frame.is_raw else _step(plane), sha256, linear=True)
 
 
 def _step(levels: NDArray[Any]) -> int:

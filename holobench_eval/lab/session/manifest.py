@@ -1,7 +1,7 @@
 """``manifest.json`` of a session folder: what every pattern is, and where its photograph belongs.
 
-The file may come from anywhere. It holds no path that is followed: names of files follow from numbers, and are in it
-for other people's scripts only.
+The file may come from anywhere. It holds no path that is followed, but for that of a correction map, which has to lie
+in the folder: names of other files follow from numbers, and are in it for other people's scripts only.
 """
 
 from __future__ import annotations
@@ -9,16 +9,17 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from annotated_types import Interval, Len, MaxLen, MinLen
 
-from ...core.errors import UserError
+from ...core.errors import CellError, UserError
 from ...core.io import write_atomically
 from ...core.schema import FieldError, checked
 from ...imaging.convention import Convention
+from ...methods.files.correction import on_panel
 
 FILE, PATTERNS, CAPTURES = "manifest.json", "patterns", "captures"
 FORMAT = 1
@@ -26,6 +27,7 @@ LARGEST_MANIFEST = 64 * 2**20  # bytes, about 200,000 patterns
 SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 DARK, FIDUCIAL, HOLOGRAM, REPEAT = "dark", "fiducial", "hologram", "repeat"
 LETTER, REVERSED = "letter", "reversed"
+DARK_FILE = "dark"  # the name, without its ending, of the file of dark counts that came with the export
 CHECKS = 0  # the round of the patterns that check the bench, which may be left out
 
 Role = Literal["dark", "fiducial", "hologram", "repeat", "letter", "reversed"]
@@ -62,7 +64,9 @@ class Manifest:
     """A session: its study and display, and all patterns so far, round by round in the order of showing.
 
     session: what tells it from others; study_sha256, bench_sha256: of its config and of its bench or profile; display:
-    name; panel: rows and columns; wavelengths [m]; photographed: sha256 of the photographs that were read, by the
+    name; panel: rows and columns; wavelengths [m]; phase: what the panel's levels mean, whose correction map lies in
+    the session's folder; dark: the counts without light, or the sha256 of the file that has them; None where dark
+    frames are photographed; photographed: sha256 of the photographs that were read, by the
     name of their pattern's capture.
     """
 
@@ -77,6 +81,7 @@ class Manifest:
     fixed_exposure: bool
     patterns: Annotated[tuple[Pattern, ...], MaxLen(1_000_000)] = ()
     photographed: dict[Annotated[str, MaxLen(100)], Hex] | None = None
+    dark: Annotated[float, Interval(ge=0)] | Hex | None = None
 
     @property
     def rounds(self) -> int:
@@ -104,7 +109,9 @@ def _folder_of(round_: int) -> str:
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Write ``manifest.json``, whole or not at all."""
-    text = json.dumps(asdict(manifest), indent=1, allow_nan=False)
+    content = asdict(manifest)
+    del content["phase"]["turns"]
+    text = json.dumps(content, indent=1, allow_nan=False)
     write_atomically(folder / FILE, f"{text}\n".encode())
 
 
@@ -124,7 +131,13 @@ def read_manifest(folder: Path) -> Manifest:
     except FieldError as error:
         raise UserError(f"{path}: {error}") from None
     _check_names(path, manifest.patterns)
-    return manifest
+    if manifest.phase.correction:
+        inside(folder, manifest.phase.correction.file)
+    try:
+        phase = on_panel(manifest.phase, manifest.panel, len(manifest.wavelengths), folder)
+    except CellError as error:
+        raise UserError(f"{path}: phase: {error}") from error
+    return replace(manifest, phase=phase)
 
 
 def _json(path: Path) -> Any:

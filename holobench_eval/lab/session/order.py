@@ -23,15 +23,18 @@ class Showing:
     exposure: float = 1.0
 
 
-def ordered(requests: Sequence[Request], repeated: Request, seed: str, exposures: Sequence[float]) -> Iterator[Showing]:
+def ordered(
+    requests: Sequence[Request], repeated: Request, seed: str, exposures: Sequence[float], dark: bool
+) -> Iterator[Showing]:
     """The showings of a round.
 
-    Dark frames first and last, at the shortest and at the longest of the round's relative ``exposures``, since stray
-    light and dark current grow with the time and an offset does not; then the fiducial holograms; then everything else
-    in a random order that ``seed`` names, since a slow drift must not favour the methods that are shown first; and one
-    hologram of the fiducial grid, ``repeated``, at the beginning, every so often, and at the end.
+    Dark frames, where ``dark``, first and last, at the shortest and at the longest of the round's relative
+    ``exposures``, since stray light and dark current grow with the time and an offset does not; then the fiducial
+    holograms; then everything else in a random order that ``seed`` names, since a slow drift must not favour the
+    methods that are shown first; and one hologram of the fiducial grid, ``repeated``, at the beginning, every so often,
+    and at the end.
     """
-    copies, spread = iter(range(1_000_000)), sorted({min(exposures), max(exposures)})
+    copies, spread = iter(range(1_000_000)), sorted({min(exposures), max(exposures)}) if dark else []
     yield from (Showing(DARK, None, 0, exposure) for exposure in spread)
     yield Showing(REPEAT, repeated, next(copies))
     yield from (Showing(FIDUCIAL, request) for request in requests if request.role == FIDUCIAL)

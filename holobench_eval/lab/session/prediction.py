@@ -10,10 +10,11 @@ import torch
 from numpy.typing import NDArray
 
 from ...core.errors import UserError
-from ...core.io import decode_levels
+from ...core.pictures import open_picture
 from ...optics.phase import blaze
 from ..real import RealBench
 from .folder import FolderPhotographer
+from .frames import MOST_PIXELS
 from .manifest import Pattern, inside
 
 
@@ -25,7 +26,8 @@ def predicted(
     UserError for a pattern that is not as it was exported.
     """
     levels = _levels(photographer.folder, pattern)
-    phase = sign * photographer.manifest.phase.phase(levels) - blaze(bench.spec.shape, bench.carrier)
+    shown = photographer.manifest.phase.of(pattern.colour).phase(levels).float()
+    phase = sign * shown - blaze(bench.spec.shape, bench.carrier)
     field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
     return np.asarray(bench.spec.region.crop(field.abs().square()).numpy())
 
@@ -35,4 +37,4 @@ def _levels(folder: Path, pattern: Pattern) -> NDArray[np.uint8]:
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != pattern.sha256:
         raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
-    return np.asarray(decode_levels(content), dtype=np.uint8)
+    return np.asarray(open_picture(content, MOST_PIXELS).values(), dtype=np.uint8)

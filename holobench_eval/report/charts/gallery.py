@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.io import decode_levels
+from ...core.errors import PictureError
+from ...core.pictures import open_picture
 
 Picture = NDArray[np.float64]
 
@@ -49,13 +50,14 @@ class Column:
 
 def load_picture(path: Path) -> Picture | None:
     """A thumbnail as ``(h, w, 3)`` sRGB values in [0, 1]; None when the file is not there or damaged."""
-    levels = decode_levels(path.read_bytes()) if path.is_file() else None
-    if levels is None:
+    try:
+        levels = open_picture(path.read_bytes()).values()
+    except (OSError, PictureError):
         return None
     picture = levels.astype(np.float64) / 255
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
-    return picture[..., :3]
+    return picture
 
 
 def most_detailed(target: Picture, fraction: int = CROP_FRACTION) -> Crop:

@@ -26,7 +26,8 @@ from ...core.errors import UserError
 from ...datasets.charts import Charts
 from ...display import load_profile
 from ...display.calibrated import CalibratedBench
-from ...display.simulated.pipeline import SimulatedBench
+from ...display.resolution import refuse_far
+from ...display.simulated.pipeline import ChannelMaps, SimulatedBench
 from ...display.simulated.stages import PixelAperture
 from ...methods.wirtinger import Wirtinger
 from ...metrics import match, score
@@ -35,10 +36,9 @@ from ...optics.convolution import iris
 from ...study.opening import open_bench
 from .style import METADATA
 
-VERSION = 3  # of the drawing: sheets of another are drawn again
+VERSION = 4  # of the drawing: sheets of another are drawn again
 DPI = 75  # of a PNG: 1275 x 975 pixels, the width of a page of pictures
 COLOURS = ("tab:red", "tab:green", "tab:blue")
-GREEN = 1
 MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.045, "top": 0.92, "wspace": 0.66, "hspace": 0.38}
 RAMP = 0.11  # cycles a pixel of the test ramp of a bench without a blaze
 # A PNG of so many colours of each kind, and of a cube for captures, is small enough to look at in a browser.
@@ -56,6 +56,7 @@ def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | N
     path = output or Path(f"stages-{profile.name}.png")
     if path.suffix not in (".png", ".pdf", ".svg"):
         raise UserError(f"--output {path}: a picture is written as .png, .pdf or .svg")
+    refuse_far(profile.spec(shape), profile.panel.distance)
     return save_sheet(open_bench(profile, shape), profile.scaling_note(shape), path)
 
 
@@ -115,6 +116,20 @@ def _of_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
     return picture
 
 
+def _index(bench: SimulatedBench) -> int:
+    """Of the colour that stands for all in pictures of one: green of three."""
+    return len(bench.channels) // 2
+
+
+def _middle(bench: SimulatedBench) -> ChannelMaps:
+    return bench.channels[_index(bench)]
+
+
+def _named(bench: SimulatedBench) -> str:
+    """Which of several colours a picture is of, for its title."""
+    return ", green" if len(bench.channels) > 1 else ""
+
+
 def _picture(
     axis: Axes,
     image: Tensor,
@@ -134,14 +149,13 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     """Look-up table, its gain map, crosstalk, wrap edge, pixel aperture and flicker."""
     profile = bench.profile
     levels = torch.arange(2**profile.panel.bits)
-    for channel, colour in enumerate(COLOURS):
-        axes[0].plot(
-            levels, profile.lut.curve(profile.panel.bits, channel) / torch.pi, color=colour, label="RGB"[channel]
-        )
+    for channel, (colour, wavelength) in enumerate(zip(COLOURS, bench.spec.wavelengths, strict=False)):
+        curve = profile.lut.curve(profile.panel.bits, channel) / torch.pi
+        axes[0].plot(levels, curve, color=colour, label=f"{1e9 * wavelength:.0f} nm")
     axes[0].plot(levels, 2 * levels / 2**profile.panel.bits, "k:", label="nominal")
     axes[0].set(title="look-up table", xlabel="gray level", ylabel="phase [pi rad]")
     axes[0].legend(fontsize=8)
-    _picture(axes[1], bench.channels[GREEN].light.lut_gain, "phase gain over the panel, green", "relative gain")
+    _picture(axes[1], _middle(bench).light.lut_gain, f"phase gain over the panel{_named(bench)}", "relative gain")
     offsets, share = profile.crosstalk.kernel()
     axes[2].plot(offsets, share)
     axes[2].set(
@@ -152,7 +166,7 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     active = aperture.active_share(bench.samples).reshape(bench.samples, bench.samples)
     sub = ("sub-sample column", "sub-sample row")
     _picture(axes[4], active, "active share of the sub-samples of a pixel", "share of area", "gray", axes=sub)
-    draw = bench.channels[GREEN].geometry.generator("sheet")
+    draw = _middle(bench).geometry.generator("sheet")
     axes[5].plot([profile.flicker.gain(draw) for _ in range(100)])
     axes[5].set(title=f"flicker, {100 * profile.flicker.rms:g} % rms", xlabel="frame", ylabel="relative phase gain")
 
@@ -166,7 +180,7 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
     line = 2 * torch.pi * turns.float()
     ramp = (line[:, None] if along == 0 else line[None]).expand(shape)
     level = torch.remainder(torch.round(ramp / (2 * torch.pi) * 2**bench.spec.bits), 2**bench.spec.bits)
-    phase = bench.profile.lut.phase(level, bench.spec.bits, bench.channels[GREEN].light.lut_gain, GREEN)
+    phase = bench.profile.lut.phase(level, bench.spec.bits, _middle(bench).light.lut_gain, _index(bench))
     fine = bench.profile.crosstalk.apply(phase, bench.crosstalk).view(bench.samples, bench.samples, *shape)
     middle = bench.samples // 2
     seen = fine[:, middle, :, shape[1] // 2] if along == 0 else fine[middle, :, shape[0] // 2]
@@ -180,12 +194,12 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
 
 def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     """Spectrum, illumination, dirt, pupil with aberration, stray light, sensor response."""
-    profile, maps = bench.profile, bench.channels[GREEN]
+    profile, maps = bench.profile, _middle(bench)
     _spectrum(axes[0], bench)
     axes = axes[1:]
     light = profile.illumination.panel(maps.geometry)
-    _picture(axes[0], light.abs(), "illumination amplitude, green", "relative amplitude")
-    _picture(axes[1], light.angle(), "illumination phase, green", "phase [rad]", "twilight")
+    _picture(axes[0], light.abs(), f"illumination amplitude{_named(bench)}", "relative amplitude")
+    _picture(axes[1], light.angle(), f"illumination phase{_named(bench)}", "phase [rad]", "twilight")
     _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
     plane = profile.coherent_noise.plane(maps.geometry)
     clean = torch.ones(bench.spec.shape)
@@ -197,7 +211,7 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     _picture(
         axes[4],
         torch.where(inside, wave, torch.nan),
-        "aberration in the iris, green",
+        f"aberration in the iris{_named(bench)}",
         "waves",
         extent=(-0.5, 0.5, 0.5, -0.5),
         axes=AT_IRIS,
@@ -219,7 +233,7 @@ def _veil(axis: Axes, bench: SimulatedBench) -> None:
     stage, (height, width) = bench.profile.stray_light, bench.spec.shape
     half = torch.zeros(height, width)
     half[:, width // 2 :] = 1
-    row = stage.image(half, bench.profile, bench.channels[GREEN].geometry)[height // 2]
+    row = stage.image(half, bench.profile, _middle(bench).geometry)[height // 2]
     axis.plot(torch.arange(width), half[height // 2], "k:", label="without")
     axis.plot(torch.arange(width), row, label="with")
     axis.set(title=f"stray light, {100 * stage.share:g} %", xlabel="column [px]", ylabel="relative intensity")
@@ -229,30 +243,30 @@ def _veil(axis: Axes, bench: SimulatedBench) -> None:
 def _chart(axes: list[Axes], workbench: CalibratedBench) -> None:
     """A flat phase, a chart's light in the plane of the iris, sensor noise, and its capture beside its target."""
     spec, bench = workbench.spec, workbench.bench
-    flat = torch.zeros(3, *spec.shape)
+    flat = torch.zeros(len(spec.wavelengths), *spec.shape)
     with torch.no_grad():
-        _picture(
-            axes[0], bench.image(flat)[GREEN], "image plane under a flat phase, green", "intensity / incident", "magma"
-        )
+        light = bench.image(flat)[_index(bench)]
+    _picture(axes[0], light, f"image plane under a flat phase{_named(bench)}", "intensity / incident", "magma")
     levels = torch.linspace(0, 1, 60)
-    sensor, draw = bench.profile.sensor, bench.channels[GREEN].geometry.generator("sheet noise")
+    sensor, draw = bench.profile.sensor, _middle(bench).geometry.generator("sheet noise")
     patch = torch.ones(40, 40)
     normal = torch.randn(patch.shape, generator=draw)
     noise = [float(sensor.expose(patch * level, sensor.full_well, patch, normal).std()) for level in levels]
     axes[2].plot(levels * sensor.full_well, noise)
     axes[2].set(title="sensor noise", xlabel="signal [electrons]", ylabel="standard deviation [DN]")
     chart = Charts(names=("tv_lines",))
-    target = chart.load("tv_lines", spec.region.shape)
+    target = chart.load("tv_lines", spec.region.shape, len(spec.wavelengths))
     method = Wirtinger(iterations=STEPS)
     phase = method.solve(target[None], workbench.for_method(method, "wirtinger", target, "chart", 0))[0]
-    _zero_order(axes[1], bench, phase[GREEN])
+    _zero_order(axes[1], bench, phase[_index(bench)])
     shot = workbench.photograph(phase, target, "chart", 0)
     psnr = score(shot.image, target, metrics=("psnr",))["psnr_linear"]
     for axis, image, title in (
         (axes[3], target, "chart: target"),
         (axes[4], match(shot.image, target)[0], f"chart: capture, {STEPS} steps of Wirtinger, {psnr:.1f} dB"),
     ):
-        axis.imshow(srgb_encode(torch.as_tensor(image)).permute(1, 2, 0).float().numpy(), interpolation="nearest")
+        picture = srgb_encode(torch.as_tensor(image)).permute(1, 2, 0).float().numpy()
+        axis.imshow(picture, cmap="gray", interpolation="nearest")
         axis.set(title=title, xlabel="column [px]", ylabel="row [px]")
 
 
@@ -263,7 +277,7 @@ def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
     """
     profile, pitch = bench.profile, bench.spec.pitch
     with torch.no_grad():
-        field = bench.channels[GREEN].light.in_torch(phase, 1.0).mean((0, 1))
+        field = _middle(bench).light.in_torch(phase, 1.0).mean((0, 1))
     power = torch.fft.fftshift(torch.fft.fft2(field)).abs() ** 2
     decibels = 10 * torch.log10((power / power.max()).clamp(min=1e-5))
     _picture(axis, decibels, "", "power / its peak [dB]", "gray", (-0.5, 0.5, 0.5, -0.5), AT_IRIS)

@@ -30,6 +30,7 @@ _KEYS = {
     "scale_2": ("Factor of the intensity match, blue", ""),
     "second_aligner_px": ("Most that a corner of the target lies elsewhere in the capture by a second aligner", "px"),
     "share_scored": ("Share of the target that is scored, which all its captures show", ""),
+    "darkest": ("How much brighter the capture's darkest part is than the target's, in parts of its white", ""),
     "share_seen": ("Share of the target that its capture shows", ""),
     "speckle_contrast": ("Standard deviation over mean of intensity in flat patches of the target", ""),
     "unexplained_by_target": ("Squared error of the capture that the target leaves, white being 1", _WHITE),

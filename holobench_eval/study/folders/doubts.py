@@ -12,6 +12,9 @@ from ..store import Record
 from .files import Folders, named
 
 NEARLY_ITSELF = 40.0  # dB: the noise of a good camera alone leaves less
+# Of white; constant light of so much leaves 26 dB. Real captures (Stanford 2021) have 2 to 5 %, simulated displays but
+# the hazy leto-2020 less than 2 %, and a black level of 6 % of full scale gives 3 to 17 %.
+LIFTED = 0.05
 ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of it has a high PSNR
 
 
@@ -25,6 +28,13 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     if near := [_name(record) for record in captures if record.values()[psnr] > least[record.target]]:
         yield f"Nearly the target itself, which a photograph with sensor noise is not: {named(near)}."
     yield from _mirrored(captures, folders)
+    lifted = {_name(record): record.values().get("darkest", 0.0) for record in captures}
+    if bright := [f"{name} {value:.0%}" for name, value in lifted.items() if value > LIFTED]:
+        yield (
+            f"Bright where the target is darkest, by more than {LIFTED:.0%} of its white: {named(bright)}. Haze and "
+            "stray light of the display do that; so does a camera's black level, which can turn the order of methods. "
+            "If the files still have one, take it off with --dark FILE|LEVEL."
+        )
     if clipped := [record for record in captures if (record.saturated or 0) > MOST_SATURATED]:
         shares = named([f"{_name(record)} {record.saturated:.2%}" for record in clipped])
         yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at full scale: {shares}."

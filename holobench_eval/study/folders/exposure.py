@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from torch import Tensor
 
 from ...imaging.similarity import Mask
 from ...imaging.warp import Frame, Warp
@@ -99,3 +100,18 @@ def _between_ends(plane: Frame, mask: Mask) -> tuple[int, float]:
     values = plane[mask] if mask.any() else plane
     low, high = np.percentile(values, ENDS)
     return len(np.unique(values[(values >= low) & (values <= high)])), float(high)
+
+
+def darkest(image: Tensor, reference: Tensor) -> float:
+    """How much brighter a capture ``(C, h, w)`` is where it is darkest than the target is, in parts of its white.
+
+    By the 1st percentiles, a capture brought to the mean of its target; of the channels that have much of the target's
+    light the largest. A constant in all counts lifts it, and so do haze and stray light.
+    """
+    means = reference.mean((-2, -1))
+    lifted = [
+        float(np.percentile(own, ENDS[0]) * mean / own.mean() - np.percentile(its, ENDS[0]))
+        for own, its, mean in zip(image.numpy(), reference.numpy(), means.tolist(), strict=True)
+        if mean >= MUCH * float(means.max()) and own.mean() > 0
+    ]
+    return max(lifted, default=0.0)

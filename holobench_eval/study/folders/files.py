@@ -8,11 +8,13 @@ from functools import cached_property
 from pathlib import Path
 
 from ...core.errors import UserError, listed, suggest
+from ...lab.counts import NUMBERS, RAW_SUFFIXES
+from ...lab.dark import Dark
 from .exposure import NAMES
 from .pairing import Pairing, lit, paired
-from .pictures import RAW_SUFFIXES, SUFFIXES, Picture, checked
+from .pictures import SUFFIXES, Picture, checked
 
-CAPTURE_SUFFIXES = (*SUFFIXES, *RAW_SUFFIXES)
+CAPTURE_SUFFIXES = (*SUFFIXES, NUMBERS, *RAW_SUFFIXES)
 NAMED = 3
 
 Key = tuple[str, str]  # method and name of the target
@@ -37,11 +39,12 @@ class Folders:
         return tuple(sorted({method for method, _ in self.captures}))
 
 
-def read_folders(captures: Path, targets: Path) -> Folders:
+def read_folders(captures: Path, targets: Path, linear: bool = False, dark: Dark | None = None) -> Folders:
     """Look at ``captures/<method>/<target>.png`` and ``targets/<target>.png``.
 
-    UserError, one line, for folders that are missing or empty, files that are no pictures of the right kind, links that
-    lead out of the folder, a capture without a target of its name.
+    linear: captures are linear in light; dark: their counts without light. UserError, one line, for folders that are
+    missing or empty, files that are no pictures of the right kind, dark counts that do not fit, links that lead out of
+    the folder, a capture without a target of its name.
     """
     target_paths = {path.stem: path for path in _pictures(targets, targets, "a target of each scene, <target>.png")}
     capture_paths = {
@@ -55,10 +58,12 @@ def read_folders(captures: Path, targets: Path) -> Folders:
             right = twice or f"{suggest(name, target_paths)}; rename it or take it away"
             raise UserError(f"{path}: no target of this name in {targets}; {right}")
     pictures = {name: checked(path) for name, path in target_paths.items()}
+    photographs = {key: checked(path, linear, dark) for key, path in capture_paths.items()}
+    if encoded := next((picture for picture in pictures.values() if picture.is_linear), None):
+        raise UserError(f"{encoded.path}: floating point; expected a target in sRGB, of 8 or 16 bits")
     for picture in pictures.values():
         if not lit(picture):
             raise UserError(f"{picture.path}: black; expected a target with light in at least one of its colours")
-    photographs = {key: checked(path) for key, path in capture_paths.items()}
     pairings = {key: paired(picture, pictures[key[1]]) for key, picture in photographs.items()}
     return Folders(pictures, photographs, pairings, tuple(_notes(pictures, photographs, pairings)))
 

@@ -9,20 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import UserError, reason
-from ...core.io import decode_levels
+from ...core.errors import UserError
 from ...datasets.images import RIGHT as RIGHT_FOR_DATASETS
-from ...datasets.images import opened, read, refuse_other_colours, refuse_short_png
+from ...datasets.images import read
 from ...imaging.similarity import reduced
-from ...lab.raw import read_raw
+from ...lab.counts import RIGHT, Counts, read_counts
+from ...lab.dark import Dark
+from ...lab.session.checks import DEPTHS
 from .exposure import Levels, levels
 
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".webp", ".jpg", ".jpeg")
-# Of cameras with a Bayer mosaic.
-RAW_SUFFIXES = (".arw", ".cr2", ".cr3", ".dng", ".nef", ".orf", ".pef", ".rw2", ".srw")
-FORMATS = ("PNG", "TIFF", "BMP", "WEBP", "JPEG")
-MODES = ("1", "L", "P", "RGB", "LA", "RGBA")  # that are decoded without loss, if an alpha channel is opaque
-RIGHT = "expected an 8-bit or 16-bit PNG or TIFF, gray or RGB, or a BMP, WebP or JPEG"
 SMALLEST = 32  # pixels a side
 WIDEST = 16_384  # pixels a side
 NEARLY_GRAY = 3 / 255  # by which the channels of a gray picture differ that was stored in colour, as in a JPEG
@@ -39,8 +35,10 @@ class Picture:
 
     shape: ``(C, h, w)``, C = 1 or 3; sha256: of the file; pixels_sha256: of its values. gray: whether all channels are
     equal; nearly_gray: whether they are so within `NEARLY_GRAY`, but not equal; opaque: whether an alpha channel was
-    left out that is opaque everywhere; is_lossy: whether it was compressed with loss. structure: standard deviation of
-    each channel's values, noise averaged away; levels: of each channel, whatever their brightness.
+    left out that is opaque everywhere; is_lossy: whether it was compressed with loss; is_linear: whether its values
+    are linear in light by their kind, a RAW file's or floating point. structure: standard deviation of each channel's
+    values, noise averaged away; levels: of each channel, whatever their brightness; full: the value from which a sample
+    is clipped; dark: counts without light.
     """
 
     path: Path
@@ -51,35 +49,55 @@ class Picture:
     nearly_gray: bool
     opaque: bool
     is_lossy: bool
+    is_linear: bool
     structure: tuple[float, ...]
     levels: tuple[Levels, ...]
-
-    @property
-    def is_raw(self) -> bool:
-        """Whether it is a camera's RAW file, whose values are linear in light."""
-        return self.path.suffix.lower() in RAW_SUFFIXES
+    full: float
+    dark: Dark | None
 
     def load(self) -> Values:
-        """Its values ``(C, h, w)`` as stored, over the full scale of 8 or 16 bits. UserError if it was changed.
+        """Its values ``(C, h, w)`` as stored, over full scale. UserError if it was changed.
 
-        Of a RAW file: counts above black, over those of white.
+        Of a RAW file: counts above its black, over those of white; of floating point: over the highest value.
         """
+        return _values(self._counts())
+
+    def light(self) -> Values:
+        """As ``load``, with the dark counts taken off where there are some: noise may make it negative."""
+        counts = self._counts()
+        return _values(counts) if self.dark is None else _light(counts, self.dark)
+
+    def _counts(self) -> Counts:
         content = read(self.path)
         if hashlib.sha256(content).hexdigest() != self.sha256:
             raise UserError(f"{self.path}: changed while it was being scored; start again")
-        return _decoded(content, self.path)[0]
+        return read_counts(content, self.path, linear=True)
 
 
-def checked(path: Path) -> Picture:
-    """A picture file, read and looked at. UserError for one that is damaged, of another kind, or of another size."""
+def checked(path: Path, linear: bool = False, dark: Dark | None = None) -> Picture:
+    """A picture file, read and looked at. UserError for one that is damaged, of another kind, or of another size.
+
+    linear: it may say that its values are proportional to light, and not only that they are sRGB; dark: counts without
+    light, of its size, above which it has to have some.
+    """
     try:
         content = read(path)
-        values, alpha = _decoded(content, path)
     except UserError as error:
         raise UserError(str(error).replace(RIGHT_FOR_DATASETS, RIGHT)) from error
+    counts = read_counts(content, path, linear)
+    if counts.white <= 0:
+        raise UserError(f"{path}: no value is above 0; expected a capture with the light on")
+    values = _values(counts)
     channels, height, width = values.shape
     if min(height, width) < SMALLEST or max(height, width) > WIDEST:
         raise UserError(f"{path}: {width} x {height} pixels; expected sides from {SMALLEST} to {WIDEST} pixels")
+    if dark is not None:
+        try:
+            mean = float(_light(counts, dark).mean())
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from error
+        if mean <= 0:
+            raise UserError(f"{path}: no brighter than the dark counts; expected a capture with the light on")
     gray = all(np.array_equal(plane, values[0]) for plane in values[1:])
     return Picture(
         path,
@@ -88,45 +106,33 @@ def checked(path: Path) -> Picture:
         hashlib.sha256(repr(values.shape).encode() + values.tobytes()).hexdigest(),
         gray=gray,
         nearly_gray=not gray and float((np.ptp(values, axis=0) > NEARLY_GRAY + ROUNDING).mean()) <= EXCEPT,
-        opaque=alpha,
-        is_lossy=path.suffix.lower() in (".jpg", ".jpeg") or (content[8:12] == b"WEBP" and b"VP8L" not in content[:64]),
+        opaque=counts.is_opaque,
+        is_lossy=counts.is_lossy,
+        is_linear=counts.is_linear,
         structure=tuple(float(np.std(reduced(plane, FACTS_SIDE)[0])) for plane in values),
         levels=tuple(levels(plane) for plane in values),
+        full=_full(counts),
+        dark=dark,
     )
 
 
-def _decoded(content: bytes, path: Path) -> tuple[Values, bool]:
-    """``(C, h, w)`` values over full scale, and whether an opaque alpha channel was left out.
+def _light(counts: Counts, dark: Dark) -> Values:
+    return np.asarray(dark.off(counts.values) / (np.float32(counts.white) - counts.black), dtype=np.float32)
 
-    UserError for a file that is damaged or of another kind.
+
+def _full(counts: Counts) -> float:
+    """The value from which a sample is clipped: full scale, or the last level of fewer bits, if the highest is that.
+
+    Counts of 12 bits end at 4095 where they lie at the lower end of 16, and at 65520 at the upper one.
     """
-    if path.suffix.lower() in RAW_SUFFIXES:
-        raw = read_raw(content, str(path))
-        black = np.array(raw.black, dtype=np.float32)
-        if black.max() >= raw.white:
-            raise UserError(f"{path}: black at {black.max():g} counts and white at {raw.white:g}; expected black below")
-        values = (raw.counts - black) / (np.float32(raw.white) - black)
-        return np.ascontiguousarray(values.transpose(2, 0, 1), dtype=np.float32), False
-    image = opened(content, str(path))
-    if image.format not in FORMATS:
-        raise UserError(f"{path}: a {image.format} file under another name; {RIGHT}")
-    if "transparency" in image.info:
-        raise UserError(f"{path}: an image with a transparent colour; {RIGHT}")
-    if image.mode not in MODES and not image.mode.startswith("I;16"):
-        raise UserError(f"{path}: an image of mode {image.mode}; {RIGHT}")
-    refuse_other_colours(image, str(path))
-    if image.format == "PNG":
-        refuse_short_png(image, content, str(path))
-    try:
-        image.load()  # which reports truncated files that OpenCV would pad
-    except Exception as error:  # whatever a decoder trips over in a damaged file
-        raise UserError(f"{path}: truncated or damaged: {reason(error)}; {RIGHT}") from error
-    pixels = decode_levels(content)
-    if pixels is None:
-        raise UserError(f"{path}: an image that cannot be decoded; {RIGHT}")
-    full = 255 if pixels.dtype == np.uint8 else 65535
-    alpha = pixels.ndim == 3 and pixels.shape[2] == 4
-    if alpha and pixels[..., 3].min() < full:
-        raise UserError(f"{path}: an image with alpha that is not opaque everywhere; {RIGHT}")
-    planes = pixels[None] if pixels.ndim == 2 else pixels[..., :3].transpose(2, 0, 1)
-    return np.ascontiguousarray(planes, dtype=np.float32) / np.float32(full), alpha
+    highest = int(counts.values.max())
+    if counts.values.dtype != np.uint16 or counts.is_raw or not highest:
+        return 1.0
+    joined = int(np.bitwise_or.reduce(counts.values, axis=None))
+    return highest / counts.white if highest + (joined & -joined) in {2**bits for bits in DEPTHS} else 1.0
+
+
+def _values(counts: Counts) -> Values:
+    """Counts above the black that the file states, over those of full scale."""
+    values = (counts.values - counts.black) / (np.float32(counts.white) - counts.black)
+    return np.ascontiguousarray(values, dtype=np.float32)

@@ -23,6 +23,7 @@ from ...imaging.cross_check import disagreement, second_warp
 from ...imaging.shared_pose import sampled, shared
 from ...imaging.similarity import reduced, similarity
 from ...imaging.warp import Warp
+from ...lab.photograph import MOST_SATURATED
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
@@ -32,7 +33,7 @@ from ..scoring.pictures import write_thumbnail
 from ..store import Record, Scores, Store
 from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
-from .exposure import burnt
+from .exposure import burnt, darkest
 from .files import Folders, Key
 from .pairing import too_few_levels
 from .pictures import Values
@@ -48,12 +49,18 @@ Step = Callable[[str], None]  # called with the name of each step
 Draw = Callable[[Path, Values, Warp, Values, Values], None]  # file, capture, warp, matched capture, target
 
 
-def described(folders: Folders, values: str) -> dict[str, Any]:
+def described(folders: Folders, values: str, dark: str = "") -> dict[str, Any]:
     """Everything about the present scoring of pictures for their ``provenance.json``."""
     files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
     files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
     code = {"metrics": HARNESS, "alignment": ALIGNMENT}
-    return {"code_sha256": code, "files": files, "values": values, **provenance.software()}
+    return {
+        "code_sha256": code,
+        "files": files,
+        "values": values,
+        **({"dark": dark} if dark else {}),
+        **provenance.software(),
+    }
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,8 @@ class Scoring:
 
     store: of records, alignments and pictures; values: how files are read, ``stored`` (as they are), ``srgb``, or
     ``linear`` (captures as linear light); draw: draws an alignment from display-encoded values; visible: score the part
-    of a target that all its captures show, if that is half of it; aligned: captures lie on their targets already.
+    of a target that all its captures show, if that is half of it; aligned: captures lie on their targets already; dark:
+    what tells the dark counts that are taken off captures from others, empty for none.
     """
 
     folders: Folders
@@ -72,6 +80,7 @@ class Scoring:
     draw: Draw
     visible: bool = False
     aligned: bool = False
+    dark: str = ""
 
     @property
     def domain(self) -> str:
@@ -122,7 +131,7 @@ class Scoring:
                 own[key] = pairing.refused or self.given(key)
                 continue
             files = [picture.sha256, self.folders.targets[key[1]].sha256]
-            chosen = [*filter(None, [pairing.channel, "visible" if self.visible else ""])]
+            chosen = [*filter(None, [pairing.channel, "visible" if self.visible else "", self.dark])]
             key_digest = digest([*files, self.values == "linear", ALIGNMENT, *chosen])
             path = self.store.folder / f"alignment-{key_digest}.json"
             found = _read(path)
@@ -131,7 +140,7 @@ class Scoring:
                 try:
                     found = align(self.viewable(capture), target, self.visible)
                 except CellError as error:
-                    found = f"{error}{burnt(capture)}"
+                    found = f"{error}{burnt(self.folders.captures[key].load())}"
                 plain = {"refused": found} if isinstance(found, str) else found.to_dict()
                 write_atomically(path, f"{json.dumps(plain, sort_keys=True, allow_nan=False)}\n".encode())
             own[key] = found
@@ -148,10 +157,14 @@ class Scoring:
         return Alignment(warp, similarity(frame, reference, warp).overall)
 
     def loaded(self, key: Key) -> tuple[Values, Values]:
-        """A capture and its target, in the channels that are compared."""
-        capture, target = self.folders.captures[key].load(), self.folders.targets[key[1]].load()
+        """A capture, its dark counts taken off, and its target, in the channels that are compared."""
+        capture, target = self.folders.captures[key].light(), self.folders.targets[key[1]].load()
+        return self.compared(key, capture), self.compared(key, target, is_target=True)
+
+    def compared(self, key: Key, values: Values, is_target: bool = False) -> Values:
+        """The channels of a capture or target that are compared."""
         index = self.folders.pairings[key].index
-        return (capture, target) if index is None else (capture[index : index + 1], target[:1])
+        return values if index is None else values[:1] if is_target else values[index : index + 1]
 
     def floor_channels(self, name: str) -> int:
         """How many channels of a target its floor has: one where a capture of it is scored on one."""
@@ -163,7 +176,7 @@ class Scoring:
         if self.values != "linear":
             return values
         bright = max(float(np.percentile(values, 99.5)), 1e-6)
-        return srgb_encode(torch.from_numpy(values) / bright).numpy()
+        return srgb_encode(torch.from_numpy(values).clamp_min(0) / bright).numpy()
 
     def common(self, own: Alignments) -> Alignments:
         """The shared alignments, by frame size and target shape, of captures that agree with one or that it fits."""
@@ -220,18 +233,26 @@ class Scoring:
         figure = self.store.output / "figures" / alignment_name(*key)
         kept = self.store.read(digest(cell))
         drawn = kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file()
-        if kept is not None and drawn and not identity.lacking(kept.scores, self.metrics):
-            return kept
+        is_full = kept is not None and not identity.lacking(kept.scores, self.metrics)
+        if kept is not None and drawn and is_full and (self.values != "linear" or "darkest" in kept.values()):
+            return kept  # and not of a version that did not look at the darkest part
         capture, target = self.loaded(key)
         warp = alignment.warp if part is None else cropped(alignment.warp, part)
         target = part_of(target, part)
-        if too_few := too_few_levels(self.folders.captures[key], self.folders.targets[name], capture, target, warp):
+        picture = self.folders.captures[key]
+        raw = self.compared(key, picture.load())
+        if too_few := too_few_levels(picture, self.folders.targets[name], raw, target, warp):
             return self.failed(cell, too_few)
+        saturated = float((sampled((raw >= picture.full).astype(np.float32), warp) > 0.5).mean())
+        if self.values == "linear" and saturated > MOST_SATURATED:
+            clipped = f"{saturated:.2%} of the scored samples are clipped, more than {MOST_SATURATED:.1%}"
+            return self.failed(cell, f"the capture is over-exposed: {clipped}")
+        del raw
         frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
         figures = self.second(frame, compared, warp)
         # In the precision that scores are computed in, so that there is no second copy of a large picture.
         image, reference = torch.from_numpy(sampled(frame, warp)).double(), compared.double()
-        saturated = float((sampled((capture >= 1).astype(np.float32), warp) > 0.5).mean())
+        figures |= {} if self.values != "linear" else {"darkest": darkest(image, reference)}
         del capture, frame, compared  # of a large picture, read again to be drawn
         scores = self.scores(image, reference, self.metrics)
         capture, _ = self.loaded(key)
@@ -343,6 +364,7 @@ class Scoring:
             **({"channel": channel} if channel else {}),
             **({"part": list(part)} if part else {}),
             **({"visible": True} if self.visible and not is_reference else {}),
+            **({"dark": self.dark} if self.dark and not is_reference else {}),
             "protocol": VERSION,
             "harness": HARNESS,
             "alignment": ALIGNMENT,

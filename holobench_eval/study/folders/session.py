@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,13 +13,14 @@ from ...core.hashing import digest
 from ...core.io import write_atomically
 from ...core.yaml_source import load
 from ...imaging.convention import Convention
-from ...lab.bench_file import load_bench_file
+from ...lab.bench_file import BenchFile, load_bench_file
+from ...lab.dark import given_dark
 from ...lab.live import letter
 from ...lab.real import RealBench
 from ...lab.session import Manifest, Pattern, read_manifest, session_photographer, write_manifest
 from ...lab.session.bench_checks import bench_checks
 from ...lab.session.geometry import look
-from ...lab.session.manifest import refuse_links_out
+from ...lab.session.manifest import DARK_FILE, refuse_links_out
 from .. import isolation
 from ..config import load_study
 from ..definition import Study
@@ -49,12 +51,19 @@ class Advance:
 
 
 def export(
-    config: Path, folder: Path, watch: Lines, bench: Path | None, display: str | None, fixed_exposure: bool
+    config: Path,
+    folder: Path,
+    watch: Lines,
+    bench: Path | None,
+    display: str | None,
+    fixed_exposure: bool,
+    dark: str | float | None = None,
 ) -> Advance:
     """Make a session folder for a study and write its first round of patterns.
 
     bench: file of the real bench; without it ``display``, one of the study's profiles, gives the nominal optics
-    (optional if the study has a single profile), and the panel's levels have the default convention.
+    (optional if the study has a single profile), and the panel's levels have the default convention. dark: the counts
+    without light, a level or a file, in the place of dark frames; by default those of the bench file.
     UserError: the folder is not empty, or the study cannot be shown on one real display.
     """
     if folder.exists() and any(folder.iterdir()):
@@ -66,16 +75,28 @@ def export(
     shown = next(iter(displays(chosen).values()))
     if shown.spec.bits != 8:
         raise UserError(f"'{shown.name}' has {shown.spec.bits} bits; patterns are written with 8")
+    described_bench = load_bench_file(shown.real.bench) if shown.real and shown.real.bench else None
+    if dark is None and described_bench:
+        dark = described_bench.capture.dark
+    if dark is not None:
+        given_dark(dark)  # what is wrong with it is said before the folder is made
+    inside = BENCH if bench else study.display.bench
+    beside = _beside(described_bench, shown.real.bench, inside) if described_bench and shown.real else {}
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / STUDY, chosen.text.encode())
-    inside = BENCH if bench else study.display.bench
     if inside and _stays_inside(inside):
         copy = folder / inside
         if copy.exists():
             raise UserError(f"{inside}: a session has a file of this name of its own; rename the bench file")
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(bench or study.folder / inside, copy)
-    described_bench = shown.real.bench if shown.real else None
+    for place, file in beside.items():
+        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, folder / place)
+    phase = described_bench.phase if described_bench else Convention()
+    if phase.correction is not None:
+        place = (Path(inside or BENCH).parent / phase.correction.file).as_posix()
+        phase = replace(phase, correction=replace(phase.correction, file=place))
     text = digest(chosen.text)
     manifest = Manifest(
         format=1,
@@ -85,14 +106,44 @@ def export(
         display=shown.name,
         panel=shown.spec.shape,
         wavelengths=shown.spec.wavelengths,
-        phase=load_bench_file(described_bench).phase if described_bench else Convention(),
+        phase=phase,
         fixed_exposure=fixed_exposure,
+        dark=_kept_dark(dark, folder),
     )
     write_manifest(folder, manifest)
     forget_sessions()
     opened = replace(chosen, display=replace(chosen.display, session=folder))
     session_photographer(folder).write_checks(letter(_bench(opened)).phase)
     return _advance(opened, folder, watch)
+
+
+def _beside(bench: BenchFile, file: Path | None, copied: str | None) -> dict[Path, Path]:
+    """The files that a bench file names, by their places in a session, where the bench file's copy finds them.
+
+    copied: place of that copy. UserError for a file that does not lie in the bench file's folder.
+    """
+    if file is None:
+        return {}
+    named = {} if bench.phase.correction is None else {"phase.correction.file": Path(bench.phase.correction.file)}
+    if isinstance(bench.capture.dark, str) and copied and _stays_inside(copied):  # else it is read where it is
+        named["capture.dark"] = Path(os.path.relpath(bench.capture.dark, file.resolve().parent))
+    for key, name in named.items():
+        if not (copied and _stays_inside(copied) and _stays_inside(str(name))):
+            raise UserError(f"{file}: {key}: {name} does not travel with a session; put it beside this file")
+    return {Path(copied or "").parent / name: file.parent / name for name in named.values()}
+
+
+def _kept_dark(given: str | float | None, folder: Path) -> str | float | None:
+    """The dark level for the manifest, or the sha256 of its file, of which the session gets a copy."""
+    if given is None:
+        return None
+    dark, told = given_dark(given)
+    if not dark.bias.ndim:
+        return float(told)
+    kept = folder / f"{DARK_FILE}{Path(str(given)).suffix.lower()}"
+    if not kept.exists():  # as the bench file's own
+        shutil.copyfile(str(given), kept)
+    return told
 
 
 def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path | None) -> Advance:
@@ -127,7 +178,7 @@ def go_on(folder: Path, watch: Lines, say: Callable[[str], None], config: Path |
     except Pending:
         raise UserError(f"{folder}: round 1 lacks holograms of the fiducial grid; export a new session") from None
     photographer.accept(read)
-    notes = [study.note, *photographer.notes, *(check.line for check in checks), *findings]
+    notes = [study.note, *photographer.notes, manifest.phase.out_of_reach, *(check.line for check in checks), *findings]
     texts = [note.strip() for note in notes]
     sentences = [f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}" for text in texts if text]
     return _advance(replace(study, note=" ".join(sentences)), folder, watch)

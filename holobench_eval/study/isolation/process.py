@@ -168,7 +168,8 @@ class MethodProcess:
         CellError where it ends by itself, sends what is no answer, or reaches a limit.
         """
         setting = {"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib}
-        late, channel = threading.Event(), None
+        late = threading.Event()
+        channel: Channel | None = None
         failure: Exception | None = None
 
         def stop() -> None:

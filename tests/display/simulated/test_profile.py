@@ -45,7 +45,15 @@ def test_digest_follows_the_file(tmp_path):
         (("bits: 8", "bits: many"), r"mine.yaml:\d+:\d+: panel.bits should be a whole number"),
         (("bits: 8", "bits: 99"), r"mine.yaml:\d+:\d+: panel.bits"),
         (("sensor:", "sensro:"), r"mine.yaml:\d+:1: unknown key 'sensro'.*did you mean 'sensor'"),
-        (("pitch: 6.4e-6", "pitch: -1"), r"mine.yaml:\d+:\d+: panel.pitch"),
+        (("pitch: 6.4e-6", "pitch: -1"), r"mine.yaml:\d+:\d+: panel.pitch: -1 is not in 500e-9 to 200e-6 m$"),
+        (("pitch: 6.4e-6", "pitch: 6.4"), r"panel.pitch: 6.4 is not in .* m; lengths are in metres: 6.4e-6$"),
+        (("distance: 0.1 ", "distance: 100 "), r"panel.distance: 100 is not in .* m; lengths are in metres: 100e-3$"),
+        (
+            ("6.36e-7, 5.17e-7, 4.46e-7", "532"),
+            r"panel.wavelengths\[0\]: 532 is not in .*; lengths are in metres: 532e-9$",
+        ),
+        ((", 4.46e-7]", "]"), r"panel.wavelengths: 2 wavelengths; a display has three, .* or one, for gray pictures$"),
+        ((", 4.46e-7]", ", 4e-7, 3e-7]"), r"panel.wavelengths: 4 wavelengths; a display has three"),
         (("version: 1\n", ""), "missing key 'version'"),
     ],
 )

@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import tifffile
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -23,6 +24,7 @@ from torch import Tensor
 
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.imaging.convention import Convention
 from holobench_eval.methods.double_phase import encode
 from holobench_eval.methods.files import arrays
 from holobench_eval.methods.files.arrays import read_array
@@ -86,7 +88,8 @@ def test_radians_of_single_precision_arrive_to_the_last_bit(tmp_path: Path) -> N
 @given(
     sign=st.sampled_from([1, -1]),
     origin=st.floats(-7, 7),
-    two_pi=st.floats(2, 300),
+    two_pi=st.one_of(st.floats(2, 300), st.tuples(*3 * [st.floats(2, 300)])),
+    correction=st.one_of(st.none(), st.floats(2, 300), st.tuples(*3 * [st.floats(2, 300)])),
     across=st.booleans(),
     down=st.booleans(),
     order=st.sampled_from(["rgb", "bgr"]),
@@ -95,18 +98,43 @@ def test_the_convention_of_a_file_is_undone(
     tmp_path_factory: pytest.TempPathFactory,
     sign: int,
     origin: float,
-    two_pi: float,
+    two_pi: float | tuple[float, ...],
+    correction: float | tuple[float, ...] | None,
     across: bool,
     down: bool,
     order: str,
 ) -> None:
-    levels = sign * (PHASE - origin) / math.tau * two_pi
-    written = levels[:: 1 if order == "rgb" else -1, :: -1 if down else 1, :: -1 if across else 1]
-    file = tmp_path_factory.mktemp("convention") / "levels.npy"
-    np.save(file, written)
-    convention = {"sign": sign, "origin": origin, "two_pi_level": two_pi, "levels": "all", "order": order}
+    folder = tmp_path_factory.mktemp("convention")
+    turns = (sign * (PHASE - origin) / math.tau)[:, :: -1 if down else 1, :: -1 if across else 1]
+    convention: dict[str, Any] = {"sign": sign, "origin": origin, "levels": "all", "order": order}
+    if correction is not None:
+        cv2.imwrite(str(folder / "flat.png"), LEVELS[0])
+        turns = turns + LEVELS[0] / np.reshape(correction, (-1, 1, 1))
+        convention["correction"] = {"file": str(folder / "flat.png"), "two_pi_level": correction}
+    file = folder / "levels.npy"
+    np.save(file, (turns * np.reshape(two_pi, (-1, 1, 1)))[:: 1 if order == "rgb" else -1])
+    convention["two_pi_level"] = two_pi
     found = solved(file, **convention, flip_horizontal=across, flip_vertical=down)
     assert turns_apart(found, PHASE) < 1e-5
+
+
+def test_a_picture_of_what_a_bench_shows_is_the_phase_to_half_a_level(tmp_path: Path) -> None:
+    full = (240.0, 200.5, 128.0)
+    write_rgb(tmp_path / "flat.bmp", LEVELS[::-1])
+    turns = LEVELS[::-1] / np.reshape((210.0, 180.0, 150.0), (3, 1, 1))
+    shared: dict[str, Any] = {"sign": -1, "origin": 0.4, "two_pi_level": full, "flip_vertical": True}
+    write_rgb(tmp_path / "levels.png", Convention(**shared, turns=turns).levels(torch.from_numpy(PHASE)))
+    correction = {"file": str(tmp_path / "flat.bmp"), "two_pi_level": [210, 180, 150]}
+    found = solved(tmp_path / "levels.png", **shared, correction=correction)
+    for channel, level in enumerate(full):
+        assert (
+            turns_apart(found[channel], PHASE[channel]) < 0.75 / level
+        )  # where two pi is between two levels, and half
+
+
+def test_a_correction_map_is_one_of_the_files_of_a_target(tmp_path: Path) -> None:
+    method = plugins.build("methods", "phases", {"file": "a.png", "correction": {"file": "flat.bmp"}})
+    assert method.files("cat.jpg") == ["a.png", "flat.bmp"]
 
 
 def test_a_field_is_encoded_by_the_encoder_that_is_named_whether_in_one_file_or_two(tmp_path: Path) -> None:
@@ -134,6 +162,12 @@ def test_real_numbers_of_any_precision_and_byte_order_are_read(tmp_path: Path, k
     assert turns_apart(solved(tmp_path / "phase.npy", **pair), PHASE) < apart
 
 
+def test_sixteen_bit_levels_in_separate_planes_are_those_of_an_interleaved_picture(tmp_path: Path) -> None:
+    levels = LEVELS.astype(np.uint16) * 256
+    tifffile.imwrite(tmp_path / "planar.tif", levels, photometric="rgb", planarconfig="separate")
+    assert turns_apart(solved(tmp_path / "planar.tif"), PHASE) < 1e-6
+
+
 def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "gray.png"), LEVELS[0])
     assert turns_apart(solved(tmp_path / "gray.png", colours=1), PHASE[:1]) < 1e-6
@@ -141,6 +175,8 @@ def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
 
 def wrong_files(folder: Path) -> None:
     np.save(folder / "small.npy", PHASE[:, 1:])
+    np.save(folder / "byte.npy", LEVELS)
+    np.save(folder / "complex.npy", np.exp(1j * PHASE))
     np.save(folder / "int.npy", LEVELS.astype(np.int64))
     np.save(folder / "float.npy", LEVELS.astype(np.float64))
     np.save(folder / "nan.npy", np.where(PHASE > 3, np.nan, PHASE))
@@ -192,6 +228,19 @@ def wrong_files(folder: Path) -> None:
         ),
         ("float.npy", {"sign": -1, "origin": 1.0}, r"\(radians that are whole: store them modulo 2 pi\)"),
         ("float.npy", {"two_pi_level": 256}, "two_pi_level is set, but float64 holds radians; levels need"),
+        (
+            "float.npy",
+            {"correction": {"file": "FOLDER/byte.npy"}},
+            "correction is set, but float64 holds radians; levels need",
+        ),
+        ("complex.npy", {"two_pi_level": 256}, "two_pi_level is set, but complex128 holds a field, not levels"),
+        ("byte.npy", {"two_pi_level": [256, 250]}, "two_pi_level: 2 levels for 3 colours; expected one for all, or"),
+        ("byte.npy", {"correction": {"file": "gone.bmp"}}, "gone.bmp: no such file"),
+        (
+            "byte.npy",
+            {"correction": {"file": "FOLDER/small.npy"}},
+            "correction of 3 x 11 x 12 levels; .* 12 x 12 pixels",
+        ),
         ("nan.npy", {}, "NaN or infinite"),
         ("objects.npy", {}, "damaged, or no .npy file: Object arrays cannot be loaded"),
         ("text.npy", {}, "holds 1 values of type <U5; expected numbers"),
@@ -223,6 +272,8 @@ def wrong_files(folder: Path) -> None:
 )
 def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, name: str, params: dict[str, Any], message: str) -> None:
     wrong_files(tmp_path)
+    if "correction" in params:
+        params = {"correction": {"file": params["correction"]["file"].replace("FOLDER", str(tmp_path))}}
     with pytest.raises(CellError, match=message) as found:
         solved(tmp_path / name, **params)
     assert "\n" not in str(found.value)
@@ -251,7 +302,12 @@ def test_a_reader_that_crashes_or_does_not_end_is_one_line(
         ({"file": "{name}.npy"}, r"'\{name\}' stands for nothing; \{target\}, \{stem\} and \{channel\} do"),
         ({"file": "phases/{target}.jpg"}, "should end in .png"),
         ({"file": "{target}.npy", "amplitude": "{channel}.npy"}, "in both patterns or in none"),
-        ({"two_pi_level": 0}, "greater than 1"),
+        ({"two_pi_level": 0}, "'two_pi_level': input should be greater than 1"),
+        ({"two_pi_level": [256, 0, 256]}, "'two_pi_level.1': input should be greater than 1"),
+        (
+            {"correction": {"file": "a.png", "two_pi_level": 1}},
+            "'correction.two_pi_level': input should be greater than 1",
+        ),
     ],
 )
 def test_wrong_parameters_are_refused_in_one_line(params: dict[str, Any], message: str) -> None:

@@ -213,7 +213,7 @@ def test_a_colour_profile_other_than_srgb_is_refused_as_in_datasets(tmp_path):
         Image.open(path).save(path, icc_profile=profile)
         if space == "sRGB":
             assert checked(path).shape == (3, 48, 64)
-    with pytest.raises(UserError, match=r"ICC colour profile is 'Lab.*convert it to sRGB: expected an 8-bit or 16-bit"):
+    with pytest.raises(UserError, match=r"ICC colour profile is 'Lab.*convert it to sRGB; expected an 8-bit or 16-bit"):
         checked(path)
 
 
@@ -224,7 +224,7 @@ def test_a_raw_file_is_linear_light_above_black(tmp_path):
     mosaic[::2, ::2] += np.round(light * (16383 - 512)).astype(np.uint16)
     (tmp_path / "x.dng").write_bytes(bayer_dng(mosaic))
     picture = checked(tmp_path / "x.dng")
-    assert picture.is_raw
+    assert picture.is_linear
     assert picture.shape == (3, 32, 48)
     assert np.abs(picture.load()[0] - light).max() < 1e-4
     assert np.abs(picture.load()[1:]).max() < 1e-6

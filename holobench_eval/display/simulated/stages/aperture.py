@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PixelAperture(Stage):
-    """Square active area, ``fill`` of the pixel's area; the rest reflects ``dead_amplitude`` without modulation."""
+    """Square active area; the rest of the pixel reflects without modulation.
+
+    fill: active area [share of the pixel's]; dead_amplitude: that the rest reflects [relative to the active area's].
+    """
 
     title: ClassVar[str] = "pixel aperture"
     model: ClassVar[str] = (
@@ -53,7 +56,10 @@ class PixelAperture(Stage):
 
 @dataclass(frozen=True)
 class ZeroOrder(Stage):
-    """``fraction`` of the incident power is reflected as it came, with ``phase`` [rad]; the iris may stop it later."""
+    """Light that is reflected as it came; the iris may stop it later.
+
+    fraction: of it [share of the incident power]; phase: of it [rad].
+    """
 
     title: ClassVar[str] = "zero order"
     model: ClassVar[str] = "unmodulated light, coherent with the image (paper Fig. 4)"

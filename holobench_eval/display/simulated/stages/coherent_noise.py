@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 class CoherentNoise(Stage):
     """Complex transmission of dirt. Sizes in panel heights.
 
-    specks, scratches: how many at the panel; speck_radius: largest radius; roughness: rms phase [rad] of the
-    panel's surface, correlated over ``roughness_pixels``; plane_specks: specks on a plane ``plane_distance``
-    (fraction of the propagation distance) before the image, where they cast rings.
+    specks, scratches: how many at the panel [count]; speck_radius: largest radius [panel heights]; roughness: rms phase
+    of the panel's surface [rad]; roughness_pixels: over which it is correlated [px]; plane_specks: how many on a plane
+    before the image, where they cast rings [count]; plane_distance: of that plane from the image [share of the
+    distance].
     """
 
     title: ClassVar[str] = "coherent noise"

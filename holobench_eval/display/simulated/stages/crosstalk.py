@@ -26,7 +26,10 @@ def sample_positions(samples: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Crosstalk(Stage):
-    """Convolution of the phase with a Gaussian of standard deviation ``width`` [pixels]."""
+    """Convolution of the phase with a Gaussian.
+
+    width: its standard deviation [px].
+    """
 
     title: ClassVar[str] = "crosstalk"
     model: ClassVar[str] = (

@@ -28,8 +28,9 @@ class Drift(Stage):
 
     Dust settles besides, a speck at a time, at the rate at which the panel's ``CoherentNoise.specks`` came.
 
-    days since calibration; power: relative laser power; tilt [cycles per panel height]; gain: relative phase gain;
-    pose: shift of the image [panel heights].
+    days: since calibration [days]; power: of the laser [relative, rms after a day]; tilt: of the light [cycles/panel
+    height, rms after a day]; gain: of the phase [relative, rms after a day]; pose: shift of the image [panel heights,
+    rms after a day].
     """
 
     title: ClassVar[str] = "drift"

@@ -25,11 +25,11 @@ COARSEST, SPAN = 0.6, 0.8  # frequency of a fringe system in units of it, and ho
 class Illumination(Stage):
     """Gaussian beam, cover-glass fringes, smooth wavefront error and tilt; lengths in panel heights.
 
-    beam_sigma: 1/e half width of the *amplitude* ``exp(-r^2 / (2 sigma^2))``, None for a uniform beam;
-    offset: largest offset of the beam's centre; fringes: amplitude modulation (0.06 is 6 %) of interference
-    fringes, ``fringe_cycles`` a panel height; phase_rms: smooth phase error [rad];
-    tilt: light falls in at this angle [cycles per panel height], a shift of the picture; power: of the laser, relative
-    to what the camera's exposure was set for.
+    beam_sigma: of the *amplitude* ``exp(-r^2 / (2 sigma^2))`` [panel heights], null for a uniform beam;
+    offset: largest offset of the beam's centre [panel heights]; fringes: amplitude modulation of interference fringes
+    [share]; fringe_cycles: how many there are [cycles/panel height]; phase_rms: smooth phase error [rad];
+    tilt: of the light that falls in, a shift of the picture, vertical and horizontal [cycles/panel height]; power: of
+    the laser [relative to what the camera's exposure was set for].
     """
 
     title: ClassVar[str] = "illumination"

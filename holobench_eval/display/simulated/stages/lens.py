@@ -18,8 +18,8 @@ from ..stage import Stage
 class AddedLens(Stage):
     """A quadratic phase that moves the image from the distance z to z (1 + ``move``).
 
-    move: a matrix, since a cylinder moves the foci of vertical and horizontal lines differently. The image is
-    stretched by 1 + move.
+    move: along rows, along columns and cross term, since a cylinder moves the foci of vertical and horizontal lines
+    differently [relative to the distance]. The image is stretched by 1 + move.
     """
 
     title: ClassVar[str] = "added lens"
@@ -48,8 +48,8 @@ class AddedLens(Stage):
 class Eye(Stage):
     """A relaxed eye that sees the plane at z (1 + ``focus``) instead of the image's.
 
-    focus: a matrix; astigmatism gives each meridian a distance of its own. See ``changes.vision``. known: whether
-    methods know the eye, as they know the nominal optics.
+    focus: along rows, along columns and cross term; astigmatism gives each meridian a distance of its own [relative to
+    the distance]. See ``changes.vision``. known: whether methods know the eye, as they know the nominal optics.
     """
 
     title: ClassVar[str] = "eye"

@@ -24,8 +24,9 @@ PerChannel = tuple[float, float, float]
 class LookUpTable(Stage):
     """Phase of a gray level g of L: ``2 pi gain(x, y) (g / L)^gamma``, or a published table.
 
-    gamma, gain: per channel (R, G, B); variation: relative rms of the gain over the panel (smooth);
-    table: phase of each level in percent of the largest, which is ``(L - 1) / L 2 pi`` (then gamma must be 1).
+    gamma: of red, green and blue; of a single colour the first [1]; gain: of the phase, likewise [relative to 2 pi];
+    variation: rms of the gain over the panel, smooth [relative]; table: phase of each level [percent of the largest,
+    ``(L - 1) / L 2 pi``]; then gamma must be 1.
     """
 
     title: ClassVar[str] = "look-up table"
@@ -76,7 +77,9 @@ class LookUpTable(Stage):
 
 @dataclass(frozen=True)
 class Flicker(Stage):
-    """Relative phase gain noise of a frame; ``rms`` of the 2 pi stroke.
+    """Relative phase gain noise of a frame.
+
+    rms: of the gain [share of the 2 pi stroke].
 
     The liquid crystal relaxes between refreshes, so that each frame has a slightly other phase gain.
     """

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from annotated_types import Interval
 from torch import Tensor
 
+from ....core.units import Check, Metres
 from ....optics.phase import TAU, gray_level, wrap
 from ...api import DisplaySpec, Region
 from ..stage import Effect, Stage
@@ -17,23 +18,37 @@ if TYPE_CHECKING:
     from ..profile import Profile
 
 
+Wavelength = Annotated[float, Metres(200e-9, 2000e-9)]
+
+
+class OneOrThree(Check):
+    """Of wavelengths, since pictures are gray or of three colours."""
+
+    def fault(self, value: Sequence[float]) -> str:
+        """See ``Check``."""
+        if len(value) in (1, 3):
+            return ""
+        return f"{len(value)} wavelengths; a display has three, for red, green and blue, or one, for gray pictures"
+
+
 @dataclass(frozen=True)
 class Panel(Stage):
     """The nominal, public part of a profile.
 
-    shape (rows, columns) and distance [m] belong together: on a smaller panel the distance shrinks with the rows.
-    pitch [m]; wavelengths [m] of red, green, blue, or a single one; bits; pupil: diameter of the iris as a fraction of
-    the band (null: none); blaze: (vertical, horizontal) cycles per pixel that the display adds and re-centres;
-    region: side of the scored window as a fraction of the panel's.
+    shape: rows and columns [px]; pitch: from pixel to pixel [m]; wavelengths: of red, green and blue, or a single one
+    [m]; distance: from the panel, or its image behind a relay, to the image plane [m], which shrinks with the rows on a
+    smaller panel; bits: gray levels are 2^bits, and 2^bits levels are a full turn [bits]; pupil: diameter of the iris
+    [share of the band 1 / pitch], null for none; blaze: carrier that the display adds and re-centres, vertical and
+    horizontal [cycles/px]; region: side of the scored window [share of the panel's].
     """
 
     title: ClassVar[str] = "panel"
     model: ClassVar[str] = "a blaze is added, the phase wrapped to [0, 2 pi) and rounded to 2^bits levels (paper Eq. 6)"
 
     shape: tuple[int, int]
-    pitch: Annotated[float, Interval(gt=0, lt=1e-3)]
-    wavelengths: tuple[float] | tuple[float, float, float]
-    distance: Annotated[float, Interval(gt=0, lt=10)]
+    pitch: Annotated[float, Metres(0.5e-6, 200e-6)]
+    wavelengths: Annotated[tuple[Wavelength, ...], OneOrThree()]
+    distance: Annotated[float, Metres(0.1e-3, 10)]
     bits: Annotated[int, Interval(ge=1, le=16)]
     pupil: Annotated[float, Interval(gt=0, le=1)] | None = None
     blaze: tuple[float, float] = (0.0, 0.0)

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 class Propagation(Stage):
     """What separates the light's way from the nominal one.
 
-    distance_error, wavelength_error: relative; aberration: rms waves at 517 nm over the iris (or over the band
-    when there is none), by Zernike name (optics/zernike.py); pupil_shift: of the iris (rows, columns), and obstruction:
-    radius of an opaque disc in its middle, both relative to its radius.
+    distance_error, wavelength_error: of the true one from the nominal one [relative]; aberration: over the iris (or
+    over the band when there is none), by Zernike name, such as ``defocus`` or ``coma_x`` [rms waves at 517 nm];
+    pupil_shift: of the iris, rows and columns [share of its radius]; obstruction: radius of an opaque disc in its
+    middle [share of its radius].
     """
 
     title: ClassVar[str] = "propagation and iris"

@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 class Relay(Stage):
     """Pose of the panel's image on the sensor.
 
-    magnification; rotation [degrees]; shift (rows, columns) and perspective: relative to the panel's height;
-    distortion: radial displacement at half a panel height, relative to it.
+    magnification: of the image on the sensor [1]; rotation: of the image [degrees]; shift: rows and columns [panel
+    heights]; perspective: change of scale over the picture, vertical and horizontal [1/panel height]; distortion:
+    radial displacement at half a panel height [relative to it].
     """
 
     title: ClassVar[str] = "relay"

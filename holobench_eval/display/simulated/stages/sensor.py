@@ -15,6 +15,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from ....core.compiled import usable
+from ....core.units import Metres
 from ....imaging.shifts import correlate
 from ....optics.blocks import in_blocks
 from ..geometry import Geometry
@@ -31,10 +32,12 @@ IMAGE_SAMPLES = 2  # at most, a pixel and axis of the image; a smaller sensor pi
 class Sensor(Stage):
     """A camera sensor.
 
-    pitch [m]; bits of the converter; dark level [DN]; full_well and read_noise [electrons]; prnu: rms of the
-    pixels' relative gain; vignetting: loss at the corner of the frame; nonlinearity: relative loss of response at
-    full scale; ambient: stray light on every pixel, relative to that of a perfectly reconstructed white one; headroom:
-    how many times the light of such a pixel fills the well; noise: False for an ideal camera that counts in fractions.
+    pitch: from pixel to pixel [m]; bits: of the converter [bits]; dark: counts without light [DN]; full_well: electrons
+    that saturate a pixel [electrons]; read_noise: rms [electrons]; prnu: rms of the pixels' gain [relative];
+    vignetting: loss at the corner of the frame [share]; nonlinearity: loss of response at full scale [share]; ambient:
+    stray light on every pixel [relative to that of a perfectly reconstructed white one]; headroom: light that fills
+    the well [times that of a perfectly reconstructed white pixel]; noise: false for an ideal camera that counts in
+    fractions.
     """
 
     title: ClassVar[str] = "sensor"
@@ -42,7 +45,7 @@ class Sensor(Stage):
         "pixel area, vignetting, fixed pattern, shot and read noise, non-linearity, saturation, ADC (paper 5.1, 7.2)"
     )
 
-    pitch: Annotated[float, Interval(gt=0, lt=1e-3)] = 3.72e-6
+    pitch: Annotated[float, Metres(0.5e-6, 200e-6)] = 3.72e-6
     bits: Annotated[int, Interval(ge=8, le=16)] = 14
     dark: Annotated[float, Interval(ge=0)] = 512.0
     full_well: Annotated[float, Interval(gt=0)] = 32000.0

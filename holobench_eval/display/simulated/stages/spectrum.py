@@ -29,9 +29,10 @@ FWHM = 2 * math.sqrt(2 * math.log(2))  # full width at half maximum of a Gaussia
 class Spectrum(Stage):
     """A Gaussian line, or a measured spectrum: an incoherent sum over a few wavelengths.
 
-    width: full width at half maximum [m] per colour (R, G, B; of a single colour the first); lines: wavelengths that
-    stand for it (Gauss-Hermite quadrature), which have to lie closer than a pixel in the image; measured: in the place
-    of width, pairs (offset from the nominal wavelength [m], share of the power) for every colour, shares in any unit.
+    width: full width at half maximum of red, green and blue; of a single colour the first [m]; lines: wavelengths that
+    stand for it (Gauss-Hermite quadrature), which have to lie closer than a pixel in the image [count]; measured: in
+    the place of width, pairs for every colour: offset from the nominal wavelength [m], and share of the power in any
+    unit.
 
     Laser diodes emit over 1 to 5 nm, superluminescent diodes over 5 to 15 nm, light-emitting diodes over 20 to 40 nm.
     The blaze of a display is a grating: a wavelength ``d`` off the nominal one leaves the axis and arrives ``z f d``

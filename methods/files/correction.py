@@ -1,0 +1,41 @@
+"""The correction map of a panel, read from the picture that its maker gives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...core.errors import CellError
+from ...imaging.convention import Convention, per_colour
+from .arrays import read_array
+
+
+def on_panel(convention: Convention, shape: tuple[int, int], colours: int, folder: Path) -> Convention:
+    """A convention with its correction map read, for a panel of (rows, columns) in so many colours.
+
+    folder: where a relative path of the map starts. CellError, in one line: a full turn for another number of colours,
+    or a map that cannot be used.
+    """
+    _check_colours("two_pi_level", convention.two_pi_level, colours)
+    if convention.correction is None:
+        return convention
+    _check_colours("correction.two_pi_level", convention.correction.two_pi_level, colours)
+    path = folder / convention.correction.file
+    levels = read_array(path)
+    if levels.ndim == 3 and levels.shape[-1] == colours:
+        levels = np.moveaxis(levels, -1, 0)
+    if (
+        levels.dtype.kind not in "uif"
+        or levels.shape not in (shape, (colours, *shape))
+        or not np.isfinite(levels).all()
+    ):
+        given = " x ".join(map(str, levels.shape))
+        raise CellError(f"{path}: a correction of {given} levels; the panel has {shape[0]} x {shape[1]} pixels")
+    return replace(convention, turns=levels / per_colour(convention.correction.two_pi_level))
+
+
+def _check_colours(key: str, level: float | tuple[float, ...], colours: int) -> None:
+    if isinstance(level, tuple) and len(level) != colours:
+        raise CellError(f"{key}: {len(level)} levels for {colours} colours; expected one for all, or one for each")

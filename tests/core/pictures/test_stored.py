@@ -1,0 +1,126 @@
+"""What a picture file says beside its samples: alpha, palettes, colours, loss and size."""
+
+import io
+import struct
+import zlib
+
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image, ImageCms
+
+from holobench_eval.core.errors import PictureError
+from holobench_eval.core.pictures import open_picture
+
+PIXELS = np.random.default_rng(3).integers(0, 256, (40, 50, 3), dtype=np.uint8)
+IMAGE = Image.fromarray(PIXELS)
+
+
+def written(image: Image.Image, kind: str = "PNG", **options: object) -> bytes:
+    file = io.BytesIO()
+    image.save(file, kind, **options)
+    return file.getvalue()
+
+
+def chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
+def with_chunk(kind: bytes, content: bytes) -> bytes:
+    """A PNG with one more chunk behind its header."""
+    png = written(IMAGE)
+    return png[:33] + chunk(kind, content) + png[33:]
+
+
+@pytest.mark.parametrize("form", ["PNG", "TIFF", "WEBP"])
+def test_alpha_is_left_out_where_it_is_opaque_and_refused_elsewhere(form: str) -> None:
+    options = {"lossless": True} if form == "WEBP" else {}
+    clear = IMAGE.convert("RGBA")
+    clear.putalpha(Image.fromarray(np.where(np.arange(50) < 1, 254, 255).astype(np.uint8)[None].repeat(40, 0)))
+    stored = open_picture(written(clear, form, **options))
+    assert stored.has_alpha
+    with pytest.raises(PictureError, match="alpha that is not opaque"):
+        stored.upright()
+    clear.putalpha(255)
+    content = written(clear, form, **options)
+    assert np.array_equal(open_picture(content).upright(), PIXELS)
+
+
+@pytest.mark.parametrize("form", ["PNG", "TIFF", "BMP"])
+def test_a_palette_is_looked_up_and_called_one(form: str) -> None:
+    indexed = IMAGE.quantize(200)
+    stored = open_picture(written(indexed, form))
+    assert stored.has_palette
+    assert np.array_equal(stored.upright(), np.asarray(indexed.convert("RGB")))
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8, 16])
+@pytest.mark.parametrize("interlaced", [False, True])
+def test_a_gray_png_of_any_depth_has_its_full_scale(bits: int, interlaced: bool) -> None:
+    values = np.random.default_rng(bits).integers(0, 2**bits, (9, 16))
+    values[0, :2] = 0, 2**bits - 1
+
+    def packed(rows: np.ndarray) -> bytes:
+        if bits == 16:
+            return b"".join(b"\0" + row.astype(">u2").tobytes() for row in rows)
+        unpacked = ((rows[..., None] >> np.arange(bits)[::-1]) & 1).astype(np.uint8).reshape(len(rows), -1)
+        return b"".join(b"\0" + np.packbits(row).tobytes() for row in unpacked)
+
+    steps = [(0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2), (1, 0, 2, 1)]
+    parts = [values[top::down, left::right] for top, left, down, right in steps] if interlaced else [values]
+    rows = b"".join(packed(part) for part in parts)
+
+    def png(data: bytes) -> bytes:
+        header = chunk(b"IHDR", struct.pack(">IIBBBBB", 16, 9, bits, 0, 0, 0, interlaced))
+        return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b"")
+
+    read = open_picture(png(rows)).upright()
+    top = 65535 if bits == 16 else 255
+    assert np.array_equal(read, values * (top // (2**bits - 1)))
+    with pytest.raises(PictureError, match="rows of the PNG are missing"):
+        open_picture(png(rows[:-1]))
+
+
+def test_a_png_says_by_its_chunks_what_its_values_mean() -> None:
+    srgb, linear, other = (struct.pack(">I", value) for value in (45455, 100000, 55556))
+    open_picture(with_chunk(b"gAMA", srgb)).refuse_other_colours()
+    open_picture(with_chunk(b"gAMA", linear)).refuse_other_colours(linear=True)
+    open_picture(with_chunk(b"cICP", bytes([1, 13, 0, 1]))).refuse_other_colours()
+    for content, is_linear, line in (
+        (with_chunk(b"gAMA", linear), False, "gAMA is 1, that of sRGB 0.45455"),
+        (with_chunk(b"gAMA", other), True, "gAMA is 0.55556"),
+        (with_chunk(b"cICP", bytes([9, 16, 0, 1])), True, "cICP says 9, 16, 0, 1"),
+    ):
+        with pytest.raises(PictureError, match=line):
+            open_picture(content).refuse_other_colours(is_linear)
+    narrow = open_picture(with_chunk(b"sBIT", bytes([5, 5, 5])))  # states what was scaled up, and changes no value
+    assert np.array_equal(narrow.upright(), PIXELS)
+
+
+@pytest.mark.parametrize("form", ["PNG", "TIFF", "JPEG", "WEBP"])
+def test_a_profile_is_read_in_every_format(form: str) -> None:
+    for space in ("sRGB", "LAB"):
+        profile = ImageCms.ImageCmsProfile(ImageCms.createProfile(space)).tobytes()
+        stored = open_picture(written(IMAGE, form, icc_profile=profile))
+        if space == "sRGB":
+            stored.refuse_other_colours()
+        else:
+            with pytest.raises(PictureError, match="ICC colour profile is 'Lab"):
+                stored.refuse_other_colours(linear=True)
+
+
+def test_loss_is_told_by_the_content_and_not_by_the_name() -> None:
+    lossy = [written(IMAGE, "JPEG"), written(IMAGE, "WEBP", quality=80), written(IMAGE, "TIFF", compression="jpeg")]
+    exact = [written(IMAGE, "PNG"), written(IMAGE, "WEBP", lossless=True), written(IMAGE, "TIFF")]
+    assert [open_picture(content).is_lossy for content in (*lossy, *exact)] == [True] * 3 + [False] * 3
+
+
+def test_a_small_tiff_that_claims_a_huge_image_is_refused_before_it_is_decoded() -> None:
+    file = io.BytesIO()
+    tifffile.imwrite(file, PIXELS[..., 0], photometric="minisblack", compression="zlib")
+    file.seek(0)
+    with tifffile.TiffFile(file, mode="r+") as content:
+        for tag in ("ImageWidth", "ImageLength", "RowsPerStrip"):
+            content.pages.first.tags[tag].overwrite(60_000)
+    with pytest.raises(PictureError, match="60000 x 60000 pixels; expected at most 33 million"):
+        open_picture(file.getvalue())

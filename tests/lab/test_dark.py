@@ -1,0 +1,73 @@
+"""Counts without light: taken off in float, from a level or a file, and from nothing that does not fit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.bench_file import load_bench_file
+from holobench_eval.lab.dark import Dark, given_dark
+
+COUNTS = np.random.default_rng(0).integers(0, 400, (1, 24, 32)).astype(np.uint16)
+BENCH = """name: b
+version: 1
+panel: {shape: [128, 128], pitch: 8.0e-6, wavelengths: [5.2e-7], distance: 0.1, bits: 8}
+capture: {dark_frames: 0, dark: DARK}
+"""
+
+
+def test_a_sample_below_the_dark_level_is_negative_and_does_not_wrap() -> None:
+    for dark in (Dark(np.array(256.0)), given_dark("256")[0], Dark(np.full_like(COUNTS, 256))):
+        light = dark.off(COUNTS)
+        assert light.dtype.kind == "f"
+        assert np.array_equal(light, COUNTS.astype(float) - 256)
+
+
+@pytest.mark.parametrize("ending", [".tif", ".npy"])
+@pytest.mark.parametrize("kind", [np.uint16, np.float32])
+def test_a_dark_frame_or_the_mean_of_several_is_taken_off_sample_by_sample(
+    tmp_path: Path, ending: str, kind: type
+) -> None:
+    frame = (COUNTS[0] // 4).astype(kind) + np.array(0.5 if kind is np.float32 else 0, kind)
+    path = tmp_path / f"dark{ending}"
+    np.save(path, frame) if ending == ".npy" else tifffile.imwrite(path, frame, photometric="minisblack")
+    dark, _ = given_dark(str(path))
+    assert np.array_equal(dark.off(COUNTS)[0], COUNTS[0] - frame.astype(float))
+    assert np.array_equal(dark.plane(2).off(COUNTS[0]), COUNTS[0] - frame.astype(float))
+
+
+def test_dark_counts_that_do_not_fit_are_refused_in_one_line(tmp_path: Path) -> None:
+    np.save(tmp_path / "small.npy", COUNTS[:, 1:])
+    np.save(tmp_path / "eight.npy", np.zeros_like(COUNTS, np.uint8))
+    for given, line in (
+        (tmp_path / "small.npy", "1 x 23 x 32 samples and the photograph 1 x 24 x 32"),
+        (tmp_path / "eight.npy", "8 bits and the photograph 16"),
+        (tmp_path / "none.npy", "no such file; expected counts without light"),
+        ("-3", "0 or more, or a file"),
+        ("nan", "0 or more, or a file"),
+    ):
+        with pytest.raises(UserError, match=line) as caught:
+            given_dark(str(given))[0].off(COUNTS)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_bench_file_names_a_level_or_a_file_beside_it_and_another_file_is_another_bench(tmp_path: Path) -> None:
+    path = tmp_path / "bench.yaml"
+    path.write_text(BENCH.replace("DARK", "64"))
+    assert load_bench_file(path).capture.dark == 64
+    path.write_text(BENCH.replace("DARK", "dark.npy"))
+    digests = set()
+    for level in (1, 2):
+        np.save(tmp_path / "dark.npy", np.full((4, 4), level, np.uint16))
+        bench = load_bench_file(path)
+        assert given_dark(str(bench.capture.dark))[0].bias.max() == level
+        digests.add(bench.digest)
+    assert len(digests) == 2
+
+
+def test_a_bench_file_of_before_whose_dark_counted_frames_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "bench.yaml").write_text(BENCH.replace("dark_frames: 0, dark: DARK", "dark: 8"))
+    with pytest.raises(UserError, match="either dark frames"):
+        load_bench_file(tmp_path / "bench.yaml")
