@@ -1,6 +1,7 @@
 """holobench_eval: which phase-retrieval method gives the better picture on a real, imperfect display?
 
-From Python: ``open_display``, ``open_bench``, ``score``, ``compare`` and ``load_records``, see ``interactive``.
+From Python: ``open_display``, ``open_bench``, ``score``, ``picture``, ``compare``, ``save_levels`` and
+``load_records``, see ``interactive``.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -8,9 +9,28 @@ from typing import TYPE_CHECKING, Any
 from .core.installed import __version__
 
 if TYPE_CHECKING:
-    from .interactive import OpenDisplay, compare, load_records, open_bench, open_display, score
+    from .interactive import (
+        OpenDisplay,
+        compare,
+        load_records,
+        open_bench,
+        open_display,
+        picture,
+        save_levels,
+        score,
+    )
 
-__all__ = ["OpenDisplay", "__version__", "compare", "load_records", "open_bench", "open_display", "score"]
+__all__ = [
+    "OpenDisplay",
+    "__version__",
+    "compare",
+    "load_records",
+    "open_bench",
+    "open_display",
+    "picture",
+    "save_levels",
+    "score",
+]
 
 
 def __getattr__(name: str) -> Any:
@@ -20,3 +40,7 @@ def __getattr__(name: str) -> Any:
 
         return getattr(interactive, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

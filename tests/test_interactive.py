@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import re
 import sys
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +17,7 @@ from PIL import Image
 import holobench_eval as hb
 from holobench_eval import interactive
 from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.display.training import TrainingImage
 from holobench_eval.optics.colour import srgb_encode
 from holobench_eval.report.charts.comparison import GAP, HEADER, SIDE, tile_size
 from holobench_eval.study.config import load_study
@@ -37,13 +39,15 @@ def target(display: hb.OpenDisplay) -> interactive.Array:
 
 
 def test_the_examples_run() -> None:
-    found = doctest.testmod(interactive)
+    found = doctest.testmod(interactive.opened)
     assert found.attempted
     assert not found.failed
 
 
 def test_what_is_public_is_there_and_nothing_else() -> None:
     assert all(getattr(hb, name) is getattr(interactive, name) for name in hb.__all__ if name[0] != "_")
+    assert dir(hb) == sorted(hb.__all__)
+    assert {*hb.__all__} == {*interactive.__all__, "__version__"} - {"Array"}
     with pytest.raises(AttributeError, match="no attribute 'solve'"):
         _ = hb.solve  # type: ignore[attr-defined]
 
@@ -366,3 +370,87 @@ def test_the_ending_says_what_a_comparison_is(
 def test_records_of_a_report_are_read() -> None:
     records = hb.load_records(Path(__file__).parents[1] / "reports" / "table3")
     assert {"method", "condition", "target", "psnr_linear_db"} <= set(records.columns)
+
+
+def test_what_python_shows_is_a_line_that_says_what_it_is(display: hb.OpenDisplay, target: interactive.Array) -> None:
+    phase = display.solve("double_phase", target)
+    capture = display.capture(phase, target)
+    scores = hb.score(capture, target)
+    handle = display._bench.for_method(Flat(), "mine", torch.from_numpy(target), "x", 0, budget=7)
+    taken = display._bench.photograph(torch.from_numpy(phase), torch.from_numpy(target), "x", 0)
+    image = TrainingImage("x", torch.from_numpy(target))
+    shown = {
+        r"<display ideal: panel of 128 x 128 pixels of .* um, .* nm, .* mm, scores 104 x 104 pixels>": display,
+        r"<target, linear light in \[0, 1\]: \(3, 104, 104\), from 0 to 1>": target,
+        r"<phase \[rad\]: \(3, 128, 128\), from .* to .*>": phase,
+        r"<capture, linear light .*: \(3, 104, 104\), from .*>": capture,
+        r"<image of the nominal model, intensity .*>": display.ideal(phase),
+        r"<scores: psnr_linear \d\d\.\d\d dB, ssim_linear 0\.\d+ and \d+ more>": scores,
+        r"<display ideal for mine: 0 captures, at most 7>": handle,
+        r"<capture in the target's frame: light \(3, 104, 104\), residual .* px, saturated 0.00%>": taken,
+        r"<capture: counts \(3, .*\), dark .*, saturated from .*>": taken.capture,
+        r"<training image 'x': light \(3, 104, 104\)>": image,
+    }
+    for pattern, value in shown.items():
+        assert re.fullmatch(pattern, repr(value)), repr(value)
+    assert repr(capture[0, :2, :2]) == repr(np.asarray(capture)[0, :2, :2])
+    assert type(capture * 2) is np.ndarray
+    assert isinstance(capture.mean(), np.float32)
+    assert np.array_equal(display.solve(lambda *_: phase[None], target), phase)
+
+
+def test_a_score_takes_its_arrays_by_position_and_notices_that_they_changed_places(
+    display: hb.OpenDisplay, target: interactive.Array
+) -> None:
+    capture = display.capture(display.solve("double_phase", target), target)
+    assert hb.score(capture, target, ["psnr"]) == hb.score(capture, target=target, metrics=["psnr"])
+    for call in (hb.score, hb.picture):
+        with pytest.raises(UserError, match=r"the target a capture; expected score\(capture, target\)"):
+            call(target, capture)
+
+
+def test_a_picture_is_the_capture_as_it_is_scored(display: hb.OpenDisplay, target: interactive.Array) -> None:
+    picture = hb.picture(target / 3, target)
+    assert (picture.shape, picture.dtype) == ((104, 104, 3), np.uint8)
+    assert np.array_equal(picture, np.asarray(levels_of(target)).transpose(1, 2, 0))
+    assert hb.picture(target[:1], target[:1]).shape == (104, 104, 3)
+    with pytest.raises(UserError, match=r"a capture of \(3, 103, 104\) and a target of"):
+        hb.picture(target[:, 1:], target)
+
+
+@pytest.mark.parametrize("convention", [{}, {"two_pi_level": [200, 220, 240.5], "sign": -1, "flip_vertical": True}])
+def test_levels_of_a_phase_are_read_back(display: hb.OpenDisplay, target, convention, tmp_path: Path) -> None:
+    phase = display.solve("double_phase", target)
+    path = hb.save_levels(phase, tmp_path / "new" / "levels.png", **convention)
+    assert Image.open(path).size == (128, 128)
+    again = display.solve("phases", target, file=str(path), **convention)
+    error = np.angle(np.exp(1j * (again - phase)))
+    assert np.abs(error).max() < 1.02 * np.pi / 200
+    gray = hb.save_levels(phase[:1], tmp_path / "red.png", **({} if not convention else {"two_pi_level": 200}))
+    assert Image.open(gray).mode == "L"
+
+
+@pytest.mark.parametrize(
+    ("change", "convention", "message"),
+    [
+        (lambda phase: phase[:2], {}, r"a phase of \(2, 128, 128\); expected finite radians \(C, H, W\) of 1 or 3"),
+        (lambda phase: phase * np.nan, {}, "expected finite radians"),
+        (lambda phase: np.round(40 * phase), {}, "expected finite radians"),
+        (lambda phase: phase.astype(np.uint8), {}, "a phase of uint8; expected radians"),
+        (lambda phase: phase, {"two_pi": 256}, "the panel has no parameter 'two_pi'; did you mean 'two_pi_level'"),
+        (lambda phase: phase, {"two_pi_level": (1.5, 2)}, "two_pi_level: 2 levels for 3 colours"),
+        (lambda phase: phase, {"correction": {"file": "gone.png"}}, "gone.png"),
+    ],
+)
+def test_what_is_no_phase_is_not_saved(display, target, tmp_path: Path, change, convention, message) -> None:
+    with pytest.raises(UserError, match=message) as caught:
+        hb.save_levels(change(display.solve("double_phase", target)), tmp_path / "levels.png", **convention)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_device_is_asked_for_by_its_name(target: interactive.Array) -> None:
+    assert hb.open_display("ideal", panel=(128, 128), device="cpu").target(target).shape == target.shape
+    for call in (lambda: hb.open_display("ideal", device="gpu"), lambda: hb.score(target, target, device="gpu")):
+        with pytest.raises(UserError, match="unknown device 'gpu'; auto, cpu, cuda or cuda:N"):
+            call()

@@ -3,6 +3,8 @@
 import tomllib
 from pathlib import Path
 
+import yaml
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -19,3 +21,11 @@ def test_the_list_of_packages_is_complete() -> None:
         for file in (ROOT / top).rglob("*.py"):
             found.add(name + ".".join(file.parent.relative_to(ROOT).parts))
     assert sorted(listed) == sorted(found)
+
+
+def test_a_citation_names_the_version_and_the_paper() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert (str(cited["version"]), cited["license"]) == (project["version"], project["license"])
+    assert cited["authors"] == project["authors"]
+    assert cited["references"][0]["doi"] in (ROOT / "README.md").read_text(encoding="utf-8")

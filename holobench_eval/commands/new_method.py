@@ -19,18 +19,23 @@ from ..core.errors import UserError
 def new_method(
     name: Annotated[str, typer.Argument(help="Lower-case words, such as my_method.")],
     folder: Annotated[Path, typer.Option(help="Where to write NAME.py and test_NAME.py.")] = Path(),
+    camera: Annotated[bool, typer.Option("--camera", help="One that captures its own holograms.")] = False,
+    trains: Annotated[bool, typer.Option("--trains", help="One that learns from captures first.")] = False,
 ) -> None:
     """Write a method that works, to be changed, and its test."""
-    method, test, source = write_method(name, folder)
+    if camera and trains:
+        raise UserError("--camera and --trains: each writes another method; choose one of them")
+    method, test, source = write_method(name, folder, "camera" if camera else "trains" if trains else "method")
     print(
         f"{method}\n{test}\nnext: pytest {test} (in a clone of holobench_eval, after pip install -e '.[dev]'); "
         f"name it in a config as '{source}'"
     )
 
 
-def write_method(name: str, folder: Path) -> tuple[Path, Path, str]:
+def write_method(name: str, folder: Path, kind: str = "method") -> tuple[Path, Path, str]:
     """Write ``NAME.py`` and ``test_NAME.py`` and return their paths and the method as a config names it.
 
+    kind: a template of methods: "method", which knows the nominal optics alone, "camera" or "trains".
     UserError for a name that is no module name and for files that exist: nothing is ever overwritten.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
@@ -40,7 +45,7 @@ def write_method(name: str, folder: Path) -> tuple[Path, Path, str]:
     cls = "".join(word.capitalize() for word in name.split("_"))
     words = {"name": name, "cls": cls, "title": name.replace("_", " ").capitalize()}
     texts = {}
-    for file, template in ((f"{name}.py", "method.txt"), (f"test_{name}.py", "test_method.txt")):
+    for file, template in ((f"{name}.py", f"{kind}.txt"), (f"test_{name}.py", "test_method.txt")):
         text = files(__package__).joinpath("templates", template).read_text(encoding="utf-8")
         texts[file] = Template(text).substitute(words)
     method, test = write_new(folder, texts)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
 from rich.padding import Padding
+from rich.segment import Segment
 from rich.table import Table
+
+from ..core.errors import listed, printable
 
 if TYPE_CHECKING:
     from ..report import Results
@@ -19,10 +23,22 @@ if TYPE_CHECKING:
 MOST_REASONS = 10  # that a terminal shows; details.md has all
 
 
+class _Screen(Console):
+    """A console that prints a question mark for each sign of a text that a terminal would obey, whoever wrote it."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """As rich does, which writes its own control codes in segments apart."""
+        for segment in super().render(renderable, options):
+            if segment.control or segment.text.isprintable():
+                yield segment
+            else:
+                yield segment._replace(text="\n".join(map(printable, segment.text.split("\n"))))
+
+
 def console() -> Console:
     """A console as wide as its terminal; wide enough for tables where there is none."""
-    screen = Console()
-    return screen if screen.is_terminal else Console(width=160)
+    screen = _Screen()
+    return screen if screen.is_terminal else _Screen(width=160)
 
 
 def write_report(
@@ -119,7 +135,7 @@ def print_holes(console: Console, results: Results) -> None:
         return
     console.print(f"without a score: {len(results.holes)} of {len(results.frame)} cells", highlight=False)
     for (state, _), cells in list(groups.items())[:MOST_REASONS]:
-        whose = ", ".join(dict.fromkeys(f"{method} on {condition}" for method, condition, _ in cells))
+        whose = listed(dict.fromkeys(f"{method} on {condition}" for method, condition, _ in cells))
         line = f"{len(cells)} {state} ({whose}): {cells[0][2] or 'no reason given'}"
         console.print(Padding(escape(line), (0, 0, 0, 2), expand=False), highlight=False)
     if len(groups) > MOST_REASONS:

@@ -13,6 +13,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from ..core.errors import listed
 from ..core.panels import is_small
 from .options import (
     ARTIFACTS,
@@ -68,7 +69,10 @@ def plan(
     grid, many = plan_cells(study), thread_count(threads, workers, study)
     artifacts = learned_folder(artifacts, grid)
     networks = Artifacts(artifacts).networks(grid.preparations().values())
-    console.print(table(study, preview(study, grid, Store(folder), many, workers, gpu_name(find(device)), networks)))
+    rows = preview(study, grid, Store(folder), many, workers, gpu_name(find(device)), networks)
+    console.print(table(study, rows))
+    if all(row.seconds is None for row in rows):
+        console.print("No method of it was timed on this machine before; 'holoeval run' says what is left.")
     if learning := trainings(grid, Artifacts(artifacts)):
         console.print(training_table(learning))
         if not artifacts.is_dir():
@@ -162,7 +166,7 @@ def preview(
 
 
 def table(study: Study, rows: list[Row]) -> Table:
-    """The rows as a table with a line of sums, in 80 columns."""
+    """The rows as a table with a line of sums, in 80 columns; without the time of solving where none is known."""
     from ..study.progress import duration
 
     result = Table(title=escape(study.title), title_justify="left", show_footer=True, **LOOK)
@@ -175,13 +179,14 @@ def table(study: Study, rows: list[Row]) -> Table:
     result.add_column("captures", justify="right")
     timed = [row.seconds for row in rows if row.seconds is not None]
     untimed = any(row.seconds is None and row.label != FLOOR for row in rows)
-    solving = f"{'at least ' * untimed}{duration(sum(timed))}" if timed else ""
-    result.add_column("solving", justify="right", footer=solving)
+    if timed:
+        result.add_column("solving", justify="right", footer=f"{'at least ' * untimed}{duration(sum(timed))}")
     for row in rows:
         limit = "" if row.captures is None else str(row.captures)
         seconds = "" if row.label == FLOOR else "not timed" if row.seconds is None else duration(row.seconds)
         name = "floor images, no method" if row.label == FLOOR else row.label
-        result.add_row(escape(name), *(str(getattr(row, name)) for name in numbers), limit, seconds)
+        counts = (str(getattr(row, name)) for name in numbers)
+        result.add_row(escape(name), *counts, limit, *([seconds] if timed else []))
     return result
 
 
@@ -228,5 +233,5 @@ def training_table(rows: list[TrainingRow]) -> Table:
         )
         state = f"{row.state}: {row.reason}" if row.reason else row.state
         name = row.name.rpartition("-")[0]
-        result.add_row(*map(escape, (name, ", ".join(row.needed_by), state)), *figures)
+        result.add_row(*map(escape, (name, listed(row.needed_by), state)), *figures)
     return result

@@ -21,7 +21,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import yaml
 
+from ..core.errors import UserError, one_line
+from ..core.files import read_regular
 from ..core.panels import is_small
+from ..core.yaml_source import LARGEST_BYTES
 from .options import (
     ARTIFACTS,
     RESULTS,
@@ -115,19 +118,20 @@ def run(
 def _panel(config: Path) -> tuple[int, int] | None:
     """The panel in a config that nobody has checked yet, without the libraries that check it; None if there is none."""
     try:
-        rows, columns = yaml.safe_load(config.read_bytes())["display"]["panel"]
+        rows, columns = yaml.safe_load(read_regular(config, LARGEST_BYTES))["display"]["panel"]
         return int(rows), int(columns)
-    except (OSError, ValueError, TypeError, LookupError, ArithmeticError, yaml.YAMLError):
+    except (UserError, OSError, ValueError, TypeError, LookupError, ArithmeticError, yaml.YAMLError):
         return None
 
 
 def _is_finished(config: Path, output: Path | None) -> bool:
     """Whether the last run of a config, as it stands, ended: there is probably nothing to compute."""
     try:
-        described = json.loads((output or RESULTS / config.stem).joinpath("provenance.json").read_bytes())
-        text = hashlib.sha256(config.read_bytes()).hexdigest()
+        known = (output or RESULTS / config.stem) / "provenance.json"
+        described = json.loads(read_regular(known, 2 * LARGEST_BYTES))
+        text = hashlib.sha256(read_regular(config, LARGEST_BYTES)).hexdigest()
         return bool(described["ended"] and described["config_sha256"] == text)
-    except (OSError, ValueError, TypeError, LookupError):
+    except (UserError, OSError, ValueError, TypeError, LookupError):
         return False
 
 
@@ -230,4 +234,4 @@ def draw_sheets(drawings: list[Sheet], threads: int) -> None:
         try:
             sheet()
         except Exception as error:
-            print(f"holoeval: no stage sheet of {sheet.display.name}: {error}", file=sys.stderr)
+            print(f"holoeval: no stage sheet of {sheet.display.name}: {one_line(str(error))}", file=sys.stderr)

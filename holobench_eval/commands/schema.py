@@ -57,7 +57,7 @@ def study_schema() -> dict[str, Any]:
         ("dataset", "Training", "dataset"),
     ):
         shared[definition]["allOf"] = [
-            _params_of(key, name.partition(" ")[2], reference, shared[definition])
+            _params_of(key, name.partition(" ")[2], reference, shared[definition], shared)
             for name, reference in references.items()
             if name.startswith(f"{what} ")
         ]
@@ -81,8 +81,15 @@ def _one_of(names: list[str], file: str) -> dict[str, Any]:
     return {"anyOf": [{"enum": names}, {"type": "string", "pattern": file}]}
 
 
-def _params_of(key: str, name: str, reference: dict[str, Any], owner: dict[str, Any]) -> dict[str, Any]:
-    """What ``params`` takes where ``key`` has a name. owner: the mapping that has both."""
+def _params_of(
+    key: str, name: str, reference: dict[str, Any], owner: dict[str, Any], shared: dict[str, Any]
+) -> dict[str, Any]:
+    """What ``params`` and ``grid`` take where ``key`` has a name. owner: the mapping that has all three."""
     default = owner["properties"][key].get("default") == name
     condition = {"properties": {key: {"const": name}}, **({} if default else {"required": [key]})}
-    return {"if": condition, "then": {"properties": {"params": reference}}}
+    taken = {"params": reference}
+    if "grid" in owner["properties"]:
+        entries = shared[reference["$ref"].rpartition("/")[2]]["properties"]
+        lists = {name: {"type": "array", "minItems": 1, "items": entry} for name, entry in entries.items()}
+        taken["grid"] = {"properties": lists, "additionalProperties": False}
+    return {"if": condition, "then": {"properties": taken}}

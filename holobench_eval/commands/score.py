@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ..core.errors import UserError, suggest
+from ..core.errors import UserError, listed, suggest
 from .output import console as open_console
 from .output import print_answer, print_headline
 
@@ -140,7 +140,7 @@ def _layout(folders: Folders, domain: str, values: str, baseline: str | None, st
     from ..study.folders.scoring import CONDITION
 
     return Layout(
-        title=f"Scores of photographs: {', '.join(folders.methods)}",
+        title=f"Scores of photographs: {listed(folders.methods)}",
         pairs=tuple((method, CONDITION) for method in folders.methods),
         targets=tuple(folders.targets),
         headline=f"psnr_{domain}",

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
+from typing import Final
+
+_BRACKETS: Final = re.compile(r"\((?:[^()]|\([^()]*\))*\)|\[[^\[\]]*\]")
 
 
 class UserError(Exception):
@@ -58,7 +62,12 @@ def reason(error: BaseException) -> str:
 
 def one_line(text: str) -> str:
     """A text in one line, with question marks in the place of signs that a terminal would obey."""
-    return "".join(sign if sign.isprintable() else "?" for sign in " ".join(text.split()))
+    return printable(" ".join(text.split()))
+
+
+def printable(text: str) -> str:
+    """A text with question marks in the place of line ends and of signs that a terminal would obey."""
+    return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 
 def out_of_memory(error: BaseException) -> bool:
@@ -71,5 +80,13 @@ def suggest(word: str, allowed: Iterable[str]) -> str:
     words = sorted(allowed)
     near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
     hint = f"did you mean '{near[0]}'? " if near else ""
-    between = "; " if any("," in each for each in words) else ", "
-    return f"{hint}allowed: {between.join(words)}"
+    return f"{hint}allowed: {listed(words)}"
+
+
+def listed(names: Iterable[str], last: str = "") -> str:
+    """``a, b, c``; ``a, x; b`` where a name itself holds a comma, unless in brackets. last: a word before the last."""
+    parts = list(names)
+    between = "; " if any("," in _BRACKETS.sub("", part) for part in parts) else ", "
+    if not last or len(parts) < 2:
+        return between.join(parts)
+    return f"{between.join(parts[:-1])}{between.rstrip(', ')} {last} {parts[-1]}"

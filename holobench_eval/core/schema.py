@@ -119,21 +119,21 @@ def typed(document: Document, cls: type[T], data: Mapping[str, Any] | None = Non
 
 
 @contextmanager
-def placed(document: Document, name: Keys, params: Keys) -> Iterator[None]:
+def placed(document: Document, name: Keys, *params: Keys) -> Iterator[None]:
     """Put a place before an error about a plug-in: the parameter at fault if the file gives it, else its name.
 
     Parameters
     ----------
     document : Document
         The file that names the plug-in.
-    name, params : tuple of str or int
-        Where its name and its parameters stand in the file.
+    name, *params : tuple of str or int
+        Where its name stands in the file, and the mappings that may hold its parameters.
     """
     try:
         yield
     except UserError as error:
-        field = (*params, *error.where[:1]) if isinstance(error, FieldError) else params
-        where = field if field != params and field in document.keys else name
+        field = error.where[:1] if isinstance(error, FieldError) else ()
+        where = next((place for part in params if field and (place := (*part, *field)) in document.keys), name)
         raise document.error(where, str(error), at_key=isinstance(error, FieldError) and error.at_key) from error
 
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from .errors import UserError
+from .files import CONTROLS, read_regular
 
 LARGEST_BYTES = 1_000_000
 DEEPEST = 20
@@ -83,11 +84,7 @@ def load(path: Path) -> Document:
 
 def _read(path: Path) -> str:
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_BYTES + 1)
-        if len(content) > LARGEST_BYTES:
-            raise UserError(f"{path}: larger than {LARGEST_BYTES} bytes; that is no config")
-        return content.decode("utf-8")
+        return read_regular(path, LARGEST_BYTES).decode("utf-8")
     except FileNotFoundError:
         where = "" if path.is_absolute() else f" in {Path.cwd()}"
         raise UserError(f"{path}: no such file{where}") from None
@@ -178,7 +175,7 @@ class _Reader:
         for key_node, value_node in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise self._error(key_node, "a key must be a plain word")
-            key = str(key_node.value)
+            key = self._text(key_node)
             if key in result:
                 first = self.keys[(*where, key)]
                 raise self._error(key_node, f"duplicate key '{key}'; first given in line {first.line}")
@@ -187,7 +184,7 @@ class _Reader:
         return result
 
     def _scalar(self, node: yaml.Node) -> Any:
-        text = str(node.value)
+        text = self._text(node)
         try:
             match node.tag.removeprefix(_CORE):
                 case "str":
@@ -205,6 +202,12 @@ class _Reader:
         except (ValueError, KeyError):
             raise self._error(node, f"'{text[:40]}' is not a finite number or a boolean") from None
         raise self._error(node, f"values of the kind '{node.tag}' are not allowed")
+
+    def _text(self, node: yaml.Node) -> str:
+        text = str(node.value)
+        if CONTROLS.search(text.replace("\n", "").replace("\t", "")):
+            raise self._error(node, f"{text[:40]!r} holds control characters; take them out")
+        return text
 
     def _error(self, node: yaml.Node, message: str) -> UserError:
         line, column = _position(node)

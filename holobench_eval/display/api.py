@@ -171,6 +171,9 @@ class Capture:
     white: float
     gain: tuple[float, ...]
 
+    def __repr__(self) -> str:
+        return f"<capture: counts {tuple(self.frame.shape)}, dark {self.dark:.4g}, saturated from {self.white:.4g}>"
+
     def linear(self) -> Tensor:
         """``(C, Hs, Ws)`` intensity in units of the mean incident intensity on the panel; dark subtracted in float."""
         gain = torch.tensor(self.gain, dtype=torch.float32, device=self.frame.device).view(-1, 1, 1)
@@ -208,6 +211,12 @@ class RectifiedCapture:
     efficiency: float
     residual: float
     exposure: tuple[float, ...]
+
+    def __repr__(self) -> str:
+        return (
+            f"<capture in the target's frame: light {tuple(self.image.shape)}, residual {self.residual:.3g} px, "
+            f"saturated {self.saturated:.2%}>"
+        )
 
 
 class Camera(Protocol):

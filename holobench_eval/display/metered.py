@@ -112,6 +112,10 @@ class MeteredDisplay:
         self._over = ""
         self._frames = set[str]()
 
+    def __repr__(self) -> str:
+        most = "no limit" if self.budget is None else f"at most {self.budget}"
+        return f"<display {self.spec.name} for {self._label}: {self.captures} captures, {most}>"
+
     @property
     def spec(self) -> DisplaySpec:
         """Nominal optics, public."""

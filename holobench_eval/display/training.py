@@ -30,6 +30,9 @@ class TrainingImage:
     item: str
     target: Tensor
 
+    def __repr__(self) -> str:
+        return f"<training image '{self.item}': light {tuple(self.target.shape)}>"
+
     def to(self, device: torch.device) -> TrainingImage:
         """The same on a device."""
         return TrainingImage(self.item, self.target.to(device))

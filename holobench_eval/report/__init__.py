@@ -3,7 +3,15 @@
 from .build import build_report, recompute_files, write_report
 from .data.layout import Layout, layout_of
 from .data.results import Results
-from .data.tables import committed_records, csv_text, difference, read_records, records_frame, table_from_records
+from .data.tables import (
+    committed_records,
+    csv_text,
+    difference,
+    read_records,
+    records_frame,
+    records_text,
+    table_from_records,
+)
 from .description import Description
 from .sections.results import headline_rows
 
@@ -20,6 +28,7 @@ __all__ = [
     "read_records",
     "recompute_files",
     "records_frame",
+    "records_text",
     "table_from_records",
     "write_report",
 ]

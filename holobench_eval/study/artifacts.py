@@ -10,8 +10,9 @@ import json
 import math
 import shutil
 import traceback
+import zipfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +22,7 @@ from typing import IO, Any
 import torch
 
 from ..core.errors import UserError, reason
+from ..core.files import open_regular
 from ..core.hashing import State, digest, file_digest, file_state
 from ..core.io import TEMPORARY, file_name, write_atomically
 from ..display.account import Journal
@@ -33,6 +35,7 @@ UNFINISHED = "unfinished"
 # had to learn. Both are small enough to be committed; a report does not need the tensors.
 RECORDS = "training"
 FORMAT = 1
+MOST_BYTES = 16_000_000_000  # of a file of tensors
 ROUND = ("round", "captures", "seconds", "predicted_psnr", "captured_psnr", "fidelity_psnr")  # columns of a log
 OTHER = {  # by the entry of a description
     "version": "other code",
@@ -233,12 +236,21 @@ def read_log(folder: Path) -> list[dict[str, str]]:
 
 
 def read_tensors(path: Path, file: IO[bytes] | None = None) -> dict[str, Any]:
-    """Tensors and plain values from a file that may be hostile. UserError for one that is damaged or holds code.
+    """Tensors and plain values from a file that may be hostile. UserError for one that is damaged or holds code, or
+    that would take more memory than it has bytes.
 
     file: what the path holds, where it has been read.
     """
     try:
-        content = torch.load(file or path, map_location="cpu", weights_only=True)
+        with nullcontext(file) if file else open_regular(path, MOST_BYTES) as opened:
+            with zipfile.ZipFile(opened) as archive:
+                decoded = sum(entry.file_size for entry in archive.infolist())
+            if decoded > opened.seek(0, io.SEEK_END):
+                raise ValueError(f"it would be unpacked to {decoded / 1e9:.1f} GB")
+            opened.seek(0)
+            content = torch.load(opened, map_location="cpu", weights_only=True)
+    except UserError:
+        raise
     except Exception as error:  # damaged bytes raise whatever they happen to mean
         reason = str(error).partition("\n")[0][:120]
         raise UserError(

@@ -58,7 +58,8 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     document, changes = load(Path(path)), changes or Changes()
     document = changed(replace(document, data=_long_form(document.data)), changes)
     study = typed(document, Study, _long_form(document.data))
-    study = _with_chosen_methods(replace(study, file=Path(path), text=document.text, changes=changes))
+    study = _with_grids(replace(study, file=Path(path), text=document.text, changes=changes), document)
+    study = _with_chosen_methods(study)
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
@@ -84,21 +85,25 @@ def _long_form(data: Mapping[str, Any]) -> dict[str, Any]:
     return {**data, "methods": [{"name": item} if isinstance(item, str) else item for item in methods]}
 
 
-def _with_chosen_methods(study: Study) -> Study:
-    """The study with the methods that the command line left: those of a label, and all of a name that is no label.
+def _with_grids(study: Study, document: Document) -> Study:
+    """The study with all combinations of its grids. Each has its place in the config, a label and an exposure."""
+    entries = list[MethodEntry]()
+    for row, entry in enumerate(study.methods):
+        for key in entry.grid:
+            if key in entry.params:
+                where: Keys = ("methods", row, "grid", key)
+                raise document.error(where, f"'{key}' stands in params, too; keep one of the two", at_key=True)
+        placed_entry = replace(entry, row=row, exposure=entry.exposure or study.display.exposure)
+        entries += placed_entry.combinations()
+    return replace(study, methods=tuple(entries))
 
-    Each has its place in the config, a label and an exposure.
-    """
-    labels, exposure = [entry.label or entry.name.rpartition(":")[2] for entry in study.methods], study.display.exposure
-    entries = [
-        replace(entry, row=row, label=labels[row], exposure=entry.exposure or exposure)
-        for row, entry in enumerate(study.methods)
-    ]
-    allowed = dict.fromkeys([*labels, *(entry.name for entry in entries)])
-    wanted = chosen("--methods", study.changes.methods, [*allowed], "method in the config") or labels
-    whole = {*wanted} - {*labels}
-    left = [entry for entry in entries if entry.label in wanted or entry.name in whole]
-    return replace(study, methods=tuple(entries)).with_methods(left)
+
+def _with_chosen_methods(study: Study) -> Study:
+    """The study with the methods that the command line left: those of a label, and all of a name that is no label."""
+    allowed = dict.fromkeys([*study.labels, *(entry.name for entry in study.methods)])
+    wanted = chosen("--methods", study.changes.methods, [*allowed], "method in the config") or study.labels
+    names = {*wanted} - {*study.labels}
+    return study.with_methods(entry for entry in study.methods if entry.label in wanted or entry.name in names)
 
 
 def _targets(study: Study, document: Document) -> Targets:
@@ -206,7 +211,7 @@ def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[
 
 def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
     where = ("methods", entry.row)
-    with placed(document, (*where, "name"), (*where, "params")):
+    with placed(document, (*where, "name"), (*where, "params"), (*where, "grid")):
         method = isolation.build(entry.name, entry.params, study.folder)
         traits = traits_of(method, entry.name)
         if study.predicts and "predict" not in traits.functions:
@@ -236,6 +241,8 @@ def _check_labels(study: Study, document: Document) -> None:
         first = study.methods[alike.index(alike[index])]
         if first is not entry:
             but = "" if label == first.label else ", but for spaces and capitals"
+            if first.row == entry.row:
+                raise document.error((*where[:2], "grid"), f"two rows are named '{label}'; list each value once")
             both = f"methods[{entry.row}] and methods[{first.row}] share the label '{label}'"
             raise document.error(where, f"{both}{but}; give one a 'label'")
         if not label.isprintable() or len(label) > 60 or label in FLOORS:

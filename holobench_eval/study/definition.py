@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import itertools
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -124,18 +126,30 @@ class MethodEntry:
     """A method of a study.
 
     name: a registered name or ``path/to/file.py:Name``; label: its name in tables (without one: its name, or that of
-    its class); params: parameters of the method, its defaults for others; profiles: the displays it is shown on, a
-    subset of the study's; captures: the most that the display allows a method with a camera for one target (None: no
-    limit); exposure: of its scored captures (None: that of the study's displays); row: its place in the config, from 0.
+    its class); params: parameters of the method, its defaults for others; grid: lists of values of further parameters,
+    for a row with each combination, whose values end its label; profiles: the displays it is shown
+    on, a subset of the study's; captures: the most that the display allows a method with a camera for one target (None:
+    no limit); exposure: of its scored captures (None: that of the study's displays); row: its place in the config, from
+    0.
     """
 
     name: Text
     label: str = ""
     params: Mapping[str, Any] = field(default_factory=dict)
+    grid: Mapping[str, Annotated[tuple[Any, ...], MinLen(1)]] = field(default_factory=dict)
     profiles: tuple[str, ...] = ()
     captures: Annotated[int, Interval(ge=1)] | None = None
     exposure: Exposure | None = None
     row: int = field(default=0, metadata={"key": False})
+
+    def combinations(self) -> Iterator[MethodEntry]:
+        """An entry for each combination of the grid's values, with its label; without a grid this one alone."""
+        for values in itertools.product(*self.grid.values()):
+            chosen = dict(zip(self.grid, values, strict=True))
+            texts = [value if isinstance(value, str) else json.dumps(value) for value in values]
+            parts = [f"{name.replace('_', ' ')} {text}" for name, text in zip(chosen, texts, strict=True)]
+            label = ", ".join([self.label or self.name.rpartition(":")[2], *parts])
+            yield replace(self, label=label, params={**self.params, **chosen}, grid={})
 
 
 @dataclass(frozen=True)

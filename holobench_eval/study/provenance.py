@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import UserError
+from ..core.files import read_text
 from ..core.installed import __version__, installed
 from ..core.io import now, write_atomically
 from . import isolation
@@ -24,6 +25,7 @@ from .versions import HARNESS
 
 PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "scikit-image", "kornia", "torchmetrics")
 FILE = "provenance.json"
+MOST_BYTES = 2_000_000
 
 
 def text_digest(text: str) -> str:
@@ -132,7 +134,7 @@ def _write(output: Path, provenance: dict[str, Any]) -> dict[str, Any]:
 def read(output: Path) -> dict[str, Any]:
     """The provenance of an output folder, empty if there is none yet."""
     try:
-        content = json.loads((output / FILE).read_text(encoding="utf-8"))
+        content = json.loads(read_text(output / FILE, MOST_BYTES))
     except FileNotFoundError:
         return {}
     except (ValueError, RecursionError) as error:

@@ -17,6 +17,7 @@ from pydantic import FiniteFloat, StringConstraints, TypeAdapter, ValidationErro
 from typing_extensions import TypedDict  # pydantic takes that of Python from 3.12 on alone
 
 from ..core.errors import UserError
+from ..core.files import read_regular
 from ..core.hashing import canonical, digest
 from ..core.io import TEMPORARY, file_name, write_atomically
 from . import identity, isolation
@@ -149,14 +150,13 @@ class Store:
         """The record of a cell, None if there is none. UserError for a file that is not that record."""
         path = self.path(identity)
         try:
-            with path.open("rb") as file:
-                text = file.read(MOST_BYTES + 1)
-            content = json.loads(text) if len(text) <= MOST_BYTES else None
+            content = json.loads(read_regular(path, MOST_BYTES))
             canonical(content)
         except FileNotFoundError:
             return None
         except (OSError, ValueError, RecursionError, UserError) as error:
-            raise UserError(f"{path}: unreadable record ({error}); {AGAIN}") from error
+            why = str(error).removeprefix(f"{path}: ")
+            raise UserError(f"{path}: unreadable record ({why}); {AGAIN}") from error
         return _checked(path, identity, content)
 
     def remove(self, identities: Iterable[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from ..core.plugins import params_of
 from ..core.seeds import generator
 from ..display import CalibratedBench, MeteredDisplay, load_profile
 from ..display.api import from_numpy, is_plain, type_name
+from ..display.training import TrainingBench, TrainingImage, Value
 from ..display.traits import traits_of
 from ..study.opening import open_bench
 from ..study.versions import method_version
@@ -28,20 +30,22 @@ def check_method(method: Any) -> None:
     AssertionError, with a sentence on what is wrong, unless it is a frozen dataclass with plain parameters, turns
     intensity ``(B, C, h, w)`` into a finite phase ``(B, C, H, W)`` for one and several images and for one and three
     colours (for three alone if it has a camera), gives the same phase for the same seed, leaves its target alone, and
-    captures only with ``camera = True``.
+    captures only with ``camera = True``. One that learns is prepared first, with three smooth images.
     """
     cls = method if isinstance(method, type) else type(method)
     instance = _default(cls) if isinstance(method, type) else method
     _check_parameters(cls, instance)
     try:
-        camera = traits_of(cls).camera
+        traits = traits_of(cls)
     except UserError as error:
         raise AssertionError(str(error)) from error
-    bench = open_bench(load_profile("ideal"), CAMERA_PANEL if camera else PLAIN_PANEL, seed=0)
-    fewest = 3 if camera else 1  # a capture is of all colours of the display
-    _check_solution(instance, bench, _target(bench, images=1, channels=3), camera)
-    _check_solution(instance, bench, _target(bench, images=2, channels=fewest), camera)
-    _check_repeatable(instance, bench, _target(bench, images=2, channels=fewest))
+    photographs = traits.camera or traits.trains
+    bench = open_bench(load_profile("ideal"), CAMERA_PANEL if photographs else PLAIN_PANEL, seed=0)
+    learned = _learned(instance, bench) if traits.trains else None
+    fewest = 3 if photographs else 1  # a capture is of all colours of the display
+    _check_solution(instance, bench, _target(bench, images=1, channels=3), learned)
+    _check_solution(instance, bench, _target(bench, images=2, channels=fewest), learned)
+    _check_repeatable(instance, bench, _target(bench, images=2, channels=fewest), learned)
 
 
 def _default(cls: type[Any]) -> Any:
@@ -78,10 +82,33 @@ def _target(bench: CalibratedBench, images: int, channels: int) -> Tensor:
     return target.clamp(0, 1)
 
 
-def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, camera: bool) -> None:
+class _NoMemory:
+    """Of a training that nobody resumes."""
+
+    def load(self, name: str) -> None:
+        return None
+
+    def save(self, name: str, value: Value) -> None:
+        pass
+
+    def log(self, row: Mapping[str, float | int | str]) -> None:
+        pass
+
+
+def _learned(method: Any, bench: CalibratedBench) -> Mapping[str, Any]:
+    name = type(method).__name__
+    assert callable(getattr(method, "prepare", None)), f"{name} declares trains = True, but has no method 'prepare'"
+    targets = _target(bench, images=3, channels=3)
+    images = [TrainingImage(f"image {number}", target) for number, target in enumerate(targets)]
+    learned = method.prepare(TrainingBench(bench, name, images[:2], images[2:], _NoMemory(), None, seed=0))
+    assert isinstance(learned, Mapping), f"{name}.prepare returned {type_name(learned)}, not a mapping of tensors"
+    return learned
+
+
+def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, learned: Mapping[str, Any] | None) -> None:
     name, before = type(method).__name__, target.clone()
     shape = (*target.shape[:2], *bench.spec.shape)
-    phase, handle = _solve(method, bench, target)
+    phase, handle = _solve(method, bench, target, learned)
     assert is_plain(phase), (
         f"{name}.solve returned {type_name(phase)}, not a plain torch.Tensor or a NumPy array of float32 or float64"
     )
@@ -89,15 +116,19 @@ def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, camera:
     assert phase.is_floating_point(), f"{name}.solve returned {phase.dtype}, not a phase in radians"
     assert bool(phase.isfinite().all()), f"{name}.solve returned a phase with NaN or infinite values"
     assert torch.equal(target, before), f"{name}.solve changed its target; clone it first"
-    assert camera or handle.captures == 0, f"{name} captures, but declares no camera; set camera = True"
+    declared = traits_of(method).camera or handle.captures == 0
+    assert declared, f"{name} captures, but declares no camera; set camera = True"
 
 
-def _check_repeatable(method: Any, bench: CalibratedBench, target: Tensor) -> None:
-    (first, _), (again, _) = _solve(method, bench, target), _solve(method, bench, target)
+def _check_repeatable(method: Any, bench: CalibratedBench, target: Tensor, learned: Mapping[str, Any] | None) -> None:
+    (first, _), (again, _) = (_solve(method, bench, target, learned) for _ in range(2))
     assert torch.equal(first, again), f"{type(method).__name__}.solve is not repeatable; draw from bench.generator(...)"
 
 
-def _solve(method: Any, bench: CalibratedBench, target: Tensor) -> tuple[Any, MeteredDisplay]:
-    handle = bench.for_method(method, type(method).__name__, target[0], item="contract", repeat=0)
+def _solve(
+    method: Any, bench: CalibratedBench, target: Tensor, learned: Mapping[str, Any] | None
+) -> tuple[Any, MeteredDisplay]:
+    name = type(method).__name__
+    handle = bench.for_method(method, name, target[0], item="contract", repeat=0, learned=learned)
     torch.seed()  # another one at every call: it shows up a method that draws from the global generator
     return from_numpy(method.solve(target, handle)), handle

@@ -5,18 +5,23 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import torch
 
+from holobench_eval.commands import app
 from holobench_eval.commands.new_method import write_method
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.study.opening import open_bench
 
+KINDS = ("method", "camera", "trains")
 
-def test_a_new_method_passes_its_own_test(tmp_path: Path) -> None:
-    _, test, _ = write_method("quiet_phase", tmp_path / "mine")
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_method_passes_its_own_test(kind: str, tmp_path: Path) -> None:
+    _, test, _ = write_method("quiet_phase", tmp_path / "mine", kind)
     runpy.run_path(str(test))["test_quiet_phase_keeps_the_contract"]()
 
 
@@ -38,13 +43,42 @@ def test_a_new_method_gets_nearer_to_its_target_with_every_step(tmp_path: Path) 
     assert error(60) < error(10) < error(1)
 
 
-def test_a_new_method_is_clean(tmp_path: Path) -> None:
-    write_method("quiet_phase", tmp_path)
+STUDY = """\
+title: Methods that have just been written
+display: {profiles: [leto-2020], panel: [144, 144]}
+targets: {dataset: photographs, params: {names: [coffee]}}
+training: {params: {count: 7}, held_out: 1}
+protocol: {metrics: [psnr]}
+methods:
+  - {name: wirtinger, params: {iterations: 50}}
+  - {name: "sees.py:Sees", label: limited, captures: 8, params: {captures: 20}}
+  - {name: "learns.py:Learns", label: learned}
+"""
+
+
+def test_new_methods_that_capture_or_learn_run_in_a_study_and_gain_by_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_method("sees", tmp_path, "camera")
+    write_method("learns", tmp_path, "trains")
+    Path("study.yaml").write_text(STUDY)
+    app(["run", "study.yaml", "--executor", "serial"], standalone_mode=False)
+    rows = pd.read_csv("holoeval-results/study/records.csv").set_index("label")
+    assert list(rows.loc[["wirtinger", "limited", "learned"], "captures"]) == [0, 8, 0]
+    assert rows.loc["learned", "training_captures"] == 6 + 1
+    assert (rows.loc[["limited", "learned"], "psnr_linear_db"] > rows.loc["wirtinger", "psnr_linear_db"]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_method_is_clean(kind: str, tmp_path: Path) -> None:
+    write_method("quiet_phase", tmp_path, kind)
     done = subprocess.run(
         [sys.executable, "-m", "ruff", "check", "--isolated", "--line-length", "120", str(tmp_path)],
         capture_output=True,
         text=True,
         check=False,
+        cwd=tmp_path,  # where the package is not the user's own
     )
     assert done.returncode == 0, done.stdout
 

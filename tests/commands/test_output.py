@@ -8,9 +8,18 @@ from typing import Any
 
 import pytest
 from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
 from holobench_eval.commands import _plain
-from holobench_eval.commands.output import MOST_REASONS, headline_table, print_answer, print_headline, print_holes
+from holobench_eval.commands.output import (
+    MOST_REASONS,
+    console,
+    headline_table,
+    print_answer,
+    print_headline,
+    print_holes,
+)
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.answers import kind_of
 from holobench_eval.report.data.phrases import marked
@@ -109,3 +118,15 @@ def test_many_reasons_are_cut_and_a_study_without_holes_has_no_such_line(records
         for letter in "abcdefghijklmnopqrstuvwxyz"
     ]
     assert printed(found([*done, *holes]))[-1] == f"  and {26 - MOST_REASONS} more reasons, in details.md"
+
+
+def test_no_text_can_control_the_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    table = Table("label\x1b[2J", title="a title\x1b]0;x\x07")
+    table.add_row("row\x9b1m", style="bold")
+    for printed in (table, "two\nlines\x1b[1A", Text("text\u202e")):
+        console().print(printed, markup=False, highlight=False)
+    shown = capsys.readouterr().out
+    assert shown.replace("\n", "").isprintable()
+    for text in ("label?[2", "a title?]0;x", "row?1m", "two\nlines?[1A", "text?"):
+        assert text in shown

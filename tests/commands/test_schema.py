@@ -35,6 +35,8 @@ BEYOND = (
     ("baseline: GS", "baseline: gs"),
     ("GS: {psnr", "gS: {psnr"),
     ("rows: {GS", "beside: idael, rows: {GS"),
+    ("params: {iterations: 12}", "grid: {iterations: [3, 3]}"),
+    ('label: "GS"', "grid: {iterations: [3]}"),
     ("repeats: 2", "protocol: {lpips_weights: no.pth}"),
     ("headline: ssim_srgb", "headline: ms_ssim_linear"),
     ("repeats: 2", "protocol: {metrics: [psnr]}"),
@@ -71,6 +73,7 @@ def test_a_mistake_of_structure_does_not_fit(known: dict[str, Any], old: str, ne
         "{name: hil, params: {retrieval: {step: 0}}}",
         "{name: sgd, params: {privileged: true}}",
         "{params: {iterations: 3}}",
+        "{name: hil, grid: {retrieval: [{step: 0.1}, {step: 0}]}}",
     ],
 )
 def test_parameters_are_those_of_the_method(known: dict[str, Any], text: str) -> None:

@@ -25,6 +25,16 @@ aliases and no duplicate keys. `null` stands for a value that is not there. `hol
 config may use, `holoeval list NAME` the parameters of a method or dataset, which `params` sets. `--set` gives a value
 of a run on the [command line](start/first-run.md#a-part-of-a-study-or-a-variant).
 
+## A grid of parameters
+
+`grid` has lists of values of parameters, and gives a row for each combination. Its values end the row's label, which is
+the one that `baseline`, `question` and `--methods` name, such as `wirtinger, iterations 10, step 0.5`:
+
+```yaml
+methods:
+  - {name: wirtinger, grid: {iterations: [10, 50], step: [0.5, 1]}}   # four rows
+```
+
 ## Where paths start
 
 - Code, `mine.py:Name`, and YAML files of profiles: in the folder of the config, and where it has none, in the working

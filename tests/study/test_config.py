@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.study.changes import Changes
 from holobench_eval.study.config import load_study
 
 DATASETS = """
@@ -66,6 +67,21 @@ def test_a_complete_config_becomes_a_study(tmp_path: Path) -> None:
     assert study.text == FULL
 
 
+def test_a_grid_is_a_row_for_each_combination(tmp_path: Path) -> None:
+    grid = "{name: wirtinger, params: {loss: huber}, grid: {iterations: [10, 50], step: [0.5, 1e-3]}}"
+    text = FULL.replace("- wirtinger", f"- {grid}").replace(
+        "baseline: GS", "baseline: wirtinger, iterations 50, step 0.5"
+    )
+    study = load_study(write(tmp_path, text))
+    expected = [(10, 0.5), (10, 0.001), (50, 0.5), (50, 0.001)]
+    assert study.labels == (*(f"wirtinger, iterations {n}, step {step}" for n, step in expected), "GS")
+    params = [entry.params for entry in study.methods[:4]]
+    assert [(each["iterations"], each["step"], each["loss"]) for each in params] == [(*p, "huber") for p in expected]
+    one = load_study(tmp_path / "study.yaml", Changes(methods=("wirtinger, iterations 50, step 0.5",)))
+    assert one.methods == (study.methods[2],)
+    assert load_study(tmp_path / "study.yaml", Changes(methods=("wirtinger",))).labels == study.labels[:4]
+
+
 def test_defaults_are_filled_in(tmp_path: Path) -> None:
     text = "title: t\ndisplay: {profiles: [ideal]}\ntargets: {dataset: 'sets.py:Images'}\nmethods: [wirtinger]\n"
     study = load_study(write(tmp_path, text))
@@ -111,6 +127,12 @@ CHANGES = [
     ("iterations: 12", "iterations: many", "10:64: method 'gerchberg_saxton': parameter 'iterations'"),
     ("params: {iterations: 12}", "parms: {}", "10:43: unknown key 'parms' in methods[1]; did you mean 'params'?"),
     ("profiles: [ideal]}", "profiles: [idael]}", "10:80: 'idael' is not in display.profiles; did you mean 'ideal'?"),
+    ("params: {iterations: 12}", "grid: {iteratons: [1]}", "10:50: method 'gerchberg_saxton' has no parameter"),
+    ("params: {iterations: 12}", "grid: {iterations: [1, 0]}", "10:62: method 'gerchberg_saxton': parameter"),
+    ("params: {iterations: 12}", "grid: {iterations: []}", "10:62: methods[1].grid.iterations"),
+    ("params: {iterations: 12}", "grid: {iterations: 3}", "10:62: methods[1].grid.iterations should be a list"),
+    ("params: {iterations: 12}", "grid: {iterations: [3, 3]}", "10:49: two rows are named 'GS, iterations 3'; list"),
+    ('label: "GS"', "grid: {iterations: [3]}", "10:37: 'iterations' stands in params, too; keep one of the two"),
     ('label: "GS"', 'label: "Wirtinger "', "10:37: methods[1] and methods[0] share the label 'Wirtinger ', but"),
     ('label: "GS"', "label: wirtinger", "10:37: methods[1] and methods[0] share the label 'wirtinger'"),
     ('label: "GS"', "label: floor_black", "10:37: label 'floor_black' should be"),

@@ -86,6 +86,13 @@ def test_the_table_of_a_preview_shows_sums_and_brackets(tmp_path: Path) -> None:
     assert all(word in text.getvalue() for word in ("a[b]", "34", "24", "at least 1.5", "50", "not timed", "solving"))
 
 
+def test_a_preview_of_which_nothing_was_timed_has_no_column_of_unknown_times(tmp_path: Path) -> None:
+    study, text = load_study(write_config(tmp_path)), io.StringIO()
+    Console(file=text, width=160).print(table(study, [Row("c", 1, 2, 4, 50, 0, 0, 4, None)]))
+    assert "solving" not in text.getvalue()
+    assert "not timed" not in text.getvalue()
+
+
 def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path: Path) -> None:
     study = load_study(write_config(tmp_path))
     rows = [

@@ -107,6 +107,17 @@ class Flagged(Good):
     privileged: bool = True
 
 
+@dataclass(frozen=True)
+class Unprepared(Good):
+    trains: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class Untidy(Unprepared):
+    def prepare(self, bench: Any) -> Any:
+        return [bench.photograph(torch.zeros(3, *bench.spec.shape), bench.images[0])]
+
+
 @pytest.mark.parametrize("method", [Good, Good(2.0), Bare, Array, Photographing])
 def test_a_method_that_keeps_the_contract_passes(method: Any) -> None:
     check_method(method)
@@ -124,6 +135,8 @@ def test_a_method_that_keeps_the_contract_passes(method: Any) -> None:
         (Loose, "can be changed after it was made"),
         (Needy, "default for every parameter"),
         (Flagged, "must be a ClassVar"),
+        (Unprepared, "has no method 'prepare'"),
+        (Untidy, "prepare returned list, not a mapping"),
         (int, "not a dataclass"),
     ],
 )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...core.errors import UserError
+from ...core.errors import UserError, one_line
 from ...core.installed import as_typed
 from ..options import Learned
 from . import committed
@@ -34,9 +34,9 @@ def check(
     if rerun:
         problems += rerun_in(folder, rerun, seed, artifacts, print)
     for problem in problems:
-        print(problem)
+        print(one_line(problem))
     for line in _earlier(folder):
-        print(line)
+        print(one_line(line))
     print(f"{reports} report{'s' * (reports > 1)}, {len(problems)} problem{'s' * (len(problems) != 1)}")
     if problems:
         raise typer.Exit(1)
@@ -87,7 +87,7 @@ def _problems(report: Path) -> Iterator[str]:
 
 def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]:
     """What is different from when the report was made, of which its provenance is ``known``."""
-    from ...report import difference, layout_of, read_records, recompute_files
+    from ...report import difference, layout_of, read_records, recompute_files, records_text
     from ...study.displays import displays
     from ...study.identity import parted, versions
     from ...study.plan import plan
@@ -101,7 +101,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     for name, version in dict(known["scores"]).items():
         if name not in versions() or parted(version)[1] != parted(versions()[name])[1]:
             yield f"'{name}' was of version {version}, is now of {versions().get(name)}; score its captures again"
-    records = (report / "records.csv").read_text(encoding="utf-8")
+    records = records_text(report / "records.csv")
     if differs := difference(read_records(records), plan(study)):
         yield f"{differs}: the study or the code has changed; run the study again"
         return

@@ -57,9 +57,9 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
 
 def _committed(grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:
     """The records of a committed records.csv. UserError: it has other cells than the study plans now."""
-    from ...report import committed_records, difference, read_records
+    from ...report import committed_records, difference, read_records, records_text
 
-    frame = read_records(path.read_text(encoding="utf-8"))
+    frame = read_records(records_text(path))
     if differs := difference(frame, grid):
         changed = "the study or the code has changed"
         raise UserError(f"{path.parent}: {differs} ({changed}); {again} computes them")

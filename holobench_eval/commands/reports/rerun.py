@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from ...core.errors import UserError
+from ...core.errors import UserError, listed
 from ...core.panels import is_small
 from ..options import thread_count
 from . import committed
@@ -215,7 +215,7 @@ def _notes(cells: Sequence[Planned], obstacles: Mapping[str, str]) -> Iterator[s
     """A line for every reason, with the methods that it holds for."""
     for why in dict.fromkeys(obstacles.values()):
         kept = [each for each in cells if obstacles.get(each.cell.id) == why]
-        labels = ", ".join(dict.fromkeys(each.task.label for each in kept))
+        labels = listed(dict.fromkeys(each.task.label for each in kept))
         yield f"not rerun: {labels} ({len(kept)} cell{'s' * (len(kept) > 1)}): {why}"
 
 

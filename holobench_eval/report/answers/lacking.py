@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...core.errors import listed
 from ...study.folders.remedies import remedies
 from ..data.results import Results
 from ..data.text import FILES
@@ -73,4 +74,4 @@ def _with_fewer(results: Results, lacks: Lacks, way: str) -> str:
 
 def _first(names: list[str], most: int) -> str:
     more = len(names) - most
-    return f"{', '.join(names[:most])}{f' and {more} more' if more > 0 else ''}"
+    return f"{listed(names[:most])}{f' and {more} more' if more > 0 else ''}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...core.errors import listed
 from ..data.categories import OFFLINE, ONLINE
 from ..data.phrases import difference
 from ..data.results import Results
@@ -15,11 +16,14 @@ from .kind import Kind, subjects
 
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
 OWN = ("refocus", "other_plane", *REMEDIES)  # kinds of which the answer tells the baseline's loss, one by one
+SEEING = (*OFFLINE, ONLINE)  # all categories but that of the oracles
+ALWAYS = "before any change and at both ends of each"
 MOST = 3  # methods that the answer follows
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """How far a lens moves the picture, what a remedy recovers, and worst losses and leads of those in question."""
+    """How far a lens moves the picture, what a remedy recovers, who leads where the question names no method, and worst
+    losses and leads of those in question."""
     found = [sweep for sweep in sweeps(results) if sweep.methods]
     for kind in dict.fromkeys(sweep.swept.kind for sweep in found):
         same = [sweep for sweep in found if sweep.swept.kind == kind]
@@ -30,9 +34,27 @@ def sentences(results: Results) -> Iterator[str]:
             yield from _worst(results, same, results.layout.baseline)
         for remedy in REMEDIES.get(kind, ()):
             yield from _recovered(results, same, [sweep for sweep in found if sweep.swept.kind == remedy])
+    if not subjects(results):
+        yield from _leaders(results, found)
     for label in _followed(results):
         yield from _worst(results, found, label)
     yield from _leads(results, found)
+
+
+def _leaders(results: Results, found: list[Sweep]) -> Iterator[str]:
+    """The best of several methods before any change, and at both ends of every sweep over numbers."""
+    parts = []
+    for before in dict.fromkeys(sweep.swept.before for sweep in found):
+        ranked, ends = results.ranking(before, categories=SEEING), dict[str, list[str]]()
+        for sweep in (sweep for sweep in found if sweep.swept.before == before and sweep.kind.nominal is not None):
+            for value, condition in dict.fromkeys((sweep.swept.points[0], sweep.swept.points[-1])):
+                for label in results.ranking(condition, categories=SEEING)[:1]:
+                    ends.setdefault(label, []).append(f"{value_text(sweep, value)} ({sweep.kind.words})")
+        if len(ranked) > 1 and ends:
+            others = [f"{label} at {words(places)}" for label, places in ends.items() if label != ranked[0]]
+            parts.append(f"on {before} {ranked[0]} {f'before any change, {listed(others)}' if others else ALWAYS}")
+    if parts:
+        yield f"The best mean {results.headline.heading}: {'; '.join(parts)}."
 
 
 def _followed(results: Results) -> list[str]:
@@ -43,7 +65,7 @@ def _followed(results: Results) -> list[str]:
     layout, condition = results.layout, results.conditions[0]
     if set(OWN) & {swept.kind for swept in layout.sweeps}:
         return subjects(results)[:MOST]
-    chosen = subjects(results) or results.ranking(condition, categories=(*OFFLINE, ONLINE))[:1]
+    chosen = subjects(results) or results.ranking(condition, categories=SEEING)[:1]
     return list(dict.fromkeys([*chosen, *([layout.baseline] if layout.baseline else [])]))[:MOST]
 
 

@@ -13,7 +13,7 @@ from ..data.tables import csv_text
 from ..data.text import words
 from ..markdown import Markdown, blocks, heading
 from ..markdown import table as markdown_table
-from .paired import Comparison, Row
+from .paired import EQUAL, Comparison, Row
 from .runs import provenance_differences
 
 TARGETS = 10  # that changed most, in the list
@@ -81,19 +81,21 @@ def _differences(comparison: Comparison) -> Part:
         verdict: sum(row.verdict == verdict for row in rows) for verdict in dict.fromkeys(r.verdict for r in rows)
     }
     found = words([f"{count} {verdict}" for verdict, count in counts.items()])
+    changed = [row for row in rows if row.verdict != EQUAL]
+    unlisted = ", in which no target has changed and which are not listed" if len(changed) < len(rows) else ""
     same = "all" if comparison.unchanged == comparison.cells else f"{comparison.unchanged}"
     sentence = (
         f"A is {comparison.a.folder}, B is {comparison.b.folder}. Differences of {score.heading} are B - A over the "
-        f"targets with a score in both, with 95 % intervals over clusters of targets. Rows: {found}. Worse and better "
-        "mean that the interval is clear of zero, and not shown that it is not; intervals are not adjusted for the "
-        f"number of rows, the p values in compare.csv are. Of {comparison.cells} paired cells, {same} have one "
+        f"targets with a score in both, with 95 % intervals over clusters of targets. Rows: {found}{unlisted}. Worse "
+        "and better mean that the interval is clear of zero, and not shown that it is not; intervals are not adjusted "
+        f"for the number of rows, the p values in compare.csv are. Of {comparison.cells} paired cells, {same} have one "
         "identity in both runs: the same settings, target, display and declared versions of the code."
     )
     protocols = [words(sorted(set(map(str, run.records.get("protocol", ()))))) for run in (comparison.a, comparison.b)]
     if protocols[0] != protocols[1]:
         sentence += f" A is scored by metric protocol {protocols[0]} and B by {protocols[1]}."
     headings = ("method", "display", "targets", "A", "B", "B - A", "verdict")
-    return Part("Differences", sentence, headings, tuple(_difference(row, score) for row in rows))
+    return Part("Differences", sentence, headings, tuple(_difference(row, score) for row in changed))
 
 
 def _difference(row: Row, score: Score) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from ..data.tables import DONE, clusters_in, score_columns
 from .runs import CELL, Run
 
 A, B = "_in_a", "_in_b"  # ends of the columns of paired cells
+EQUAL = "equal"  # the verdict of rows in which no target has changed
 OWN = "own_display"  # the name of a display in its run, where it is paired with another
 
 
@@ -49,7 +50,7 @@ class Row:
         ``equal``: no target has changed; ``too few clusters``: there is no interval.
         """
         if not np.any(self.b - self.a):
-            return "equal"
+            return EQUAL
         if np.isnan(self.change.low):
             return "too few clusters"
         return ("better" if self.gain > 0 else "worse") if self.change.is_clear else "not shown"
@@ -89,8 +90,9 @@ class Unpaired:
 class Comparison:
     """Two runs by one score.
 
-    rows: regressions first; unpaired: what only one of them has; cells, unchanged: paired cells, and those of them with
-    one identity in both runs, so that only the machine and undeclared changes of the code can make a difference.
+    rows: regressions first, equal ones last; unpaired: what only one of them has; cells, unchanged: paired cells, and
+    those of them with one identity in both runs, so that only the machine and undeclared changes of the code can make a
+    difference.
     """
 
     a: Run
@@ -150,7 +152,7 @@ def compare(a: Run, b: Run, metric: str | None = None, displays: Mapping[str, st
     clusters = clusters_in(b.records) | clusters_in(a.records)
     groups = both.groupby(["label", f"{OWN}{A}", f"{OWN}{B}"], sort=False)
     rows = _tested([_row(group, score, clusters) for _, group in groups], clusters)
-    rows.sort(key=lambda row: (row.verdict != "worse", row.gain))
+    rows.sort(key=lambda row: (row.verdict == EQUAL, row.verdict != "worse", row.gain))
     unpaired = (*_unpaired("A", first, second), *_unpaired("B", second, first))
     unchanged = int((both[f"cell{A}"] == both[f"cell{B}"]).sum())
     return Comparison(a, b, score, tuple(rows), unpaired, len(both), unchanged)

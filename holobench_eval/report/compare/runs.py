@@ -9,9 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from ...core.errors import UserError
+from ...core.errors import UserError, one_line
 from ...study import provenance
-from ..data.tables import read_records
+from ..data.tables import read_records, records_text
 
 # What names a cell in records.csv whatever code computed it: the same in two runs of a study.
 CELL = ("label", "condition", "target", "repeat")
@@ -32,11 +32,9 @@ class Run:
 def read_run(folder: Path) -> Run:
     """Read a report. UserError: the folder holds no records.csv, or one that names a cell twice."""
     try:
-        text = (folder / "records.csv").read_text(encoding="utf-8")
+        text = records_text(folder / "records.csv")
     except (FileNotFoundError, NotADirectoryError):
         raise UserError(f"{folder}: no records.csv in this folder; expected the folder of a report") from None
-    except ValueError as error:
-        raise UserError(f"{folder}: {error}") from None
     return Run(folder, records_of(folder, text), provenance.read(folder))
 
 
@@ -64,10 +62,10 @@ def provenance_differences(a: Run, b: Run) -> list[tuple[str, str, str]]:
 def _facts(known: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for name in (*_FACTS, "gpu", "threads"):
         if known.get(name) is not None:
-            yield name.replace("_", " "), str(known[name])
+            yield name.replace("_", " "), one_line(str(known[name]))
     for group, entries in (("package", known.get("packages")), ("display", known.get("profiles"))):
         for name, value in entries.items() if isinstance(entries, Mapping) else ():
-            yield f"{group} {name}", _version(value)
+            yield one_line(f"{group} {name}"), one_line(_version(value))
 
 
 def _version(value: Any) -> str:

@@ -10,12 +10,14 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Container, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ...core.errors import UserError
+from ...core.files import CONTROLS, read_text
 from ...study.plan import FLOORS, REFERENCE, Plan
 from . import columns
 from .categories import FLOOR, ORACLE
@@ -26,6 +28,7 @@ from .scores import order_scores, parse
 from .statistics import mean_interval
 
 PUBLISHED = "reported_"  # how columns of published figures begin
+MOST_BYTES = 64_000_000  # of a file of numbers of one study
 MEDIAN = "_median"  # the statistic of the headline beside its mean
 _EXACT = 2.0**53  # below it every whole number is a float
 # Text that a spreadsheet would run as a formula, after any apostrophes, which this module puts before it.
@@ -191,14 +194,22 @@ def _guarded(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value
 
 
+def records_text(path: Path) -> str:
+    """The text of a records.csv. UserError: no regular file, too large for a study's, or not UTF-8."""
+    return read_text(path, MOST_BYTES)
+
+
 def read_records(text: str) -> pd.DataFrame:
-    """The records frame from the text of records.csv."""
+    """The records frame from the text of records.csv. UserError: it is none, or a text would control a terminal."""
     frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     listed = columns.recorded()
     lacking = sorted(column.name for column in listed if column.kept is None and column.name not in frame)
     if lacking:
         raise UserError(f"records.csv lacks the columns {', '.join(lacking)}; it was written by another version")
     texts = [column.name for column in listed if column.kind == "text" and column.name in frame]
+    for name in texts:
+        for value in filter(CONTROLS.search, frame[name].unique()):
+            raise UserError(f"records.csv, column {name}: {value[:60]!r} holds control characters; take them out")
     frame[texts] = frame[texts].replace(GUARDED, r"\1", regex=True)
     for name in frame.columns.drop(texts):
         try:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ...core.errors import listed
 from ...study.folders import FILES as FILES
 from .statistics import Estimate
 
@@ -31,8 +32,8 @@ def _value(value: Any) -> str:
 
 
 def words(names: list[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    """``a``, ``a and b``, ``a, b and c``; ``a, x; and b`` where a name holds a comma."""
+    return listed(names, "and")
 
 
 def number(value: float) -> str:

@@ -24,13 +24,12 @@ from ..data.categories import CALIBRATED, CATEGORIES, ONLINE, ORACLE
 from ..data.layout import Layout, network_of
 from ..data.results import Results
 from ..data.scores import METRICS, Score, parse
-from ..data.tables import GUARDED, clusters_in, score_columns
+from ..data.tables import GUARDED, clusters_in, records_text, score_columns
 from . import checks
 from .checks import LONGEST, NAMES, RECORDS, folded
 
 TABLE: Final = "table.csv"
 TESTS: Final = "tests.csv"
-MOST_BYTES, MOST_FACTS = 64_000_000, 2_000_000  # of a file of numbers, and of a provenance
 BY = "by"  # the key of a provenance that says whose results they are
 OWN = "own"  # how the site calls results of whoever makes it
 TEXTS = ("measure", "parameters", *NAMES)
@@ -96,8 +95,8 @@ def _is_report(folder: Path) -> bool:
 def read(folder: Path, own: Path) -> Source:
     """Take in a folder. own: below it are own reports. UserError: what is wrong, and what would be right."""
     _check_file(folder / RECORDS)
-    _check_file(folder / provenance.FILE, MOST_FACTS)
-    known, text = _known(folder), _text(folder / RECORDS)
+    _check_file(folder / provenance.FILE)
+    known, text = _known(folder), records_text(folder / RECORDS)
     raw = _raw(folder / RECORDS, text)
     by = _whose(folder, known, own)
     checks.check_names(folder, raw)
@@ -123,12 +122,10 @@ def read(folder: Path, own: Path) -> Source:
     return Source(folder, folder.resolve().name, by, results, measure, _panels(frame), known, parameters, changed)
 
 
-def _check_file(path: Path, most: int = MOST_BYTES) -> None:
+def _check_file(path: Path) -> None:
     if path.is_symlink() or not path.is_file():
         what = "a link" if path.is_symlink() else "missing"
         raise UserError(f"{path}: {what}; a folder of results holds {RECORDS} and {provenance.FILE} as files")
-    if path.stat().st_size > most:
-        raise UserError(f"{path}: more than {most // 10**6} MB; expected that of one study")
 
 
 def _known(folder: Path) -> dict[str, Any]:
@@ -139,13 +136,6 @@ def _known(folder: Path) -> dict[str, Any]:
         wrong = "nested too deeply, not Unicode, or not finite"
         raise UserError(f"{folder / provenance.FILE}: {wrong}; expected that of 'holoeval run'") from None
     return known
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise UserError(f"{path}: not UTF-8 ({error}); write it with 'holoeval report'") from None
 
 
 def _raw(path: Path, text: str) -> pd.DataFrame:
@@ -199,7 +189,7 @@ def _tested(folder: Path, frame: pd.DataFrame) -> tuple[Score, str | None]:
         return first, None
     _check_file(path)
     try:
-        tests = pd.read_csv(io.StringIO(_text(path)), dtype=str, keep_default_na=False)
+        tests = pd.read_csv(io.StringIO(records_text(path)), dtype=str, keep_default_na=False)
         tests = tests.replace(GUARDED, r"\1", regex=True)
         pairs = {(str(a), str(b)) for a, b in zip(tests["metric"], tests["baseline"], strict=True)}
     except (ValueError, KeyError) as error:
@@ -255,7 +245,7 @@ def _parameters(folder: Path) -> dict[str, str]:
     if not path.exists():
         return {}
     _check_file(path)
-    table = _raw(path, _text(path))
+    table = _raw(path, records_text(path))
     if not {"label", "parameters"} <= set(table):
         return {}
     return {str(label): str(text) for label, text in zip(table["label"], table["parameters"], strict=True)}

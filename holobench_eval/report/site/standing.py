@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.errors import listed
 from ...study.plan import REFERENCE
 from ...study.versions import HARNESS
 from ..data.categories import ORACLE
@@ -79,7 +80,7 @@ class Row:
     @property
     def whose(self) -> str:
         """Whose result it is."""
-        return ", ".join(dict.fromkeys(source.by or OWN for source in self.sources))
+        return listed(dict.fromkeys(source.by or OWN for source in self.sources))
 
     @property
     def contestant(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from ...core.errors import UserError, suggest
+from ...core.errors import UserError, listed, suggest
 from ...lab.counts import NUMBERS, RAW_SUFFIXES
 from ...lab.dark import Dark
 from .exposure import NAMES
@@ -147,4 +147,4 @@ def _notes(
 def named(names: list[str]) -> str:
     """The first of several names, and how many more there are."""
     more = len(names) - NAMED
-    return f"{', '.join(names[:NAMED])}{f' and {more} more' if more > 0 else ''}"
+    return f"{listed(names[:NAMED])}{f' and {more} more' if more > 0 else ''}"

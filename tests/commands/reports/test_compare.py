@@ -71,3 +71,33 @@ def test_bad_input_is_one_line_and_exit_code_2(
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.usefixtures("worse")
+def test_equal_rows_are_counted_and_the_others_come_first(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    better = {("fine", "bench"): [20.0, 21.0, 22.1, 23.2]}
+    equal = {(f"kept {number}", "bench"): BASE for number in range(21)}
+    write_report(Path("a"), equal | {("fine", "bench"): BASE})
+    write_report(Path("b"), equal | better)
+    assert holoeval(monkeypatch, "compare", "a", "b", "--output", "out") == 0
+    shown = capsys.readouterr().out
+    assert "1 not shown and 21 equal, in which no target has changed and which are not listed" in shown
+    assert "fine" in shown
+    assert "kept" not in shown
+    assert "kept" not in Path("out/compare.md").read_text()
+    rows = Path("out/compare.csv").read_text().splitlines()
+    assert rows[1].startswith("fine")
+    assert sum(row.startswith("kept") for row in rows) == 21
+
+
+def test_a_provenance_cannot_control_the_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, sign in (("a", "\x1b[31m"), ("b", "\x1b[2J\n")):
+        write_report(tmp_path / name, {("toy", "bench"): BASE}, {"cpu": f"chip{sign}", "packages": {f"x{sign}": sign}})
+    assert holoeval(monkeypatch, "compare", tmp_path / "a", tmp_path / "b", "--output", tmp_path / "out") == 0
+    text = capsys.readouterr().out + (tmp_path / "out" / "compare.md").read_text()
+    assert "chip?[31m" in text
+    assert "\x1b" not in text

@@ -246,9 +246,25 @@ def test_refocusing_says_how_far_a_lens_moves_the_picture() -> None:
     means = {f"{label}@bench": 20.0 for label in loss}
     means |= {f"{label}@{name}": 20.0 - loss[label] * abs(value) for label in loss for value, name in points}
     found = results_of(means, sweeps=(Swept("refocus", "bench", points),))
-    first, second = kind_of(found).answer(found)
+    first, second, third = kind_of(found).answer(found)
     assert "at most 1 dB, from and to: on bench -2 or less to 2 or more mm (old) and nowhere (new)." in first
     assert "The largest mean loss of old is on bench +0.60 dB [+0.60, +0.60] (image moved by a lens phase" in second
+    assert third.startswith("The best mean PSNR")
+    assert third.endswith("on bench old before any change and at both ends of each.")
+
+
+def test_a_sweep_that_asks_of_no_method_names_the_leader_at_both_ends() -> None:
+    points = tuple((value, f"bench, refocus {value:g} mm") for value in (-2.0, 1.0, 2.0))
+    scores = {"old": (20, 20, 20, 20), "new": (21, 22, 20.5, 18), "third": (20.5, 17, 20, 19)}
+    names = ("bench", *(name for _, name in points))
+    means = {
+        f"{label}@{name}": float(value) for label in scores for name, value in zip(names, scores[label], strict=True)
+    }
+    found = results_of(means, sweeps=(Swept("refocus", "bench", points),))
+    text = answer(found)
+    assert "on bench new before any change, old at 2 mm (image moved by a lens phase" in text
+    asked = results_of(means, sweeps=(Swept("refocus", "bench", points),), question="What does it cost third?")
+    assert "before any change, old at" not in answer(asked)
 
 
 def ranked() -> Results:

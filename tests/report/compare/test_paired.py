@@ -31,7 +31,7 @@ def test_a_difference_is_b_minus_a_with_its_interval_over_clusters(tmp_path: Pat
     assert row.verdict == "better"
 
 
-def test_regressions_come_first_the_largest_before_the_others(tmp_path: Path) -> None:
+def test_regressions_come_first_the_largest_before_the_others_and_equal_rows_last(tmp_path: Path) -> None:
     a = {(name, "d"): BASE for name in ("up", "noisy", "same", "down", "far down")}
     changes = {"up": shifted(1), "noisy": shifted(-5, 90), "same": BASE, "down": shifted(-1), "far down": shifted(-3)}
     comparison = compared(tmp_path, a, {(name, "d"): values for name, values in changes.items()})
@@ -39,8 +39,8 @@ def test_regressions_come_first_the_largest_before_the_others(tmp_path: Path) ->
         ("far down", "worse"),
         ("down", "worse"),
         ("noisy", "not shown"),
-        ("same", "equal"),
         ("up", "better"),
+        ("same", "equal"),
     ]
 
 

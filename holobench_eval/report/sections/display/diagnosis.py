@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ....core.errors import listed
 from ....display.estimates import QUANTITIES
 from ...data.trainings import Training
 from ...markdown import Markdown, bullets, heading, table
@@ -60,7 +61,7 @@ def missing(trainings: Sequence[Training]) -> list[str]:
         if isinstance(texts, list) and all(isinstance(text, str) for text in texts):
             lists.setdefault((item.display, tuple(texts)), []).extend(item.labels)
     return [
-        f"{display} contains {'effects' if texts else 'no effect'} that {', '.join(dict.fromkeys(labels))} cannot "
+        f"{display} contains {'effects' if texts else 'no effect'} that {listed(dict.fromkeys(labels))} cannot "
         f"represent{': ' * bool(texts)}{'; '.join(texts)}."
         for (display, texts), labels in lists.items()
     ]

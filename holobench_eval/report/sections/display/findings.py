@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from ....core.errors import listed
 from ....study.plan import REFERENCE
 from ...data.categories import CALIBRATED, ONLINE
 from ...data.phrases import difference, margin, verdict
@@ -124,7 +125,7 @@ def _incomplete(results: Results, condition: str) -> list[str]:
     plain = [label for label in results.methods(condition) if label not in results.layout.privileged]
     holes = [label for label in plain if not results.is_complete(label, condition)]
     counts = [f"{label} ({int(results.row(label, condition)['n'])} of {len(results.targets)})" for label in holes]
-    return [f"Not ranked, because targets are missing: {', '.join(counts)}."] if holes else []
+    return [f"Not ranked, because targets are missing: {listed(counts)}."] if holes else []
 
 
 def _other_metrics(results: Results, condition: str) -> list[str]:
