@@ -81,4 +81,4 @@ def setup(app: Sphinx) -> None:
 
 
 def _link_examples(_: Sphinx, __: str, source: list[str]) -> None:
-    source[0] = re.sub(r"\(\.\./gallery/(plot_\w+)\.py\)", r"(../examples/\1.rst)", source[0])
+    source[0] = re.sub(r"\((\.\./|docs/)gallery/(plot_\w+)\.py\)", r"(\1examples/\2.rst)", source[0])
