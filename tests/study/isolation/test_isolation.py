@@ -451,3 +451,9 @@ def test_a_plain_script_runs_in_a_folder_with_files_named_like_modules(tmp_path:
     command = [sys.executable, "../script.py"]
     done = subprocess.run(command, cwd=tmp_path / "work", timeout=60, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.count("Mine")) == (0, 1), done.stderr
+
+
+def test_a_method_s_own_processes_know_its_file(tmp_path: Path) -> None:
+    top = "import multiprocessing\n\n\ndef half(number):\n    return number / 2"
+    body = "with multiprocessing.Pool(1) as pool:\n            assert pool.map(half, [4.0]) == [2.0]"
+    assert solved(tmp_path, body, top)["reason"] == ""
