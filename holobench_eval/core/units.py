@@ -35,6 +35,8 @@ class Metres(Check):
     --------
     >>> Metres(200e-9, 2000e-9).fault(532.0)
     '532 is not in 200e-9 to 2e-6 m; lengths are in metres: 532e-9'
+    >>> Metres(1e-3, 10.0).fault(2000000.0)
+    '2000000 is not in 1e-3 to 10 m; lengths are in metres: 2000000e-6'
     """
 
     low: float
@@ -45,8 +47,8 @@ class Metres(Check):
         if self.low <= value <= self.high:
             return ""
         meant = (power for power in POWERS if self.low <= value * 10.0**power <= self.high)
-        remedy = next((f"; lengths are in metres: {value:g}e{power}" for power in meant), "")
-        return f"{value:g} is not in {metres(self.low)} to {metres(self.high)} m{remedy}"
+        remedy = next((f"; lengths are in metres: {value:.10g}e{power}" for power in meant), "")
+        return f"{value:.10g} is not in {metres(self.low)} to {metres(self.high)} m{remedy}"
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> Any:
         """What pydantic asks for: the range, for editors and pages."""

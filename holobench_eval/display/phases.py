@@ -57,7 +57,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     """What is odd about a phase, told from the nominal model, on which no fault of a display hides it.
 
     A mirrored phase makes the mirrored image, so that poses cost nothing: a phase that makes its target takes one
-    propagation a colour, any other three or four.
+    propagation a colour, any other up to eight.
 
     Parameters
     ----------

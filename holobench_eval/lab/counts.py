@@ -83,6 +83,9 @@ def _counts(values: NDArray[Any], **facts: bool) -> Counts:
 
 def _planes_last(values: NDArray[Any], largest: int) -> NDArray[Any]:
     """Numbers ``(H, W)`` or ``(H, W, 3)``, from an array that may have its colours first, or a single one."""
+    values = values.astype(
+        values.dtype.newbyteorder("="), copy=False
+    )  # numbers of another byte order have no type else
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
     if values.ndim == 3 and values.shape[2] != 3 and values.shape[0] in (1, 3):

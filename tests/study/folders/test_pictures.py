@@ -35,6 +35,11 @@ def test_sixteen_bit_tiffs_of_any_layout_have_the_same_values(tmp_path, write, w
     assert np.allclose(checked(tmp_path / "x.tif").load(), wanted / 65535, atol=1e-7)
 
 
+def test_numbers_of_another_byte_order_are_the_same_numbers(tmp_path):
+    np.save(tmp_path / "x.npy", LEVELS.astype(">u2"))
+    assert np.allclose(checked(tmp_path / "x.npy", linear=True).load(), LEVELS / 65535, atol=1e-7)
+
+
 @pytest.mark.parametrize("form", ["planar", "interleaved", "colours last", "colours first", "double"])
 def test_floating_point_is_read_over_its_highest_value(tmp_path, form):
     path = tmp_path / ("x.tif" if form in ("planar", "interleaved") else "x.npy")

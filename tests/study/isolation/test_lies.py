@@ -93,7 +93,9 @@ def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[
 
 
 def test_the_truth_is_taken(lie: Callable[[Callable[[Any], Any]], None]) -> None:
-    lie(lambda told: told)
+    asked = list[Any]()
+    lie(lambda told: asked.append(told) or told)
+    assert any(isinstance(told, dict) and told.get("name") == "Mine" for told in asked)
 
 
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in FACTS.items() for value in values])
