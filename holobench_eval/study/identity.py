@@ -31,7 +31,7 @@ from .definition import Study
 from .displays import Condition
 from .focal_stacks import INFOCUS
 from .focal_stacks import VERSION as INFOCUS_VERSION
-from .versions import GIVEN, HARNESS, PHOTOGRAPHS
+from .versions import GIVEN, GIVEN_GRAY, HARNESS, PHOTOGRAPHS
 
 Plain = dict[str, Any]
 BASIS = ("given", "target", "optics", "draw")  # entries of a phase that are not of its method
@@ -72,7 +72,8 @@ def phase(
 def basis(target: Mapping[str, Any], spec: DisplaySpec, draw: tuple[object, ...]) -> Plain:
     """The entries of a phase that are not of its method, see ``phase``."""
     optics = {name: value for name, value in asdict(spec).items() if name != "name"}
-    return _plain({"given": GIVEN, "target": dict(target), "optics": optics, "draw": list(draw)})
+    given = GIVEN if len(spec.wavelengths) > 1 else GIVEN_GRAY
+    return _plain({"given": given, "target": dict(target), "optics": optics, "draw": list(draw)})
 
 
 def display(shown_on: Condition) -> Plain:

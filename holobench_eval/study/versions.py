@@ -15,6 +15,7 @@ from ..core.errors import CellError
 # What a method is given: the pixels of its target, nominal optics, random numbers. A new version is any new text; every
 # phase is then solved again.
 GIVEN = "1"
+GIVEN_GRAY = "2: the colour that alone has light"  # on a display of one wavelength
 # Everything between a phase and its capture: simulated bench, camera, registration. With a new text every capture is
 # taken again, of phases that stay.
 HARNESS = "4: scattered light taken off before registration"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study import identity
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.versions import GIVEN, GIVEN_GRAY
 from tests.support import another_metric
 
 CONFIG = """\
@@ -249,3 +251,11 @@ def test_a_metric_that_found_nothing_to_measure_is_not_lacking() -> None:
     known = identity.versions()
     found = identity.grouped({"psnr_linear": 1.0}, {name: known[name] for name in ("psnr", "speckle_contrast")})
     assert identity.lacking(found, {"speckle_contrast": known["speckle_contrast"]}) == {}
+
+
+def test_a_display_of_one_wavelength_has_its_own_version_of_what_a_method_is_given() -> None:
+    spec = load_profile("ideal").spec((128, 128))
+    gray = replace(spec, wavelengths=spec.wavelengths[1:2])
+    given = [identity.basis({}, each, ())["given"] for each in (spec, gray)]
+    assert given == [GIVEN, GIVEN_GRAY]
+    assert len(set(given)) == 2
