@@ -307,6 +307,21 @@ class IgnoresTheEnd(Photographer):
 
 
 @dataclass(frozen=True)
+class PhotographsMoreThanOne(Photographer):
+    """In one request."""
+
+    def cheat(self, target, bench):
+        self.photographed(self.phase(target, bench).expand(64, -1, -1, -1), [bench])
+
+
+@dataclass(frozen=True)
+class PhotographsAfterItsAnswer(Photographer):
+    def cheat(self, target, bench):
+        bench._channel.send({"result": self.phase(target, bench), "seen": {}})
+        self.photographed(self.phase(target, bench)[0], [bench] * 20)
+
+
+@dataclass(frozen=True)
 class RectifiesAForgedFrame(Photographer):
     """Which would show where the camera stands, without a capture."""
 
@@ -370,6 +385,32 @@ class FinishesInAThread(Attempt):
         phase = super().phase(target, bench)
         threading.Thread(target=lambda: (time.sleep(0.3), phase.fill_(1.0)), daemon=True).start()
         return phase
+
+
+@dataclass(frozen=True)
+class FinishesInAnotherProcess(Attempt):
+    """In memory that both share."""
+
+    kind = "lies about time"
+
+    def phase(self, target, bench):
+        phase = super().phase(target, bench).share_memory_()
+        if os.fork() == 0:
+            time.sleep(0.3)
+            phase.fill_(1.0)
+            os._exit(0)
+        return phase
+
+
+@dataclass(frozen=True)
+class AnswersTwice(Attempt):
+    """The second answer is the better one, and outside the clock."""
+
+    kind = "lies about time"
+
+    def cheat(self, target, bench):
+        bench._channel.send({"result": self.phase(target, bench), "seen": {}})
+        time.sleep(0.3)
 
 
 @dataclass(frozen=True)
@@ -639,6 +680,15 @@ class SendsItsOwnResult(Attempt):
 
 
 @dataclass(frozen=True)
+class FloodsTheTerminal(Attempt):
+    kind = "poisons records"
+
+    def cheat(self, target, bench):
+        for stream in (1, 2):
+            os.write(stream, b"\x1b[2J\x1b]0;better\x07\r" * 2**10)
+
+
+@dataclass(frozen=True)
 class SendsAPickle(Attempt):
     kind, outcome, reason = "poisons records", "refused", "no answer"
 
@@ -753,6 +803,28 @@ class RunsForEver(Ender):
     def cheat(self, target, bench):
         while True:
             time.sleep(1)
+
+
+@dataclass(frozen=True)
+class ForbidsItsEnd(Ender):
+    reason = "took more than"
+
+    def cheat(self, target, bench):
+        signal.pthread_sigmask(signal.SIG_BLOCK, range(1, signal.NSIG))
+        while True:
+            with suppress(BaseException):
+                time.sleep(1)
+
+
+@dataclass(frozen=True)
+class AnswersWithoutAnEnd(Ender):
+    """A message of a million bytes, of which few come."""
+
+    reason = "took more than"
+
+    def cheat(self, target, bench):
+        os.write(bench._channel.connection.fileno(), struct.pack("!i", 10**6) + b"[")
+        time.sleep(3600)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import pytest
 from tests.cheats import attempts
 from tests.study.test_run import compute
 
-ENDLESS = ("RunsForEver", "StopsItself")
+ENDLESS = ("RunsForEver", "ForbidsItsEnd", "AnswersWithoutAnEnd", "StopsItself")
 NAMES = [
     name
     for name, value in vars(attempts).items()
