@@ -19,7 +19,7 @@ from typing import Any
 from holobench_eval.core.hashing import digest
 from holobench_eval.study.executors.processes import PRELOADED, start
 from holobench_eval.study.phases import phases_of
-from tests.faults.counts import COUNTS, reported, taken
+from tests.faults.counts import account, forget, reported, taken
 from tests.faults.life import DEVICES, SAID, SIMULATED, TRACEBACK, begin, ends, live
 from tests.faults.system import FAULTS, FAULTS_OF_DEVICES
 
@@ -32,7 +32,6 @@ TIMES = {
     "sha256",
 }  # of a record: what differs from run to run, and its digest
 CAPTURES = "captures"  # those of attempts that a fault has ended count, too; they are compared with the camera's
-CAMERA = "Mine"  # the method that has one
 
 
 @dataclass
@@ -112,8 +111,7 @@ def unfinish(folder: Path, draw: random.Random) -> None:
     for path in sorted((folder / "out/records").glob("*.json")):
         if draw.random() < 0.5:
             record = json.loads(path.read_text())
-            if record["label"] == CAMERA and record["state"] == "done":  # made again, it begins a new account
-                (folder / COUNTS / record["target"]).unlink()
+            forget(folder, account(path))  # made again, it begins a new account
             path.unlink()
             phases_of(folder / "out").path(digest(record["capture"]["phase"])).unlink(missing_ok=True)
 
@@ -148,7 +146,7 @@ def compare(folder: Path, wanted: Whole, seen: Count) -> None:
 
 def count(folder: Path, faults: int, seen: Count) -> None:
     """Compare the captures that are reported with those that the camera has counted; each fault may cost one more."""
-    for of, captures in reported(folder, CAMERA).items():
+    for of, captures in reported(folder).items():
         surplus = captures - taken(folder, of)
         seen.counted += 1
         seen.surplus += int(max(0, surplus))

@@ -11,6 +11,7 @@ from holobench_eval.study.artifacts import progress, provenance_of
 
 COUNTS = Path("counts")  # files with a line for each capture, written as the camera is asked
 TRAINING = "training"
+CAMERA = "Mine"  # the method that has one
 
 
 def note(names: Sequence[object]) -> str:
@@ -29,7 +30,21 @@ def taken(folder: Path, of: str) -> int:
     return len(path.read_text().splitlines()) if path.exists() else 0
 
 
-def reported(folder: Path, label: str) -> dict[str, float]:
+def account(path: Path) -> str:
+    """What the captures were taken for whose account ends with a file of the results; empty for none."""
+    if path.suffix != ".json":
+        return ""
+    record = json.loads(path.read_text())
+    return record["target"] if record.get("label") == CAMERA and record["state"] == "done" else ""
+
+
+def forget(folder: Path, of: str) -> None:
+    """Begin a new count."""
+    if of:
+        (folder / COUNTS / of).unlink(missing_ok=True)
+
+
+def reported(folder: Path, label: str = CAMERA) -> dict[str, float]:
     """The captures in the records of a method with a camera, and in the artifact of the one training."""
     captures: dict[str, float] = {}
     for path in (folder / "out/records").glob("*.json"):

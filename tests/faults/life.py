@@ -33,7 +33,7 @@ from tests.faults.counts import note
 
 LONGEST = 300.0  # seconds that a life may take before it counts as hung
 WORKERS = 2
-TRACEBACK = 3  # how a life ends that ends with one
+REFUSED, TRACEBACK = 2, 3  # how a life ends that ends with a line, or with a traceback
 SAID = "said.txt"  # what lives print
 STEP, CAPTURES = running.step, {camera: camera.capture for camera in (BenchSession, RealSession)}
 
@@ -60,6 +60,7 @@ display: {profiles: [leto-mild], panel: [128, 160]}
 targets: {dataset: photographs, params: {count: 2}}
 training: {dataset: dead_leaves, params: {count: 4}, held_out: 1}
 protocol: {metrics: [psnr]}
+limits: {seconds: 20}
 methods:
   - double_phase
   - {name: wirtinger, params: {iterations: 5}}
@@ -119,11 +120,12 @@ def live(
         outcome = running.run(study, planned, Path("out"), chosen, watch, 1, artifacts, retry_failed=peace)
         layout = layout_of(study)
         write_files(Results(records_frame(outcome.records, layout), layout), Path("out"))
-    except (UserError, OSError):  # which the command says in one line
-        os._exit(2)
+    except (UserError, OSError) as error:  # which the command says in one line
+        print(error, flush=True)
+        os._exit(REFUSED)
     except Exception as error:
         if out_of_memory(error):  # said in one line, too
-            os._exit(2)
+            os._exit(REFUSED)
         traceback.print_exc()
         os._exit(TRACEBACK)
     os._exit(1 if outcome.failed else 0)

@@ -10,6 +10,7 @@ import json
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,9 +22,10 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from holobench_eval.study.executors.processes import start
+from holobench_eval.study.executors.processes import number_within, start
 from tests.faults import devices
-from tests.faults.life import LONGEST, WORKERS, ends, live, on_devices
+from tests.faults.counts import TRAINING, account, forget
+from tests.faults.life import LONGEST, REFUSED, SAID, WORKERS, ends, live, on_devices
 
 Told = Iterator[Any]  # the process of a life, then whether it was hit
 IMPORTS = 1.0  # seconds that a life on a Dask cluster takes to begin
@@ -69,6 +71,38 @@ def limits(limit: int, low: int, high: int) -> Callable[..., Told]:
         yield start(live, folder, "serial", {limit: round(low * (high / low) ** draw.random())})
 
     return fault
+
+
+def called(driver: BaseProcess) -> list[int]:
+    """Processes that answer calls of methods: each is of a namespace, and not its first."""
+    return [number for number in others(driver) if number_within(number) not in (0, 1, number)]
+
+
+def damaged(folder: Path, draw: random.Random, length: float) -> Told:
+    """A fault: a bit of a file of the results is another one, or the file ends early. What the run refuses by its name
+    is deleted, as the message says."""
+    kept = [path for part in ("out", "artifacts") for path in sorted((folder / part).rglob("*")) if path.is_file()]
+    for path in draw.sample(kept, min(1, len(kept))):
+        count = account(path)
+        content = bytearray(path.read_bytes()) or bytearray(1)
+        at = draw.randrange(len(content))
+        if draw.random() < 0.5:
+            del content[at:]
+        else:
+            content[at] ^= 1 << draw.randrange(8)
+        path.write_bytes(content)
+    process = start(live, folder, "serial")
+    yield process
+    process.join(LONGEST)
+    if process.exitcode == REFUSED:
+        named, _, cure = (folder / SAID).read_text().splitlines()[-1].partition(":")
+        if folder / named == path and "folder" not in cure:
+            path.unlink()
+            forget(folder, count)
+        elif folder / named in (path, path.parent):
+            shutil.rmtree(path.parent)
+            forget(folder, TRAINING)
+    yield bool(kept)
 
 
 def full_disk(folder: Path, draw: random.Random, length: float) -> Told:
@@ -164,6 +198,8 @@ FAULTS: dict[str, Any] = {
     "the run is interrupted": kills(signal.SIGINT, lambda driver: [driver.pid or 0]),
     "a worker or a method's process is killed": kills(signal.SIGKILL, others),
     "a worker or a method's process aborts": kills(signal.SIGABRT, others),
+    "a call of a method is stopped": kills(signal.SIGSTOP, called),
+    "a file of the results is damaged": damaged,
     "files have a largest size": limits(resource.RLIMIT_FSIZE, 200, 300_000),
     "few files may be open": limits(resource.RLIMIT_NOFILE, 12, 80),
     "memory is short": limits(resource.RLIMIT_DATA, 50 * 2**20, 2**31),
@@ -187,4 +223,5 @@ FAULTS_OF_DEVICES: dict[str, Any] = {
     "the camera vanishes": device("late", devices.FOREVER, devices.FOREVER),
     "the panel vanishes": device("panel", devices.FOREVER, devices.FOREVER),
     "the run on devices is killed": FAULTS["the run is killed"],
+    "a file of the results on devices is damaged": damaged,
 }
