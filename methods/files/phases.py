@@ -72,7 +72,7 @@ class Phases:
         The correction map of a panel that is in the levels, and is taken off them modulo a turn: ``file``, a picture of
         the panel's rows and columns, and ``two_pi_level``, the level of the map that is a full turn (256 unless given),
         one for all colours or one for each. It lies as the file does, before ``flip_horizontal`` and
-        ``flip_vertical``. A file of radians is refused with it.
+        ``flip_vertical``; its colours are red first. A file of radians is refused with it.
     sign : {1, -1}
         -1 for phases of the opposite convention.
     origin : float
