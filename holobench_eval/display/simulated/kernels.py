@@ -183,14 +183,14 @@ def show_row(phase: Plane, added: Plane, levels: Any, level: Any, out: Plane) ->
 def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: int, top: int, out: Plane) -> None:
     """The light of the sub-samples in rows ``first`` to ``last`` of the panel; see ``PanelLight.field``.
 
-    lit: phase, what is added to it, gain of each pixel and of the frame, shares of the neighbours ``(samples, taps)``,
-    light that follows no phase ``(samples, samples, 2)`` and incident light ``(H, 2 W)``; table: phase [rad] of each
-    gray level; out ``(samples, samples, rows, 2 W)``: the rows from ``top`` on. Complex numbers are real and imaginary
-    parts in turn.
+    lit: phase, what is added to it, gain of each pixel and of the frame, shares of the neighbours ``(2, samples,
+    taps)``, light that follows no phase ``(samples, samples, 2)`` and incident light ``(H, 2 W)``; table: phase [rad]
+    of each gray level; out ``(samples, samples, rows, 2 W)``: the rows from ``top`` on. Complex numbers are real and
+    imaginary parts in turn.
     """
     phase, added, gain, factor, taps, unmodulated, incident = lit
     height, width = phase.shape
-    samples, reach, rows = len(taps), taps.shape[1] // 2, last - first
+    samples, reach, rows = taps.shape[1], taps.shape[2] // 2, last - first
     driven, level = np.empty((rows + 2 * reach, width + 2 * reach), np.float32), np.empty(width, np.int32)
     for r in range(len(driven)):
         row, line = min(max(first + r - reach, 0), height - 1), driven[r, reach : reach + width]
@@ -204,14 +204,14 @@ def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: in
         light, place = incident[first + r], first + r - top
         for j in range(samples):
             line[:] = 0
-            for k in range(taps.shape[1]):
+            for k in range(taps.shape[2]):
                 for c in range(line.size):
-                    line[c] += taps[j, k] * driven[r + k, c]
+                    line[c] += taps[0, j, k] * driven[r + k, c]
             for i in range(samples):
                 fine[:] = 0
-                for k in range(taps.shape[1]):
+                for k in range(taps.shape[2]):
                     for c in range(width):
-                        fine[c] += taps[i, k] * line[c + k]
+                        fine[c] += taps[1, i, k] * line[c + k]
                 share, real, imaginary = modulated[j, i], unmodulated[j, i, 0], unmodulated[j, i, 1]
                 for c in range(width):
                     sine, cosine = sincos(fine[c])
@@ -228,7 +228,7 @@ def modulate_back_rows(lit: Any, slope: Plane, grad: Plane, field: Plane, first:
     """
     phase, added, gain, factor, taps, unmodulated, incident = lit
     height, width = phase.shape
-    samples, reach = len(taps), taps.shape[1] // 2
+    samples, reach = taps.shape[1], taps.shape[2] // 2
     total = np.zeros((last - first, width + 2 * reach), np.float32)
     line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
     for r in range(max(first - reach, 0), min(last + reach, height)):
@@ -241,14 +241,14 @@ def modulate_back_rows(lit: Any, slope: Plane, grad: Plane, field: Plane, first:
                     a = field[j, i, r, 2 * c] - (real * light[2 * c] - imaginary * light[2 * c + 1])
                     b = field[j, i, r, 2 * c + 1] - (real * light[2 * c + 1] + imaginary * light[2 * c])
                     fine[c] = grad[j, i, r, 2 * c + 1] * a - grad[j, i, r, 2 * c] * b
-                for k in range(taps.shape[1]):
+                for k in range(taps.shape[2]):
                     for c in range(width):
-                        line[c + k] += taps[i, k] * fine[c]
-            for k in range(taps.shape[1]):
+                        line[c + k] += taps[1, i, k] * fine[c]
+            for k in range(taps.shape[2]):
                 row = min(max(r + k - reach, 0), height - 1) - first
                 if 0 <= row < last - first:
                     for c in range(line.size):
-                        total[row, c] += taps[j, k] * line[c]
+                        total[row, c] += taps[0, j, k] * line[c]
     level = np.empty(width, np.int32)
     for r in range(last - first):
         row, seen = first + r, total[r]

@@ -29,10 +29,10 @@ Floats = NDArray[np.float32]
 class PanelLight:
     """Gray levels, look-up table, crosstalk and the light on the panel, for one line of the source.
 
-    bits: of the panel; channel: of the look-up table; weights: of the crosstalk ``(samples, taps)``; modulated,
+    bits: of the panel; channel: of the look-up table; weights: of the crosstalk ``(2, samples, taps)``; modulated,
     unmodulated: amplitude of the light of each sub-sample that follows the phase, and that does not
     ``(samples, samples, 1, 1)``; added: phase [rad] that the display adds to every hologram; lut_gain; incident:
-    complex amplitude of the light: ``(H, W)``.
+    complex amplitude of the light; lut_bend: see ``LookUpTable.bend_map``: ``(H, W)``.
     """
 
     bits: int
@@ -45,13 +45,18 @@ class PanelLight:
     added: Tensor
     lut_gain: Tensor
     incident: Tensor
+    lut_bend: Tensor | None = None
+
+    def ready(self, phase: Tensor) -> bool:
+        """Whether compiled functions can light the panel with this phase; see ``ready``."""
+        return self.lut_bend is None and ready(phase)
 
     def field(self, phase: Tensor, gain: float) -> Tensor:
         """Field ``(samples, samples, H, W)`` of the sub-samples, the carrier off, of ``phase`` ``(H, W)`` [rad].
 
         Differentiable once; gain: of the phase in this frame, relative.
         """
-        if not ready(phase.detach()):
+        if not self.ready(phase.detach()):
             return self.in_torch(phase, gain)
         light: Tensor = _Lit.apply(phase, self, gain)  # type: ignore[no-untyped-call]
         return light
@@ -59,13 +64,13 @@ class PanelLight:
     def in_torch(self, phase: Tensor, gain: float) -> Tensor:
         """``field`` by torch: the reference for compiled code, in its place where it cannot be."""
         level = straight_through_level(phase + self.added, self.bits)
-        driven = self.lut.phase(level, self.bits, self.lut_gain * gain, self.channel)
+        driven = self.lut.phase(level, self.bits, self.lut_gain * gain, self.channel, self.lut_bend)
         fine = self.crosstalk.apply(driven, self.weights).view(*self.modulated.shape[:2], *driven.shape)
         return (phasor(self.modulated, fine) + self.unmodulated) * self.incident
 
     def rows(self, phase: Tensor, gain: float) -> Light:
         """``field`` a few rows at a time, compiled and without a gradient; for a phase that is ``ready``."""
-        lit, samples = self._lit(phase, gain), len(self.weights)
+        lit, samples = self._lit(phase, gain), self.weights.shape[1]
         shares = self._curve[0], self.modulated[:, :, 0, 0].numpy()
 
         def light(rows: slice) -> Tensor:
@@ -78,7 +83,7 @@ class PanelLight:
 
     def whole(self, phase: Tensor, gain: float) -> Tensor:
         """``field``, compiled and without a gradient."""
-        lit, samples = self._lit(phase, gain), len(self.weights)
+        lit, samples = self._lit(phase, gain), self.weights.shape[1]
         field = torch.empty((samples, samples, *phase.shape), dtype=torch.complex64, device="cpu")
         shares, parts = (self._curve[0], self.modulated[:, :, 0, 0].numpy()), _planes(field)
 

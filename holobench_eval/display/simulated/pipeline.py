@@ -23,7 +23,7 @@ from ..api import Capture, DisplaySpec
 from .fused_path import quickest
 from .geometry import Geometry
 from .noise import normal
-from .panel_light import PanelLight, ready
+from .panel_light import PanelLight
 from .path import Dust, LightPath, OpticalPath, image
 from .profile import Profile
 from .stages.propagation import sample_weights
@@ -147,6 +147,7 @@ class SimulatedBench:
                 added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
                 lut_gain=profile.lut.gain_map(geometry).to(self.device),
                 incident=(math.sqrt(power) * incident).to(self.device, torch.complex64),
+                lut_bend=None if (bend := profile.lut.bend_map(geometry)) is None else bend.to(self.device),
             ),
             path=path,
         )
@@ -177,12 +178,14 @@ class SimulatedBench:
             raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
         gain = flicker * self.drift_gain
 
-        def of_line(maps: ChannelMaps) -> Tensor:
-            if ready(phase):
+        def of_line(maps: ChannelMaps, gain: float) -> Tensor:
+            if maps.light.ready(phase):
                 return maps.path.intensity(maps.light.rows(phase, gain))
             return squared_modulus(image(maps.path, maps.light.field(phase, gain)))
 
-        return reduce(add, map(of_line, self.lines[channel]))
+        moments = self.profile.flicker.moments
+        light = reduce(add, (of_line(maps, gain * moment) for maps in self.lines[channel] for moment in moments))
+        return light if len(moments) == 1 else light / len(moments)
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
         """``intensity`` as it falls on the sensor: after what spreads it, averaged over the area of a sensor pixel."""

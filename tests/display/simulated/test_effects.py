@@ -30,6 +30,19 @@ def test_an_effect_is_listed_when_it_is_switched_on() -> None:
     assert "1/1.2/1" in next(one.text for one in bent.effects() if one.name == "look_up_table")
 
 
+def test_uneven_effects_are_outside_the_form_of_the_model() -> None:
+    aged = load_profile("leto-aged")
+    uneven = replace(
+        aged,
+        lut=replace(aged.lut, bend=0.03),
+        crosstalk=replace(aged.crosstalk, ratio=1.4),
+        flicker=replace(aged.flicker, ripple=0.02),
+    )
+    more = {one.name for one in uneven.effects()} - found("leto-aged")
+    assert more == {"uneven_table", "uneven_crosstalk", "ripple"}
+    assert more.isdisjoint(FORM)
+
+
 def test_a_form_names_only_effects_that_some_display_has_or_may_have() -> None:
     everywhere = set().union(*map(found, names()))
     assert FORM - everywhere <= {"drift", "astigmatism_45", "coma_y", "spherical"}

@@ -12,6 +12,8 @@ from holobench_eval.display.simulated.stages import (
     CoherentNoise,
     Crosstalk,
     Drift,
+    Flicker,
+    LookUpTable,
     PixelAperture,
     Propagation,
     Sensor,
@@ -109,6 +111,20 @@ def test_defocus_of_the_bench_is_that_of_the_nominal_model(with_stage, phase):
     moved = replace(bench.spec, distance=bench.spec.distance * 1.1)
     right = field_of(moved, phase[1]).abs().square()
     assert float((bench.intensity(phase[1], 1) - right).norm() / right.norm()) < 1e-2
+
+
+def test_a_ripple_adds_the_light_of_its_moments(with_stage, phase):
+    bench, still = SimulatedBench(with_stage(flicker=Flicker(ripple=0.1))), SimulatedBench(with_stage())
+    moments = [still.intensity(phase[1], 1, gain) for gain in (0.9, 1.1)]
+    assert torch.allclose(bench.intensity(phase[1], 1), (moments[0] + moments[1]) / 2, atol=1e-5)
+
+
+def test_an_uneven_table_is_shown_with_and_without_a_gradient(with_stage, phase):
+    bench, even = SimulatedBench(with_stage(lut=LookUpTable(bend=0.05))), SimulatedBench(with_stage())
+    light = bench.intensity(phase[1], 1)
+    slow = bench.intensity(phase[1].clone().requires_grad_(), 1).detach()
+    assert float((light - slow).norm() / slow.norm()) < 1e-6
+    assert float((light - even.intensity(phase[1], 1)).norm() / light.norm()) > 0.05
 
 
 def test_image_gradient_points_downhill(with_stage, phase):

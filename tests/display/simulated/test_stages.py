@@ -80,6 +80,25 @@ def test_crosstalk_turns_a_wrap_edge_into_a_ramp():
     assert 3 <= int(inside.sum()) <= 6
 
 
+def test_uneven_crosstalk_is_that_of_each_width_along_its_axis():
+    edge = torch.zeros(16, 16)
+    edge[:, 8:] = TAU
+    uneven, wide, narrow = Crosstalk(0.3, ratio=2.0), Crosstalk(0.6), Crosstalk(0.3)
+    along_rows = [stage.apply(edge, stage.weights(3))[:, 4:12, 4:12] for stage in (uneven, wide)]
+    along_columns = [stage.apply(edge.T, stage.weights(3))[:, 4:12, 4:12] for stage in (uneven, narrow)]
+    assert torch.allclose(*along_rows, atol=1e-3)
+    assert torch.allclose(*along_columns, atol=1e-3)
+
+
+def test_an_uneven_table_bends_as_much_as_stated_and_only_where_it_is_said(geometry):
+    assert LookUpTable().bend_map(geometry) is None
+    table = LookUpTable(gamma=(1.1, 1.1, 1.1), bend=0.05)
+    bend = table.bend_map(geometry)
+    assert float(bend.std()) == pytest.approx(0.05, rel=0.2)
+    shown = table.phase(torch.full(geometry.shape, 64.0), 8, torch.ones(()), 0, bend)
+    assert torch.allclose(shown, TAU * 0.25 ** (1.1 + bend), atol=1e-4)
+
+
 def test_no_crosstalk_keeps_pixels_apart():
     stage = Crosstalk(0.0)
     phase = torch.rand(8, 8)
@@ -107,6 +126,11 @@ def test_flicker_has_its_rms():
     gains = torch.tensor([Flicker(0.05).gain(draw) for _ in range(2000)])
     assert float(gains.std()) == pytest.approx(0.05, rel=0.1)
     assert Flicker().gain(draw) == 1.0
+
+
+def test_the_moments_of_a_frame_have_the_rms_of_its_ripple():
+    assert Flicker(0.05).moments == (1.0,)
+    assert torch.tensor(Flicker(ripple=0.03).moments).std(correction=0) == pytest.approx(0.03)
 
 
 def test_illumination_has_unit_mean_power_and_the_stated_phase(geometry):

@@ -28,7 +28,10 @@ def sample_positions(samples: int) -> list[float]:
 class Crosstalk(Stage):
     """Convolution of the phase with a Gaussian.
 
-    width: its standard deviation [px].
+    width: its standard deviation along a column of pixels [px]; ratio: the standard deviation along a row [of width].
+
+    Fringing fields turn the liquid crystal more along one axis than along the other (Moser et al. 2019, Opt. Express
+    27, 25046).
     """
 
     title: ClassVar[str] = "crosstalk"
@@ -37,37 +40,44 @@ class Crosstalk(Stage):
     )
 
     width: Annotated[float, Interval(ge=0, le=2)] = 0.0
+    ratio: Annotated[float, Interval(ge=0.2, le=5)] = 1.0
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Its width, and the sub-samples that it acts on."""
         if self.width:
             yield Effect("crosstalk", f"crosstalk of {self.width:g} px")
+            if self.ratio != 1:
+                yield Effect("uneven_crosstalk", f"crosstalk {self.ratio:g} times as wide along rows as along columns")
         if profile.sampling > 1:
             grid = f"{profile.sampling} x {profile.sampling}"
             yield Effect("sub_pixel_field", f"structure inside a pixel, {grid} samples, each where it is")
 
     def weights(self, samples: int) -> Tensor:
-        """``(samples, k)``: the share of each neighbour along one axis in each sub-sample, exact for square pixels."""
-        reach = max(1, math.ceil(4 * self.width))
-        rows = torch.zeros(samples, 2 * reach + 1, dtype=torch.float64)
-        for j, position in enumerate(sample_positions(samples)):
-            for n in range(-reach, reach + 1):
-                rows[j, n + reach] = self._share(n - position)
-        return (rows / rows.sum(1, keepdim=True)).float()
-
-    def _share(self, offset: float) -> float:
-        if self.width == 0:
-            return float(abs(offset) < 0.5)
-        scale = self.width * math.sqrt(2)
-        return 0.5 * (math.erf((offset + 0.5) / scale) - math.erf((offset - 0.5) / scale))
+        """``(2, samples, k)``: the share of each neighbour in each sub-sample, along columns and along rows, exact for
+        square pixels."""
+        widths = self.width, self.width * self.ratio
+        reach = max(1, math.ceil(4 * max(widths)))
+        shares = torch.zeros(2, samples, 2 * reach + 1, dtype=torch.float64)
+        for axis, width in zip(shares, widths, strict=True):
+            for j, position in enumerate(sample_positions(samples)):
+                for n in range(-reach, reach + 1):
+                    axis[j, n + reach] = _share(n - position, width)
+        return (shares / shares.sum(2, keepdim=True)).float()
 
     def apply(self, phase: Tensor, weights: Tensor) -> Tensor:
         """Phase ``(H, W)`` at pixels to phase ``(samples^2, H, W)`` at sub-samples [rad]."""
-        reach, taps = weights.shape[1] // 2, weights.tolist()
+        reach, (columns, rows) = weights.shape[2] // 2, weights.tolist()
         padded = F.pad(phase[None, None], (reach, reach, reach, reach), mode="replicate")[0, 0]
-        return correlate_each(correlate_each(padded, taps, dim=-2), taps, dim=-1).flatten(0, 1)
+        return correlate_each(correlate_each(padded, columns, dim=-2), rows, dim=-1).flatten(0, 1)
 
     def kernel(self, points: int = 101) -> tuple[Tensor, Tensor]:
-        """Offsets [pixels] and the share of a pixel at that offset, for a plot."""
+        """Offsets [pixels] and the share of a pixel at that offset along a column, for a plot."""
         offsets = torch.linspace(-2, 2, points)
-        return offsets, torch.tensor([self._share(float(offset)) for offset in offsets])
+        return offsets, torch.tensor([_share(float(offset), self.width) for offset in offsets])
+
+
+def _share(offset: float, width: float) -> float:
+    if width == 0:
+        return float(abs(offset) < 0.5)
+    scale = width * math.sqrt(2)
+    return 0.5 * (math.erf((offset + 0.5) / scale) - math.erf((offset - 0.5) / scale))

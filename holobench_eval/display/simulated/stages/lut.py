@@ -25,7 +25,8 @@ class LookUpTable(Stage):
     """Phase of a gray level g of L: ``2 pi gain(x, y) (g / L)^gamma``, or a published table.
 
     gamma: of red, green and blue; of a single colour the first [1]; gain: of the phase, likewise [relative to 2 pi];
-    variation: rms of the gain over the panel, smooth [relative]; table: phase of each level [percent of the largest,
+    variation: rms of the gain over the panel, smooth [relative]; bend: likewise of gamma [1], as where the cell's
+    thickness or temperature changes the table's shape; table: phase of each level [percent of the largest,
     ``(L - 1) / L 2 pi``]; then gamma must be 1.
     """
 
@@ -35,6 +36,7 @@ class LookUpTable(Stage):
     gamma: PerChannel = (1.0, 1.0, 1.0)
     gain: PerChannel = (1.0, 1.0, 1.0)
     variation: Annotated[float, Interval(ge=0, le=0.5)] = 0.0
+    bend: Annotated[float, Interval(ge=0, le=0.3)] = 0.0
     table: Annotated[tuple[float, ...], Len(0, 1024)] = ()
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
@@ -46,6 +48,9 @@ class LookUpTable(Stage):
             yield Effect("look_up_table", f"look-up table, exponent {powers}, stroke {gains} of a turn (R/G/B)")
         if self.variation:
             yield Effect("gain_map", f"stroke uneven over the panel, {percent(self.variation)} rms, smooth")
+        if self.bend:
+            text = f"exponent of the look-up table uneven over the panel, {self.bend:g} rms, smooth"
+            yield Effect("uneven_table", text)
 
     def gain_map(self, geometry: Geometry) -> Tensor:
         """The gain ``(H, W)`` of the panel for a wavelength: the same path is less phase of a longer one."""
@@ -53,13 +58,17 @@ class LookUpTable(Stage):
         stroke = self.gain[geometry.channel] * (1 - geometry.detuning / geometry.wavelength)
         return (stroke * (1 + ripple)).float()
 
-    def phase(self, level: Tensor, bits: int, gain: Tensor, channel: int) -> Tensor:
-        """Phase [rad] of gray levels ``(..., H, W)``; differentiable in the level."""
+    def bend_map(self, geometry: Geometry) -> Tensor | None:
+        """What is added to the exponent, ``(H, W)``; None where that is the same all over the panel."""
+        return (self.bend * geometry.smooth_map(2.0, "look-up bend")).float() if self.bend else None
+
+    def phase(self, level: Tensor, bits: int, gain: Tensor, channel: int, bend: Tensor | None = None) -> Tensor:
+        """Phase [rad] of gray levels ``(..., H, W)``; differentiable in the level. bend: see ``bend_map``."""
         levels = 2**bits
         if self.table:
             return gain * self._tabulated(level, levels)
         fraction = (level / levels).clamp_min(1e-6)
-        return gain * TAU * fraction ** self.gamma[channel]
+        return gain * TAU * fraction ** (self.gamma[channel] if bend is None else self.gamma[channel] + bend)
 
     def _tabulated(self, level: Tensor, levels: int) -> Tensor:
         if len(self.table) != levels:
@@ -77,22 +86,33 @@ class LookUpTable(Stage):
 
 @dataclass(frozen=True)
 class Flicker(Stage):
-    """Relative phase gain noise of a frame.
+    """Relative phase gain noise of a frame, and within it.
 
-    rms: of the gain [share of the 2 pi stroke].
+    rms: of the gain from frame to frame [share of the 2 pi stroke]; ripple: rms of the gain within a frame, whose light
+    the exposure adds up [share of the 2 pi stroke].
 
-    The liquid crystal relaxes between refreshes, so that each frame has a slightly other phase gain.
+    The liquid crystal follows the pulses of a digital addressing and relaxes between refreshes, so that the phase gain
+    ripples within each frame and differs a little from one to the next.
     """
 
     title: ClassVar[str] = "flicker"
-    model: ClassVar[str] = "phase gain noise, new in every frame"
+    model: ClassVar[str] = "phase gain noise, new in every frame, and a ripple within it"
 
     rms: Annotated[float, Interval(ge=0, le=0.2)] = 0.0
+    ripple: Annotated[float, Interval(ge=0, le=0.2)] = 0.0
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
-        """The noise of the gain."""
+        """The noise of the gain, and its ripple."""
         if self.rms:
             yield Effect("flicker", f"flicker, {percent(self.rms)} rms of the stroke from frame to frame")
+        if self.ripple:
+            yield Effect("ripple", f"ripple within an exposure, {percent(self.ripple)} rms of the stroke")
+
+    @property
+    def moments(self) -> tuple[float, ...]:
+        """Phase gains within a frame, equal in weight, whose mean light is that of the exposure: the two points of
+        Gauss-Hermite quadrature."""
+        return (1 - self.ripple, 1 + self.ripple) if self.ripple else (1.0,)
 
     def gain(self, draw: torch.Generator) -> float:
         """The phase gain of one frame."""
