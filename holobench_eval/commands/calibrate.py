@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from .options import Profile as ProfileName
 
 
 def calibrate(profile: ProfileName) -> None:
     """Fit the free parameters of a profile to published figures; minutes, a quarter of an hour with a network."""
     from ..display import load_profile
-    from ..study.calibration import load_calibration, refuse_bench_file
+    from ..study.calibration import load_calibration
     from ..study.calibration.fitting import Fitting
     from ..study.progress import watching
     from .output import console
 
-    refuse_bench_file(Path(profile))
     loaded, screen = load_profile(profile), console()
     calibration = load_calibration(loaded)
     with watching(screen) as watch:

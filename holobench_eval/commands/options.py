@@ -37,7 +37,7 @@ Output = Annotated[
     typer.Option(help="Output folder. [default: holoeval-results/<name of the config>, or <name>-changed]"),
 ]
 RESULTS = Path("holoeval-results")
-PANEL = typer.Option(metavar="ROWS COLUMNS", help="Pixels of the simulated panel, such as 192 192.")
+PANEL = typer.Option(metavar="ROWS COLUMNS", help="Pixels of the simulated panel, at most all of it, such as 192 192.")
 Threads = Annotated[int | None, typer.Option(min=1, help="Torch threads of a worker.")]
 Device = Annotated[str, typer.Option(help="Where torch computes: cpu, cuda, cuda:N, or auto, a GPU if it finds one.")]
 Learned = Annotated[Path, typer.Option(help="Folder of what trained methods learned.")]

@@ -34,6 +34,7 @@ def solve(
     from ..core.io import file_name
     from ..datasets.images import decode, read
     from ..study.config import load_study
+    from ..study.displays import displays
     from ..study.plan import plan
     from .run import run
 
@@ -48,10 +49,10 @@ def solve(
     if not _is_free(folder, picture, study_in(folder)):
         raise UserError(f"{folder}: holds the report of other methods or of another display; choose another --output")
     config.write_text(study_in(folder), encoding="utf-8")
-    size = f"{panel[0]} x {panel[1]} pixels"
     try:
         study = load_study(config)
         plan(study)
+        size = "{} x {} pixels".format(*displays(study)[study.display.profiles[0]].spec.shape)
         print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
         run(config, output=folder, executor="serial", artifacts=artifacts, retrain=retrain)
     except UserError as error:

@@ -213,7 +213,7 @@ def open_display(
     name
         Of a display profile, or the path of one.
     panel
-        Rows and columns of the panel [px], None for all of it.
+        Rows and columns of the panel [px], at most all of it, as with None.
     seed
         Of all random numbers.
     folder

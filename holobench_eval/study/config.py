@@ -195,7 +195,7 @@ def _check_profiles(study: Study, document: Document) -> None:
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
             message += f"; registration needs at least {SMALLEST_REGION}"
-            if panel and not bench:
+            if panel and not bench and min(load_profile(profile, study.folder).spec().region.shape) >= SMALLEST_REGION:
                 message += f", which a panel of {list(_smallest_panel(profile, panel, study.folder))} has"
             raise document.error(("display", "panel"), message)
         seen[name] = profile

@@ -45,9 +45,9 @@ class DisplayGrid:
     A study names its displays by one of profiles, learned and bench.
 
     profiles: names of profiles or paths of profile files; learned: a trained network in the place of a display; bench:
-    the file of a real bench (docs/real-bench.md); panel: rows and columns in pixels (None: the profile's full panel);
-    exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the pictures); session:
-    the folder that stands for the display, when photographs are exchanged as files.
+    the file of a real bench (docs/real-bench.md); panel: rows and columns in pixels, at most those of the profile
+    (None: all of them); exposure: ``equal`` (the same light for every method) or ``matched`` (equal brightness of the
+    pictures); session: the folder that stands for the display, when photographs are exchanged as files.
     """
 
     profiles: tuple[Text, ...] = ()

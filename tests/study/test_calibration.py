@@ -159,14 +159,12 @@ def test_a_display_that_no_figures_were_published_for_is_refused_in_one_line_tha
         "name: leto-2020\nversion: 1\nseed: 1\ndescription: ours\npanel: {shape: [128, 128], pitch: 6.4e-6, "
         "wavelengths: [5.2e-7], distance: 0.012, bits: 8}\n"
     )
-    (tmp_path / "bench.yaml").write_text("name: ours\nversion: 1\nslm: {driver: monitor}\n")
     for file, said in (
         (
             "wide.yaml",
             "panel.pitch is 8e-06, and the figures that calibrate fits are of 'leto-2020', where it is 6.4e-06",
         ),
         ("same.yaml", "profile 'leto-2020': panel.shape"),
-        ("bench.yaml", "bench.yaml: describes a real bench"),
     ):
         with pytest.raises(UserError) as refused:
             calibrate(str(tmp_path / file))

@@ -113,9 +113,9 @@ class Profile:
         return [effect for stage in self.stages for effect in stage.effects(self)]
 
     def scaled(self, shape: tuple[int, int] | None) -> Profile:
-        """The profile on another panel: the pitch stays, the distance scales with the rows.
+        """The profile on a smaller panel: the pitch stays, the distance scales with the rows.
 
-        Light then spreads over the same fraction of the panel (K / N is constant).
+        Light then spreads over the same fraction of the panel (K / N is constant). A side that is no smaller stays.
 
         Parameters
         ----------
@@ -127,12 +127,13 @@ class Profile:
         UserError
             A side below 64 or above 8192 pixels.
         """
-        if shape is None or tuple(shape) == self.panel.shape:
+        if shape is None:
             return self
         if min(shape) < SMALLEST_PANEL or max(shape) > LARGEST_PANEL:
             raise UserError(f"a panel has {SMALLEST_PANEL} to {LARGEST_PANEL} pixels a side, got {list(shape)}")
-        distance = self.panel.distance * shape[0] / self.panel.shape[0]
-        return replace(self, panel=replace(self.panel, shape=(shape[0], shape[1]), distance=distance))
+        rows, columns = (min(given, own) for given, own in zip(shape, self.panel.shape, strict=True))
+        distance = self.panel.distance * rows / self.panel.shape[0]
+        return replace(self, panel=replace(self.panel, shape=(rows, columns), distance=distance))
 
     def spec(self, shape: tuple[int, int] | None = None) -> DisplaySpec:
         """Nominal optics on a panel of ``shape`` (the profile's own by default)."""

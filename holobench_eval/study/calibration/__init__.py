@@ -76,13 +76,6 @@ def load_calibration(profile: Profile) -> Calibration:
     return typed(load(FOLDER / f"{name}.yaml"), Calibration)
 
 
-def refuse_bench_file(path: Path) -> None:
-    """UserError for the file of a real bench, which is no profile; a file that is no YAML is left to others."""
-    is_yaml = path.suffix.lower() in (".yaml", ".yml") and path.is_file()
-    if is_yaml and not load(path).data.keys().isdisjoint(("slm", "camera", "phase", "capture", "laser")):
-        raise UserError(f"{path}: describes a real bench, and calibrate fits simulated displays; {_right()}")
-
-
 def _right() -> str:
     return (
         f"calibrate takes {' or '.join(names())}, or a profile of the same panel that is like one of them and has its "

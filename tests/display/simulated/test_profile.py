@@ -16,7 +16,7 @@ def test_the_promised_profiles_are_there():
     assert {"ideal", "leto-mild", "leto-aged", "plm-4bit", "pluto-offaxis"} <= set(names())
 
 
-@given(rows=st.integers(64, 2000), columns=st.integers(64, 2000), name=st.sampled_from(names()))
+@given(rows=st.integers(64, 700), columns=st.integers(64, 1200), name=st.sampled_from(names()))
 def test_scaling_keeps_pitch_and_relative_spread(rows, columns, name):
     full, small = load_profile(name).spec(), load_profile(name).spec((rows, columns))
     assert small.pitch == full.pitch
@@ -24,6 +24,12 @@ def test_scaling_keeps_pitch_and_relative_spread(rows, columns, name):
     assert relative[0] == pytest.approx(relative[1])
     assert small.region.height <= rows
     assert small.region.top * 2 + small.region.height in (rows, rows - 1)
+
+
+def test_no_panel_is_larger_than_the_display():
+    profile = load_profile("leto-aged").scaled((100, 120))
+    assert profile.scaled((300, 110)).panel.shape == (100, 110)
+    assert profile.scaled((300, 110)).panel.distance == profile.panel.distance
 
 
 def test_scaling_is_said():
@@ -54,6 +60,10 @@ def test_digest_follows_the_file(tmp_path):
         ),
         ((", 4.46e-7]", "]"), r"panel.wavelengths: 2 wavelengths; a display has three, .* or one, for gray pictures$"),
         ((", 4.46e-7]", ", 4e-7, 3e-7]"), r"panel.wavelengths: 4 wavelengths; a display has three"),
+        (
+            ("5.17e-7, 4.46e-7]", "4.46e-7, 5.17e-7]"),
+            r"red comes first, .*: \[6.36e-07, 5.17e-07, 4.46e-07\]$",
+        ),
         (("version: 1\n", ""), "missing key 'version'"),
     ],
 )

@@ -22,12 +22,13 @@ Wavelength = Annotated[float, Metres(200e-9, 2000e-9)]
 
 
 class OneOrThree(Check):
-    """Of wavelengths, since pictures are gray or of three colours."""
+    """Of wavelengths, since pictures are gray or of three colours, red first."""
 
     def fault(self, value: Sequence[float]) -> str:
         """See ``Check``."""
         if len(value) in (1, 3):
-            return ""
+            falling = sorted(value, reverse=True)
+            return "" if list(value) == falling else f"red comes first, then green and blue: {falling}"
         return f"{len(value)} wavelengths; a display has three, for red, green and blue, or one, for gray pictures"
 
 
