@@ -1,19 +1,40 @@
-"""``holoeval calibrate``: fit the free parameters of a profile to published figures."""
+"""``holoeval calibrate``: what published figures say of a display: a fit, or a family of displays that have them."""
 
 from __future__ import annotations
 
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import RESULTS
 from .options import Profile as ProfileName
 
 
-def calibrate(profile: ProfileName) -> None:
-    """Fit the free parameters of a profile to published figures; minutes, a quarter of an hour with a network."""
+def calibrate(
+    profile: ProfileName,
+    draws: Annotated[
+        int | None, typer.Option(min=1, help="Draw so many displays of its family, and keep those that fit.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="Folder of the draws. [default: holoeval-results/<profile>-family]")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Draws side by side.")] = None,
+) -> None:
+    """Fit the free parameters of a profile to published figures, in minutes; with --draws, draw a family of displays,
+    two seconds each on a core."""
+    if draws is not None:
+        _family(profile, draws, output or RESULTS / f"{profile}-family", workers)
+        return
     from ..display import load_profile
     from ..study.calibration import load_calibration
     from ..study.calibration.fitting import Fitting
     from ..study.progress import watching
     from .output import console
 
-    loaded, screen = load_profile(profile), console()
+    screen = console()
+    loaded = load_profile(profile)
     calibration = load_calibration(loaded)
     with watching(screen) as watch:
         fitting = Fitting(
@@ -30,3 +51,31 @@ def calibrate(profile: ProfileName) -> None:
     print("write into the profile, and raise its version if they differ:")
     for name, value in values.items():
         print(f"  {name}: {value}")
+
+
+def _family(name: str, draws: int, folder: Path, workers: int | None) -> None:
+    """Draw displays, resuming what the folder has; write the report and the profiles that are kept."""
+    from ..report.family import write_family
+    from ..study.calibration.family import compute, load_family
+    from ..study.calibration.posterior import members, middle, write_member
+    from ..study.executors import executor
+    from ..study.progress import SECONDS_BETWEEN_LINES, duration
+    from .output import console
+
+    family, screen, began, last = load_family(name), console(), time.monotonic(), 0.0
+
+    def tell(done: int, of: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if done == of or now - last > SECONDS_BETWEEN_LINES:
+            last = now
+            screen.print(f"{done} of {of} draws, about {duration((of - done) * (now - began) / done)} left")
+
+    rows = compute(name, folder, executor("auto", workers), draws, tell)
+    kept = members(family, name, rows, folder)
+    for member in kept:
+        path = folder / "displays" / f"{member.profile.name}.yaml"
+        path.parent.mkdir(exist_ok=True)
+        write_member(path, family, member)
+        print(path)
+    print(write_family(folder, family, rows, kept, middle(family, rows, kept)))

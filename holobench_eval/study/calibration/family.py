@@ -7,7 +7,8 @@ Approximate Bayesian computation by rejection (Pritchard et al. 1999, Mol. Biol.
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -41,10 +42,11 @@ Holograms = dict[str, dict[str, Tensor]]
 
 @dataclass(frozen=True)
 class Range:
-    """What a parameter is drawn from, evenly. name: ``stage.key`` of the profile; unit: empty for a count; source:
-    where the range comes from."""
+    """What a parameter is drawn from, evenly. name: ``stage.key`` of the profile; unit: empty for none; source: where
+    the range comes from."""
 
     name: str
+    words: str
     low: float
     high: float
     unit: str
@@ -161,47 +163,45 @@ def figures_of(family: Family, profile: Profile, kept: Holograms) -> dict[str, f
     return found
 
 
-def missed(family: Family, row: Row, domain: str) -> float:
+def missed(family: Family, row: Row, domain: str, metrics: Collection[str] = METRICS) -> float:
     """The largest miss of a figure by a draw, in tolerances; infinite for a display that could not be registered."""
-    return max(
+    misses = [
         abs(row[f"{method}.{metric}_{domain}"] - figure) / family.tolerance[metric]
         for method, figures in family.figures.items()
         for metric, figure in figures.items()
-    )
+        if metric in metrics
+    ]
+    return math.inf if any(map(math.isnan, misses)) else max(misses)
 
 
-def compute(name: str, folder: Path, executor: Executor, draws: int, tell: Callable[[str], object]) -> list[Row]:
+def compute(name: str, folder: Path, executor: Executor, draws: int, tell: Callable[[int, int], object]) -> list[Row]:
     """All rows of a family's first draws; those that the folder has are kept.
 
     A row has ``draw``, ``geometry``, ``outside``, every parameter, and ``figures_of``, NaN where the display cannot be
-    registered.
+    registered. tell: called after each draw with how many are done, and of how many.
     """
     family, path = load_family(name), folder / "draws.csv"
     for number in range(len(family.geometries)):
         _solve(family, number, folder)
+    columns = _columns(family)
+    content = path.read_bytes() if path.is_file() else (",".join(columns) + "\n").encode()
+    write_atomically(path, content[: content.rfind(b"\n") + 1])  # without a line that was cut short
     known = {int(row["draw"]) for row in rows_of(path)}
     left = [index for index in range(draws) if index not in known]
-    columns = _columns(family)
-    if not known:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, (",".join(columns) + "\n").encode())
     work = partial(_evaluated, name, folder)
-    for count, (index, result) in enumerate(executor.map(work, iter(left)), 1):
+    for count, (_, result) in enumerate(executor.map(work, iter(left)), 1):
         if isinstance(result, Exception):
             raise result
         with path.open("a", encoding="utf-8", newline="") as file:
             csv.DictWriter(file, columns, lineterminator="\n").writerow(result)
-        tell(f"draw {index}: {count} of {len(left)}")
+        tell(count, len(left))
     return [row for row in rows_of(path) if row["draw"] < draws]
 
 
 def rows_of(path: Path) -> list[Row]:
-    """The rows of a file of draws, in the order of their numbers; one that was cut short is left out."""
-    if not path.is_file():
-        return []
+    """The rows of a file of draws, in the order of their numbers."""
     with path.open(encoding="utf-8", newline="") as file:
-        whole = [row for row in csv.DictReader(file) if None not in row.values()]
-    found = [{key: float(value) if value else float("nan") for key, value in row.items()} for row in whole]
+        found = [{key: float(value or "nan") for key, value in row.items()} for row in csv.DictReader(file)]
     return sorted(found, key=lambda row: row["draw"])
 
 

@@ -1,0 +1,112 @@
+"""A family of displays: its draws, what figures leave of them, and the displays that are kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.display import load_profile
+from holobench_eval.report.family import write_family
+from holobench_eval.study.calibration import family as families
+from holobench_eval.study.calibration import posterior
+from holobench_eval.study.calibration.family import (
+    Family,
+    Row,
+    compute,
+    drawn,
+    load_family,
+    missed,
+    profile_of,
+    rows_of,
+)
+from holobench_eval.study.definition import Targets
+from holobench_eval.study.executors import Serial
+
+DRAWS = 6
+
+
+@pytest.fixture(scope="module")
+def small() -> Family:
+    """On a small panel, with figures that half of its draws have."""
+    family = load_family("leto-2020")
+    return replace(
+        family,
+        panel=(128, 128),
+        targets=Targets("dead_leaves", {"count": 1, "seed": 1, "colours": "natural"}),
+        tolerance={"psnr": 4.0, "ssim": 0.5},
+        members=2,
+        outside=replace(family.outside, share=0.5),
+    )
+
+
+@pytest.fixture(scope="module")
+def rows(small: Family, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Row]]:
+    folder = tmp_path_factory.mktemp("family")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(families, "load_family", lambda _: small)
+        compute("leto-2020", folder, Serial(), DRAWS - 2, lambda *_: None)
+        text = (folder / "draws.csv").read_text()
+        (folder / "draws.csv").write_text(text + "9,1,")  # killed as it wrote
+        return folder, compute("leto-2020", folder, Serial(), DRAWS, lambda *_: None)
+
+
+@pytest.mark.parametrize("name", families.names())
+def test_every_draw_of_a_family_is_a_profile_within_its_ranges(name: str) -> None:
+    family = load_family(name)
+    seen = [drawn(family, index) for index in range(200)]
+    assert {draw.geometry for draw in seen} == set(range(len(family.geometries)))
+    assert np.mean([draw.is_outside for draw in seen]) == pytest.approx(family.outside.share, abs=0.1)
+    for draw in seen[:20]:
+        effects = {effect.name for effect in profile_of(family, draw, "one").effects()}
+        assert {"uneven_table", "ripple"} <= effects or not draw.is_outside
+        for given in family.parameters:
+            assert given.low <= draw.values[given.name] <= given.high
+    assert drawn(family, 7) == drawn(family, 7)
+
+
+def test_no_display_of_the_family_is_a_fog() -> None:
+    share = next(given for given in load_family("leto-2020").parameters if given.name == "stray_light.share")
+    assert share.high <= 0.3
+
+
+def test_a_parameter_that_a_profile_lacks_is_refused(small: Family) -> None:
+    with pytest.raises(UserError, match="no parameter 'haze'"):
+        profile_of(small, replace(drawn(small, 0), values={"stray_light.haze": 1.0}), "one")
+
+
+def test_draws_are_resumed_and_a_line_that_was_cut_short_is_drawn_again(rows: tuple[Path, list[Row]]) -> None:
+    folder, found = rows
+    assert [row["draw"] for row in found] == list(range(DRAWS))
+    np.testing.assert_equal(rows_of(folder / "draws.csv"), found)
+
+
+def test_what_is_kept_fits_under_its_own_name_and_its_file_is_the_display(
+    small: Family, rows: tuple[Path, list[Row]], tmp_path: Path
+) -> None:
+    folder, found = rows
+    kept = posterior.members(small, "leto-2020", found, folder)
+    assert [member.draw.is_outside for member in kept].count(True) == 1
+    for member in kept:
+        assert missed(small, member.scores, "linear") <= 1
+        path = tmp_path / f"{member.profile.name}.yaml"
+        posterior.write_member(path, small, member)
+        loaded = load_profile(str(path))
+        same = {"digest": "", "like": None, "description": ""}
+        assert replace(loaded, **same) == replace(member.profile, **same)
+    report = write_family(tmp_path, small, found, kept, posterior.middle(small, found, kept)).read_text()
+    assert "leto-2020-02" in report
+    assert (tmp_path / "corner.png").stat().st_size > 10_000
+
+
+def test_too_few_draws_that_fit_are_said(small: Family, rows: tuple[Path, list[Row]]) -> None:
+    with pytest.raises(UserError, match="give more --draws"):
+        posterior.members(replace(small, members=40), "leto-2020", rows[1], rows[0])
+
+
+def test_a_display_that_could_not_be_registered_fits_nothing(small: Family, rows: tuple[Path, list[Row]]) -> None:
+    row = {**rows[1][0], "wirtinger.psnr_linear": float("nan")}
+    assert missed(small, row, "linear") == float("inf")
