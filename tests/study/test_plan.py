@@ -119,3 +119,20 @@ def test_a_second_baseline_is_the_label_of_a_row(tmp_path: Path) -> None:
     config.write_text(f"{config.read_text()}second_baseline: toy\n")
     with pytest.raises(UserError, match="no method has the label 'toy'"):
         load_study(config)
+
+
+def test_a_display_with_targets_of_other_colours_has_floors_of_its_own(tmp_path: Path) -> None:
+    add_other_profile(tmp_path)
+    one = (tmp_path / "other.yaml").read_text().replace("name: other", "name: one")
+    (tmp_path / "one.yaml").write_text(one.replace("[6.36e-7, 5.17e-7, 4.46e-7]", "[5.32e-7]"))
+
+    def floors(profiles: str) -> dict[str, set[str]]:
+        found: dict[str, set[str]] = {}
+        for task in plan(study_in(tmp_path, profiles=profiles)).tasks:
+            for cell in task.cells if task.is_floor else ():
+                found.setdefault(cell.condition, set()).add(cell.id)
+        return found
+
+    colour, gray = floors("ideal, other.yaml"), floors("one.yaml")
+    assert set(colour) == set(gray) == {REFERENCE}
+    assert floors("ideal, other.yaml, one.yaml") == colour | {"reference for one": gray[REFERENCE]}
