@@ -8,7 +8,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
-from tests.study.test_run import add_other_profile
+from tests.study.test_run import add_one_laser, add_other_profile
 from tests.support.fake_study import write_config
 
 
@@ -122,9 +122,7 @@ def test_a_second_baseline_is_the_label_of_a_row(tmp_path: Path) -> None:
 
 
 def test_a_display_with_targets_of_other_colours_has_floors_of_its_own(tmp_path: Path) -> None:
-    add_other_profile(tmp_path)
-    one = (tmp_path / "other.yaml").read_text().replace("name: other", "name: one")
-    (tmp_path / "one.yaml").write_text(one.replace("[6.36e-7, 5.17e-7, 4.46e-7]", "[5.32e-7]"))
+    add_one_laser(tmp_path)
 
     def floors(profiles: str) -> dict[str, set[str]]:
         found: dict[str, set[str]] = {}

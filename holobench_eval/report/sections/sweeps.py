@@ -238,16 +238,19 @@ def _curves(report: Report) -> Iterator[tuple[Path, str]]:
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     """Rows of pictures of the target in the middle of their ranking by quality."""
     thumbnails = report.thumbnails
-    if not thumbnails.targets:
+    first = report.results.conditions[0]
+    if not thumbnails.targets(first):
         return
-    target = thumbnails.middle(report.results.conditions[0])
+    target = thumbnails.middle(first)
     for same in _by_kind(report):
         change, kind = same[0].kind.words, same[0].swept.kind
         for sweep in same:
             stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in sweep.swept.before)
             path = report.figures / f"sweep-{kind}-{stem}.jpg"
             rows = _rows(report, sweep, target)
-            draw_rows(path, f"{sweep.swept.before}: {change}", (target, thumbnails.targets[target]), rows)
+            draw_rows(
+                path, f"{sweep.swept.before}: {change}", (target, thumbnails.targets(sweep.swept.before)[target]), rows
+            )
             yield path, f"Captures of {target} on {sweep.swept.before} along a change: {change}."
 
 

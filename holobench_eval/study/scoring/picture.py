@@ -22,7 +22,7 @@ from .. import identity, isolation
 from ..artifacts import Artifact
 from ..displays import Condition
 from ..phases import Solution
-from ..plan import REFERENCE, Cell
+from ..plan import Cell
 from ..store import Record
 from .job import Job, Measured
 from .pictures import write_capture, write_phase, write_thumbnail
@@ -80,8 +80,7 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor]) -> Measure
     others = [replace(cell, **cell.params, holograms=cell.holograms.get("wrong", {})) for cell in cells if cell.params]
     target, *wrong = (wanted(cell, display) for cell in (cells[0], *others))
     captures = floor_captures(target, wrong, cells[0].seed, cells[0].target)
-    if cells[0].condition == REFERENCE:
-        write_thumbnail(job.store.target_thumbnail(cells[0].target), target)
+    write_thumbnail(job.store.target_thumbnail(cells[0].target, cells[0].condition), target)
 
     def reference(cell: Cell, _: Condition) -> Record:
         image = captures[cell.method]()
