@@ -51,8 +51,11 @@ def solve(
     size = f"{panel[0]} x {panel[1]} pixels"
     try:
         study = load_study(config)
-        plan(study)
-        print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
+        is_gray = len(plan(study).tasks[0].conditions[0].spec.wavelengths) == 1
+        gray = " and shown in gray, by the one wavelength of the display" * is_gray
+        print(
+            f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored{gray}"
+        )
         run(config, output=folder, executor="serial", artifacts=artifacts, retrain=retrain)
     except UserError as error:
         if is_new and not (folder / "records").exists():
