@@ -34,7 +34,6 @@ def solve(
     from ..core.io import file_name
     from ..datasets.images import decode, read
     from ..study.config import load_study
-    from ..study.displays import displays
     from ..study.plan import plan
     from .run import run
 
@@ -51,9 +50,12 @@ def solve(
     config.write_text(study_in(folder), encoding="utf-8")
     try:
         study = load_study(config)
-        plan(study)
-        size = "{} x {} pixels".format(*displays(study)[study.display.profiles[0]].spec.shape)
-        print(f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored")
+        spec = plan(study).tasks[0].conditions[0].spec
+        gray = " and shown in gray, by the one wavelength of the display" * (len(spec.wavelengths) == 1)
+        size = "{} x {} pixels".format(*spec.shape)
+        print(
+            f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored{gray}"
+        )
         run(config, output=folder, executor="serial", artifacts=artifacts, retrain=retrain)
     except UserError as error:
         if is_new and not (folder / "records").exists():

@@ -72,7 +72,8 @@ def printable(text: str) -> str:
 
 def out_of_memory(error: BaseException) -> bool:
     """Whether memory is used up, in NumPy, in Python or in torch, which has no class of its own for it on a CPU."""
-    return isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
+    texts = "DefaultCPUAllocator", "can't start new thread"
+    return isinstance(error, MemoryError) or any(text in str(error) for text in texts)
 
 
 def suggest(word: str, allowed: Iterable[str]) -> str:

@@ -185,7 +185,7 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     truth, columns, errors = _picture(wanted), [], []
     for name, scores in measured.items():
         shown = _picture(match(images[name], wanted)[0])
-        note = f"{scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
+        note = f"PSNR {scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
         columns.append(Column(name, (Tile(shown, note),)))
         errors.append(error_map(shown, truth))
     place.parent.mkdir(parents=True, exist_ok=True)

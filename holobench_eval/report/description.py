@@ -20,6 +20,8 @@ from ..study.displays import Condition
 from ..study.displays import displays as conditions
 from .data.text import plain, words
 
+PER_COLOUR = ("gamma", "gain", "width")  # of stages, where a value is a tuple
+
 
 @dataclass(frozen=True)
 class Display:
@@ -87,7 +89,7 @@ def _real(condition: Condition) -> Display:
     return Display(
         name=condition.name,
         heading=f"Version {condition.version}, sha256 {condition.digest[:16]}. A real bench, {way}; only its nominal "
-        "optics are known, and an efficiency of 1 is the nominal one.",
+        f"optics are known, and an efficiency of 1 is the nominal one{_gray(spec)}.",
         lines=(f"panel: {spec.shape[0]} x {spec.shape[1]} pixels, {spec.distance * 1e3:.4g} mm", _optics(spec)),
     )
 
@@ -105,7 +107,7 @@ def simulated(
             _optics(profile.scaled(panel).panel),
             *_stages(profile),
         ),
-        basis=basis(profile),
+        basis=f"{basis(profile)}{_gray(profile.panel)}",
         modelled={label: tuple(name for name in effects if name in form) for label, form in forms.items()},
         effects=len(effects),
     )
@@ -128,6 +130,10 @@ def basis(profile: Profile) -> str:
     )
 
 
+def _gray(panel: Panel | DisplaySpec) -> str:
+    return "; of one wavelength, so that targets are gray" if len(panel.wavelengths) == 1 else ""
+
+
 def _optics(panel: Panel | DisplaySpec) -> str:
     wavelengths = ", ".join(f"{value * 1e9:.4g}" for value in panel.wavelengths)
     iris = f"an iris of {panel.pupil:g} of the band" if panel.pupil else "no iris"
@@ -141,5 +147,9 @@ def _stages(profile: Profile) -> list[str]:
         stage = getattr(profile, item.name)
         neutral = item.default_factory() if item.default_factory is not MISSING else item.default
         if is_dataclass(stage) and not isinstance(stage, type | Panel) and stage != neutral:
-            lines.append(f"{item.name.replace('_', ' ')}: {plain(asdict(stage))}")
+            values = asdict(stage)
+            for name in PER_COLOUR:
+                if isinstance(values.get(name), tuple):
+                    values[name] = values[name][: len(profile.panel.wavelengths)]
+            lines.append(f"{item.name.replace('_', ' ')}: {plain(values)}")
     return lines

@@ -26,7 +26,7 @@ from .definition import DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep,
 from .displays import condition, displays, real_condition
 from .focal_stacks import SCORES, planes_of
 from .identity import SPECKLE
-from .plan import FLOORS, REFERENCE
+from .plan import FLOORS, REFERENCE, is_reference
 
 
 def load_study(path: Path | str, changes: Changes | None = None) -> Study:
@@ -188,8 +188,8 @@ def _check_profiles(study: Study, document: Document) -> None:
         where = ("display", "learned", "profile") if learned else where
         with placed(document, where, where):
             display = real_condition(bench, study.folder) if bench else condition(profile, panel, study.folder)
-            if display.name in seen:
-                both = f"'{profile}' and '{seen[display.name]}' are both named '{display.name}'"
+            if (taken := REFERENCE if is_reference(display.name) else display.name) in seen:
+                both = f"'{profile}' and '{seen[taken]}' are both named '{display.name}'"
                 raise UserError(f"{both}; list each display once")
         name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:

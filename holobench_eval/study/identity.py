@@ -164,6 +164,8 @@ def grouped(columns: Mapping[str, float], metrics: Mapping[str, str]) -> dict[st
     metrics: versions by name, of those that were computed; one without values found nothing in the capture to measure.
     """
     names = sorted(versions(), key=len, reverse=True)
+    if "scale_1" not in columns:  # of gray pictures
+        columns = {"match_factor" if name == "scale_0" else name: value for name, value in columns.items()}
     by_name: dict[str, Plain] = {name: {"version": version, "values": {}} for name, version in metrics.items()}
     for column, value in columns.items():
         owner = _owner(column, names)

@@ -21,7 +21,7 @@ from .focal_stacks import Showing, Target, offset, planes_a_scene, planes_of, sh
 from .isolation import read_files
 from .versions import dataset_version, method_version
 
-REFERENCE = "reference"  # the condition of the floor cells
+REFERENCE = "reference"  # the condition of the floor cells, see ``reference_of``
 PATHS = ("path", "manifest")  # parameters of datasets that say where images lie; each image has its digest
 FLOORS = (  # what a study without any display would score: see ``holobench_eval.metrics.references``
     "floor_constant",
@@ -33,6 +33,16 @@ FLOORS = (  # what a study without any display would score: see ``holobench_eval
 )
 
 
+def reference_of(display: str) -> str:
+    """The condition of the floor cells of a display whose targets are not those of the study's first."""
+    return f"{REFERENCE} for {display}"
+
+
+def is_reference(condition: str) -> bool:
+    """Whether a condition is that of floor cells."""
+    return condition == REFERENCE or condition.startswith(reference_of(""))
+
+
 @dataclass(frozen=True)
 class Cell:
     """A number of a table, before it is measured: a phase, a capture of it, and what reports say of both.
@@ -40,7 +50,7 @@ class Cell:
     phase: its description (``identity.phase``), or what a floor image is made of; shown_on: the display (None for a
     floor image that needs none); method: registered name or ``file.py:Class``; code: its version
     (``versions.method_version``); params: all of them; target_sha256: digest of the source image; condition: name of
-    the display, or ``reference`` for the floor; repeat, seed: names of the noise; measure: what is scored, see
+    the display, or the floor's (``is_reference``); repeat, seed: names of the noise; measure: what is scored, see
     ``Study``; holograms: of predictions, the method whose captures are predicted, with the description of its phase;
     prepared: what the method and the display had to learn first (``Preparation.id``); captures: the most that the
     display allows while the target is solved (None: no limit); files: digests of the files that the method reads for
@@ -117,7 +127,7 @@ class Task:
     @property
     def is_floor(self) -> bool:
         """Whether the cells are floor cells, which have no method."""
-        return self.cells[0].condition == REFERENCE
+        return is_reference(self.cells[0].condition)
 
 
 @dataclass(frozen=True)
@@ -179,9 +189,13 @@ def plan(study: Study) -> Plan:
     targets = [(item, study.dataset.digest(item)) for item in study.items]
     displays_by_source = displays(study)
     ground = _Ground(study)
-    first = next(iter(displays_by_source.values()))
+    references = tuple(_references(study, list(displays_by_source.values())))
     apart = planes_a_scene(ground.planes) if study.measure == "focus" else 1
-    tasks = [ground.floor(first, target, targets[(i + apart) % len(targets)]) for i, target in enumerate(targets)]
+    tasks = [
+        ground.floor(display, condition, target, targets[(i + apart) % len(targets)])
+        for display, condition in references
+        for i, target in enumerate(targets)
+    ]
     for entry in study.methods:
         entry_displays = [
             display for source in entry.profiles for display in changed(study, source, displays_by_source[source])
@@ -324,7 +338,7 @@ class _Ground:
         """The name of a display in tables; the planes of a focal stack share a row."""
         return display.name if self.study.measure == "focus" else display.title
 
-    def floor(self, display: Condition, target: Target, wrong: Target) -> Task:
+    def floor(self, display: Condition, condition: str, target: Target, wrong: Target) -> Task:
         """The references of a target; ``wrong``: the target whose picture is scored as the wrong one."""
         study = self.study
         wrong_target = {"target": wrong[0], "target_sha256": wrong[1]}
@@ -334,6 +348,8 @@ class _Ground:
         holograms = self._holograms(display, target, 0)
         source = self.source | {"sha256": target[1]}
         made_of = {"target": source, "size": list(display.spec.region.shape), "draw": [study.seed, target[0]]}
+        if condition != REFERENCE or len(display.spec.wavelengths) == 1:
+            made_of["display"] = display.name
         cells = tuple(
             self.cell(
                 {"floor": name, **made_of, **({"wrong": wrong[1]} if own else {})},
@@ -344,7 +360,7 @@ class _Ground:
                 params=own,
                 target=target[0],
                 target_sha256=target[1],
-                condition=REFERENCE,
+                condition=condition,
                 repeat=0,
                 prepared=_ids(display.learned),
                 holograms=holograms | ({"wrong": self._holograms(display, wrong, 0)} if own and holograms else {}),
@@ -352,6 +368,21 @@ class _Ground:
             for name, own in params.items()
         )
         return Task("floor", cells, (display,) * len(cells))
+
+
+def _references(study: Study, shown: Sequence[Condition]) -> Iterator[tuple[Condition, str]]:
+    """The first display, and those whose targets are of another size or other colours, with their floor's condition.
+
+    Predictions are compared with captures, and their floor with those of the first display alone.
+    """
+
+    def size(display: Condition) -> tuple[object, ...]:
+        return display.spec.region.shape, len(display.spec.wavelengths)
+
+    yield shown[0], REFERENCE
+    for display in () if study.predicts else shown[1:]:
+        if size(display) != size(shown[0]):
+            yield display, reference_of(display.name)
 
 
 def _ids(*trainings: Preparation | None) -> tuple[str, ...]:

@@ -258,6 +258,12 @@ def spoil_link(path: Path) -> None:
     path.symlink_to(outside)
 
 
+def spoil_depth(path: Path) -> None:
+    deeper = path.with_name("deeper")
+    deeper.mkdir()
+    path.rename(deeper / path.name)
+
+
 def spoil_twin(path: Path) -> None:
     Image.open(path).save(path.with_suffix(".tif"))
 
@@ -286,6 +292,7 @@ def spoil_light_of_target(path: Path) -> None:
         (spoil_name_of_target, r"targets/coffee.png.png; rename it coffee.png$"),
         (lambda path: Image.new("RGB", (8, 8)).save(path), "8 x 8 pixels"),
         (lambda path: shutil.rmtree(path.parent), "no folders in it"),
+        (spoil_depth, "expected .*, or --captures .*m for those in its folder deeper$"),
         (lambda path: path.rename(path.parents[1] / "loose.png"), "outside a method's folder"),
         (lambda path: shutil.rmtree(path.parents[2] / "targets"), "no such folder"),
         (spoil_light_of_target, r"targets/coffee.png: black; expected a target with light"),

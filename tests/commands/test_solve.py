@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,18 @@ def test_a_gray_picture_is_taken(picture: Path) -> None:
     cv2.imwrite(str(picture), np.full((120, 120), 90, np.uint8))
     solve("double_phase", picture, display="ideal", panel=(128, 128), output=Path("out"))
     assert Path("out", "report.md").is_file()
+
+
+def test_a_display_of_one_laser_is_called_by_no_other_colour(picture: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    panel = "panel: {wavelengths: [532e-9]}"
+    Path("one.yaml").write_text(f"name: one\nversion: 1\nseed: 1\ndescription: One.\nlike: leto-2020\n{panel}\n")
+    solve("double_phase", picture, display="one.yaml", panel=(128, 128), output=Path("out"))
+    assert "shown in gray, by the one wavelength of the display" in capsys.readouterr().out
+    assert "of one wavelength, so that targets are gray" in Path("out/report.md").read_text()
+    (note,) = Path("out/captures").rglob("*.json")
+    written = "".join(Path("out", name).read_text() for name in ("details.md", "columns.md", note.relative_to("out")))
+    assert "gamma = [1.1], gain = [0.95]" in written
+    assert not re.findall(r"\b(?:red|green|R/G/B)\b", written)
 
 
 @pytest.mark.parametrize(

@@ -227,7 +227,13 @@ def test_a_metric_of_another_version_is_in_no_name(tmp_path: Path, monkeypatch: 
 def test_scores_are_grouped_by_the_metric_that_gives_them_and_columns_of_no_metric_by_the_match() -> None:
     columns = {
         **{"psnr_linear": 1.0, "psnr_linear_blur0.5": 2.0, "ssim_srgb": 3.0, "ms_ssim_linear": 4.0, "scale_0": 5.0},
-        **{"brightness_ratio": 6.0, "refine_dx_px": 7.0, "psnr_linear_infocus": 8.0, "speckle_contrast": 9.0},
+        **{
+            "brightness_ratio": 6.0,
+            "refine_dx_px": 7.0,
+            "psnr_linear_infocus": 8.0,
+            "speckle_contrast": 9.0,
+            "scale_1": 5.5,
+        },
     }
     known = identity.versions()
     found = identity.grouped(columns, known)
@@ -235,12 +241,14 @@ def test_scores_are_grouped_by_the_metric_that_gives_them_and_columns_of_no_metr
         "psnr": {"psnr_linear": 1.0, "psnr_linear_blur0.5": 2.0},
         "ssim": {"ssim_srgb": 3.0},
         "ms_ssim": {"ms_ssim_linear": 4.0},
-        "match": {"scale_0": 5.0, "brightness_ratio": 6.0},
+        "match": {"scale_0": 5.0, "brightness_ratio": 6.0, "scale_1": 5.5},
         "refine": {"refine_dx_px": 7.0},
         "infocus": {"psnr_linear_infocus": 8.0},
         "speckle_contrast": {"speckle_contrast": 9.0},
     }
     assert identity.flat(found) == columns
+    gray = identity.grouped({"scale_0": 5.0}, known)
+    assert identity.flat(gray) == {"match_factor": 5.0}
     assert identity.lacking(found, known) == {}
     old = {**found, "ssim": {"version": "v2, 0", "values": {"ssim_srgb": 3.0}}}
     assert identity.lacking(old, known) == {"ssim": known["ssim"]}

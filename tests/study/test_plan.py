@@ -8,7 +8,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
-from tests.study.test_run import add_other_profile
+from tests.study.test_run import add_one_laser, add_other_profile
 from tests.support.fake_study import write_config
 
 
@@ -119,3 +119,18 @@ def test_a_second_baseline_is_the_label_of_a_row(tmp_path: Path) -> None:
     config.write_text(f"{config.read_text()}second_baseline: toy\n")
     with pytest.raises(UserError, match="no method has the label 'toy'"):
         load_study(config)
+
+
+def test_a_display_with_targets_of_other_colours_has_floors_of_its_own(tmp_path: Path) -> None:
+    add_one_laser(tmp_path)
+
+    def floors(profiles: str) -> dict[str, set[str]]:
+        found: dict[str, set[str]] = {}
+        for task in plan(study_in(tmp_path, profiles=profiles)).tasks:
+            for cell in task.cells if task.is_floor else ():
+                found.setdefault(cell.condition, set()).add(cell.id)
+        return found
+
+    colour, gray = floors("ideal, other.yaml"), floors("one.yaml")
+    assert set(colour) == set(gray) == {REFERENCE}
+    assert floors("ideal, other.yaml, one.yaml") == colour | {"reference for one": gray[REFERENCE]}

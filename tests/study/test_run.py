@@ -10,6 +10,7 @@ import pytest
 from holobench_eval.commands.plan import preview
 from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.core.io import file_name
+from holobench_eval.core.pictures import open_picture
 from holobench_eval.study import provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
@@ -159,6 +160,19 @@ def add_other_profile(folder: Path) -> None:
 
     text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
     (folder / "other.yaml").write_text(text.replace("name: ideal", "name: other"))
+
+
+def add_one_laser(folder: Path) -> None:
+    add_other_profile(folder)
+    text = (folder / "other.yaml").read_text().replace("name: other", "name: one")
+    (folder / "one.yaml").write_text(text.replace("[6.36e-7, 5.17e-7, 4.46e-7]", "[5.32e-7]"))
+
+
+def test_a_display_of_one_laser_has_gray_pictures_of_the_targets(tmp_path: Path) -> None:
+    add_one_laser(tmp_path)
+    compute(write_config(tmp_path, profiles="ideal, one.yaml", count=1), tmp_path / "out")
+    paths = [Store(tmp_path / "out").target_thumbnail("gray 0", name) for name in ("reference", "reference for one")]
+    assert [open_picture(path.read_bytes()).channels for path in paths] == [3, 1]
 
 
 def test_captures_and_phases_are_saved_on_request(tmp_path: Path) -> None:

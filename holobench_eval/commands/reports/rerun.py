@@ -28,7 +28,7 @@ Key = tuple[str, str, str, float]  # method's label, display, target and repeat:
 # Table 3, computed on processors of two makers, the largest were 0.045 dB and 0.016: docs/results/compare.md.
 TOLERANCE_DB, TOLERANCE = 0.05, 0.02
 # How a capture was matched with its target: no score, and where the match has several equal answers, not one number.
-MATCHES = ("scale_", "refine_")
+MATCHES = ("scale_", "match_factor", "refine_")
 # Phase congruency of a flat image is made of rounding errors.
 FLAT, OF_EDGES = ("floor_constant", "floor_black"), ("fsim", "vsi")
 

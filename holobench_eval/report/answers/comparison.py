@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
-from ...study.plan import REFERENCE
 from ..data.categories import CATEGORIES, OFFLINE, ONLINE
-from ..data.phrases import counted, difference, relation, tested, value, verdict
+from ..data.phrases import counted, difference, floor_scores, relation, tested, value, verdict
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES
 from ..data.text import number, p_value, percent, words
@@ -134,18 +132,13 @@ def floor(results: Results) -> Iterator[str]:
         below = [label for label, gap in scored.items() if not results.headline.better(gap.mean, 0.0)]
         if below:
             parts.append(f"on {condition} {words(below)}")
-    constant = f"a constant image in the place of a {results.layout.text.scored}"
+    scores = floor_scores(results)
+    constant = f"a constant image in the place of a {results.layout.text.scored}{f' ({scores})' if scores else ''}"
     if parts:
-        yield f"No better on average than {constant}{_score_of_floor(results)}: {'; '.join(parts)}."
+        yield f"No better on average than {constant}: {'; '.join(parts)}."
     elif known:
         every = "Every method" if whole else "Every method with a score for every target"
-        yield f"{every} is better on average than {constant}{_score_of_floor(results)}."
-
-
-def _score_of_floor(results: Results) -> str:
-    """What the constant image scores, where it does for every target."""
-    mean = float(results.values("floor_constant", REFERENCE).mean())
-    return "" if math.isnan(mean) else f" ({results.headline.with_unit(mean)})"
+        yield f"{every} is better on average than {constant}."
 
 
 def oracle(results: Results) -> Iterator[str]:

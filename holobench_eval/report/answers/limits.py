@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...study.plan import REFERENCE
+from ..data.categories import FLOOR
 from ..data.phrases import remarks
 from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, words
@@ -67,7 +67,7 @@ def _sample(report: Report) -> str:
             parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")
     elif clusters < FEWEST:
         parts.append(f"Fewer than {FEWEST} clusters give no interval and no test.")
-    holes = int((results.holes["condition"] != REFERENCE).sum())
+    holes = int((results.holes["category"] != FLOOR).sum())
     if holes:
         parts.append(
             f"{holes} planned cells have no score (details.md says why); a method that lacks one is not ranked."

@@ -104,7 +104,8 @@ def _others(results: Results, losses: list[tuple[Estimate, Sweep, float | str]])
         return text
     shown = [sweep.kind.words for loss, sweep, _ in losses if loss.low > SMALL]
     open_ = [sweep.kind.words for loss, sweep, _ in losses if loss.low <= SMALL < loss.high]
-    text += f"; {words(shown) if shown else 'no change'} is shown to cost it more than {SMALL:g} dB"
+    are = "are" if len(shown) > 1 else "is"
+    text += f"; {words(shown) if shown else 'no change'} {are} shown to cost it more than {SMALL:g} dB"
     return f"{text}; more is not excluded for {words(open_)}" if open_ else text
 
 

@@ -162,6 +162,6 @@ def _colour_bar(page: Page, scale: Normalize) -> None:
     box = (SIDE / width, (FOOTER - 22) / height, min(420, width - 2 * SIDE) / width, 14 / height)
     mappable = ScalarMappable(scale, ERROR_COLOURS)
     bar = page.figure.colorbar(mappable, cax=page.figure.add_axes(box), orientation="horizontal")
-    words = "absolute error, mean over R, G, B [share of full scale of sRGB values]"
+    words = "absolute error, mean over colours [share of full scale of sRGB values]"
     bar.set_label(textwrap.fill(words, int(box[2] * width / 5.5)), fontsize=8)
     bar.ax.tick_params(labelsize=8)

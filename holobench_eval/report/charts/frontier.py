@@ -30,6 +30,7 @@ FOOTER = 20
 # cost, which stand side by side so that none hides another.
 ZERO_GAP = 0.14
 SPREAD = 0.02
+APART = 0.07  # two ticks with names, the same
 # From so many rows of a method on, no two with the same captures, they are a curve, named at its end; fewer, or rows
 # that differ in something else, are marks of their own.
 SHORTEST_CURVE = 3
@@ -85,12 +86,14 @@ class Frontier:
 class Costs:
     """The axis of costs, equal in all panels: positions are decimal logarithms, and zero has a position of its own.
 
-    low, high: ends of the logarithmic part; free: labels of marks without any cost, side by side around ``zero``.
+    low, high: ends of the logarithmic part; free: labels of marks without any cost, side by side around ``zero``;
+    own: logarithms of the marks' costs, where these are apart enough to be ticks.
     """
 
     low: float
     high: float
     free: tuple[str, ...] = ()
+    own: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, marks: Sequence[Mark]) -> Costs:
@@ -98,7 +101,8 @@ class Costs:
         logs = np.log10([mark.cost for mark in marks if mark.cost > 0])
         left, right = (max(0.12, share * float(np.ptp(logs))) for share in (0.06, 0.16))  # to the right stand names
         free = tuple(dict.fromkeys(mark.label for mark in marks if mark.cost == 0))
-        return cls(float(logs.min()) - left, float(logs.max()) + right, free)
+        low, high, own = float(logs.min()) - left, float(logs.max()) + right, np.unique(logs)
+        return cls(low, high, free, tuple(own) if (np.diff(own) > APART * (high - low)).all() else ())
 
     @property
     def width(self) -> float:
@@ -127,12 +131,14 @@ class Costs:
         return (self.low if self.zero is None else self.zero - self.half - 0.08 * self.width), self.high
 
     def show(self, axes: Axes) -> None:
-        """Ticks at decades, and at 2 and 5 in between where there are few; zero with a break of the axis."""
+        """Ticks at decades, and at 2 and 5 in between where there are few; at the marks where that leaves one at most;
+        zero with a break of the axis."""
         decades = range(int(np.floor(self.low)), int(np.ceil(self.high)) + 1)
         named = (1, 2, 5) if self.width < 2.5 else (1,)
         ticks = [exponent + float(np.log10(step)) for exponent in decades for step in named]
         small = [exponent + float(np.log10(step)) for exponent in decades for step in range(2, 10)]
         inside = [tick for tick in ticks if self.low <= tick <= self.high]
+        inside = inside if len(inside) > 1 else [*(self.own or inside)]
         axes.set_xlim(*self.limits)
         axes.xaxis.set_major_locator(FixedLocator(inside if self.zero is None else [self.zero, *inside]))
         axes.xaxis.set_minor_locator(FixedLocator([tick for tick in small if self.low <= tick <= self.high]))
@@ -143,7 +149,7 @@ class Costs:
 
     def _name(self, position: float) -> str:
         cost = 10**position
-        return "0" if position == self.zero else f"{cost:,.0f}" if cost > 0.9 else f"{cost:.1g}"
+        return "0" if position == self.zero else f"{cost:,.0f}" if cost > 99 else f"{cost:.2g}"
 
 
 def _break(axes: Axes, position: float) -> None:

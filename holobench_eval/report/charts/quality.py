@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..data.phrases import floor_scores
 from ..data.results import Results
 from ..data.statistics import Array, Estimate
 from .look.medium import medium
@@ -86,10 +87,10 @@ def best_first(rows: Iterable[Row], higher: bool) -> list[Row]:
     return sorted(rows, key=lambda row: row.estimate.mean, reverse=higher)
 
 
-def draw_quality(path: Path, results: Results, floors: Mapping[str, float]) -> None:
+def draw_quality(path: Path, results: Results, floors: Sequence[str]) -> None:
     """Draw a panel per display, best method first; UserError where no record has the headline.
 
-    floors: what the floor scores, by its description.
+    floors: rows of the floor, each a line.
     """
     score, panels = results.headline, {}
     for condition in results.conditions:
@@ -100,15 +101,18 @@ def draw_quality(path: Path, results: Results, floors: Mapping[str, float]) -> N
     axis = f"{score.axis}{results.layout.text.axis}; dots: targets; mean with 95 % interval"
     axis = medium().wrap(axis, 0.6 * medium().width)
     labels = [
-        medium().wrap(f"floor: {name}, {score.with_unit(value)}", 0.8 * medium().width)
-        for name, value in floors.items()
+        medium().wrap(
+            f"floor: {results.layout.text.floor_name(name)}, {floor_scores(results, name)}", 0.8 * medium().width
+        )
+        for name in floors
     ]
     with style():
         heights = [height_of(rows) for rows in panels.values()]
         figure, drawn = stacked(list(panels), heights, footer_of(axis, labels))
-        for axes, rows in zip(drawn, panels.values(), strict=True):
+        for axes, (condition, rows) in zip(drawn, panels.items(), strict=True):
             draw_rows_of_dots(axes, rows)
-            for value, label, dashes in zip(floors.values(), labels, DASHES, strict=False):
+            for name, label, dashes in zip(floors, labels, DASHES, strict=False):
+                value = float(results.row(name, results.reference(condition))[score.column])
                 axes.axvline(value, color=GREY, linestyle=dashes, linewidth=1.1, zorder=1, label=label)
         drawn[-1].set_xlabel(axis)
         if floors:

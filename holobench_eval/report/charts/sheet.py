@@ -36,9 +36,10 @@ from ...optics.convolution import iris
 from ...study.opening import open_bench
 from .style import METADATA
 
-VERSION = 4  # of the drawing: sheets of another are drawn again
+VERSION = 5  # of the drawing: sheets of another are drawn again
 DPI = 75  # of a PNG: 1275 x 975 pixels, the width of a page of pictures
 COLOURS = ("tab:red", "tab:green", "tab:blue")
+BOUNDS = (590e-9, 490e-9)  # m, between these colours
 MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.045, "top": 0.92, "wspace": 0.66, "hspace": 0.38}
 RAMP = 0.11  # cycles a pixel of the test ramp of a bench without a blaze
 # A PNG of so many colours of each kind, and of a cube for captures, is small enough to look at in a browser.
@@ -121,6 +122,13 @@ def _index(bench: SimulatedBench) -> int:
     return len(bench.channels) // 2
 
 
+def _colours(bench: SimulatedBench) -> tuple[str, ...]:
+    """Of the lines of each wavelength; of a single one, the colour that it is nearest to."""
+    if len(bench.spec.wavelengths) > 1:
+        return COLOURS
+    return (COLOURS[sum(bench.spec.wavelengths[0] < bound for bound in BOUNDS)],)
+
+
 def _middle(bench: SimulatedBench) -> ChannelMaps:
     return bench.channels[_index(bench)]
 
@@ -149,7 +157,7 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     """Look-up table, its gain map, crosstalk, wrap edge, pixel aperture and flicker."""
     profile = bench.profile
     levels = torch.arange(2**profile.panel.bits)
-    for channel, (colour, wavelength) in enumerate(zip(COLOURS, bench.spec.wavelengths, strict=False)):
+    for channel, (colour, wavelength) in enumerate(zip(_colours(bench), bench.spec.wavelengths, strict=True)):
         curve = profile.lut.curve(profile.panel.bits, channel) / torch.pi
         axes[0].plot(levels, curve, color=colour, label=f"{1e9 * wavelength:.0f} nm")
     axes[0].plot(levels, 2 * levels / 2**profile.panel.bits, "k:", label="nominal")
@@ -222,7 +230,7 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
 
 def _spectrum(axis: Axes, bench: SimulatedBench) -> None:
     """The wavelengths of each colour, as offsets from the nominal one; colours of the same offset lie in each other."""
-    for lines, colour, width in zip(bench.lines, COLOURS, (9, 5, 2), strict=False):
+    for lines, colour, width in zip(bench.lines, _colours(bench), (9, 5, 2), strict=False):
         offsets = [1e9 * line.geometry.detuning for line in lines]
         axis.vlines(offsets, 0, [line.power for line in lines], color=colour, linewidth=width)
     axis.set(title="spectrum of the source", xlabel="offset from the nominal wavelength [nm]", ylabel="power of a line")

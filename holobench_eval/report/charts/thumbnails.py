@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +22,16 @@ class Thumbnails:
         """output: the folder of the report."""
         self.results, self.store = results, Store(output)
         self.absent: set[str] = set()
+        self._targets: dict[str, dict[str, Picture]] = {}
 
-    @cached_property
-    def targets(self) -> dict[str, Picture]:
-        """The targets that have a picture, in their order."""
-        pictures = ((target, self._load(self.store.target_thumbnail(target))) for target in self.results.targets)
-        return {target: picture for target, picture in pictures if picture is not None}
+    def targets(self, condition: str) -> dict[str, Picture]:
+        """The targets that have a picture, as a display is to show them, in their order."""
+        reference = self.results.reference(condition)
+        if reference not in self._targets:
+            paths = {target: self.store.target_thumbnail(target, reference) for target in self.results.targets}
+            pictures = ((target, self._load(path)) for target, path in paths.items())
+            self._targets[reference] = {target: picture for target, picture in pictures if picture is not None}
+        return self._targets[reference]
 
     def tile(self, label: str, condition: str, target: str) -> Tile:
         """The capture of the first repeat that is done, with its own scores; without one, the reason in its place."""
@@ -39,7 +42,7 @@ class Thumbnails:
         done = cells[cells["state"] == DONE]
         if done.empty:
             return Tile(None, f"{cells.iloc[0]['state']}: {cells.iloc[0]['reason']}")
-        cell, shape = done.iloc[0], self.targets[target].shape
+        cell, shape = done.iloc[0], self.targets(condition)[target].shape
         picture = self._load(self.store.thumbnail(str(cell["cell"])))
         if picture is None:
             return Tile(None, "no thumbnail of this capture")
@@ -55,7 +58,7 @@ class Thumbnails:
         known = np.isfinite(values)
         means = np.where(known, values, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
         quality = dict(zip(results.targets, results.headline.sign * means, strict=True))
-        return sorted(self.targets, key=lambda target: quality[target])
+        return sorted(self.targets(condition), key=lambda target: quality[target])
 
     def middle(self, condition: str) -> str:
         """The target in the middle of ``by_quality``."""

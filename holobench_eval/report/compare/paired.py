@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ...core.errors import UserError, suggest
-from ...study.plan import REFERENCE
+from ...study.plan import REFERENCE, is_reference
 from ..data.scores import Score, parse
 from ..data.statistics import Array, Estimate, family_p, mean_interval
 from ..data.tables import DONE, clusters_in, score_columns
@@ -175,7 +175,8 @@ def _displays(a: Run, b: Run, displays: Mapping[str, str] | None) -> dict[str, s
         return {name: name for name in sorted(of_a | of_b)}
     for name, known, run in [*((n, of_a, a) for n in displays), *((n, of_b, b) for n in displays.values())]:
         if name not in known:
-            raise UserError(f"--displays: {run.folder} has no display '{name}'; {suggest(name, known - {REFERENCE})}")
+            shown = [other for other in known if not is_reference(other)]
+            raise UserError(f"--displays: {run.folder} has no display '{name}'; {suggest(name, shown)}")
     if len(set(displays.values())) < len(displays):
         raise UserError("--displays: two displays of A are paired with one of B; expected a display of B for each")
     return {**displays, REFERENCE: REFERENCE}

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from ...display.simulated.changes import KINDS
-from ...study.plan import REFERENCE
+from ...study.plan import is_reference
 from .categories import FLOOR
 from .column import DONE, Cells, Column, Record, column, first, if_known, if_trained, mean, median
 from .layout import Layout
@@ -94,7 +94,7 @@ def label(record: Record, layout: Layout) -> str:
 def category(record: Record, layout: Layout) -> str:
     """What the method knows of the display: `open loop`, `calibrated`, `online` (captures the scored image), `ceiling`
     (oracle), `given` (pictures from files); `floor`: an image that no method made."""
-    return FLOOR if record["cell"]["condition"] == REFERENCE else layout.category(record["label"])
+    return FLOOR if is_reference(record["cell"]["condition"]) else layout.category(record["label"])
 
 
 @column(CELL, "count", is_of_study=True)

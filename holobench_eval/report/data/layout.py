@@ -18,7 +18,7 @@ from ...study import isolation
 from ...study.definition import PREDICTIONS, Study
 from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
-from ...study.plan import REFERENCE
+from ...study.plan import is_reference
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .text import AS_STORED, BY_MEASURE, COMPARED, FILES, ON_A_NETWORK, REAL, REAL_SEEDS, Text, plain
 
@@ -187,7 +187,7 @@ class Layout:
 
     def change(self, condition: str, target: str = "") -> Change:
         """What was changed under a condition; the plane of a target of a focal stack is a change of its display."""
-        if condition in self.changed or condition == REFERENCE or target not in self.planes:
+        if condition in self.changed or is_reference(condition) or target not in self.planes:
             return self.changed.get(condition, Change())
         return Change("plane", self.planes[target][1], "mm")
 

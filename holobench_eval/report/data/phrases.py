@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...study.plan import REFERENCE
 from .column import DONE
 from .results import Results
 from .scores import Score
@@ -75,6 +74,13 @@ def value(results: Results, label: str, condition: str) -> str:
     return results.headline.with_unit(float(results.values(label, condition).mean()))
 
 
+def floor_scores(results: Results, floor: str = CONSTANT) -> str:
+    """What a floor image scores: ``16.20 dB``, or ``16.20 dB on A and 17.97 dB on B`` where displays have their own."""
+    shown = results.by_reference
+    known = {name: value(results, floor, name) for name in shown if results.is_complete(floor, name)}
+    return words([f"{mean} on {words(shown[name])}" if len(shown) > 1 else mean for name, mean in known.items()])
+
+
 def marked(results: Results, label: str, condition: str) -> str:
     """A method's label with what must be known of its row: an oracle, a fallback, a network that learned too little."""
     return ", ".join([results.layout.marked(label), *_marks(results, label, condition)])
@@ -101,7 +107,7 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
         return []
     rows = [("the ideal image", name, condition) for name in layout.identities if name in results.methods(condition)]
     if CONSTANT in results.floors and results.has_pictures(condition):
-        rows.insert(0, ("the constant image", CONSTANT, REFERENCE))
+        rows.insert(0, ("the constant image", CONSTANT, results.reference(condition)))
     ours, better = results.values(label, condition).mean(), results.headline.better
     return [text for text, name, where in rows if better(results.values(name, where).mean(), ours)]
 

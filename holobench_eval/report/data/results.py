@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...core.errors import UserError, suggest
-from ...study.plan import FLOORS, REFERENCE
-from .categories import CATEGORIES, OFFLINE, ORACLE
+from ...study.plan import FLOORS, REFERENCE, is_reference, reference_of
+from .categories import CATEGORIES, FLOOR, OFFLINE, ORACLE
 from .layout import Layout
 from .scores import Score, parse
 from .statistics import Array, Estimate, PairedTest, family_p, mean_interval, ratio_interval
@@ -71,7 +71,7 @@ class Results:
     @cached_property
     def done(self) -> pd.DataFrame:
         """The records of methods with a score."""
-        return self.frame[(self.frame["state"] == DONE) & (self.frame["condition"] != REFERENCE)]
+        return self.frame[(self.frame["state"] == DONE) & (self.frame["category"] != FLOOR)]
 
     @cached_property
     def targets(self) -> list[str]:
@@ -98,8 +98,8 @@ class Results:
     @cached_property
     def conditions(self) -> list[str]:
         """Conditions that have rows, without the reference and without those that are a change of another."""
-        aside = {REFERENCE, *self.layout.changed}
-        return [name for name in dict.fromkeys(self.table["condition"]) if name not in aside]
+        names = dict.fromkeys(self.table["condition"])
+        return [name for name in names if not is_reference(name) and name not in self.layout.changed]
 
     def methods(self, condition: str) -> list[str]:
         """Labels with a row under ``condition``, in the order of the table."""
@@ -179,14 +179,31 @@ class Results:
         rows = (name for name in FLOORS if name in self.methods(REFERENCE))
         return [name for name in rows if np.isfinite(self.row(name, REFERENCE)[self.headline.column])]
 
+    def reference(self, condition: str) -> str:
+        """The condition of the reference rows that a display's methods are held against: its own where it has any."""
+        own = reference_of(self.display_of.get(condition, condition))
+        return own if own in self.display_of else REFERENCE
+
+    @property
+    def by_reference(self) -> dict[str, list[str]]:
+        """The displays that have pictures of the reference rows, by the condition of those rows."""
+        found: dict[str, list[str]] = {}
+        for condition in filter(self.has_pictures, self.conditions):
+            found.setdefault(self.reference(condition), []).append(condition)
+        return found
+
+    @cached_property
+    def display_of(self) -> dict[str, str]:
+        """The display of every condition."""
+        return dict(zip(self.frame["condition"], self.frame["display"], strict=True))
+
     def has_pictures(self, condition: str) -> bool:
         """Whether the reference rows were scored against the same images as the methods under ``condition``, and made
         the pictures that stand for the targets there.
 
-        Pictures are compared with targets, equal for all displays; predictions with the captures of one display.
+        Pictures are compared with targets; predictions with the captures of one display.
         """
-        captured = self.frame.loc[self.frame["condition"] == REFERENCE, "display"]
-        return not self.layout.predicts or condition in set(captured)
+        return not self.layout.predicts or condition == self.display_of.get(REFERENCE)
 
     @cached_property
     def holes(self) -> pd.DataFrame:
@@ -217,5 +234,5 @@ class Results:
         """Headline score minus that of a floor row of the same target; None without one, or without a target."""
         if floor not in self.floors or not self.has_pictures(condition):
             return None
-        found = self.estimate(self.values(label, condition) - self.values(floor, REFERENCE))
+        found = self.estimate(self.values(label, condition) - self.values(floor, self.reference(condition)))
         return found if found.n else None

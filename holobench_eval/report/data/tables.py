@@ -18,7 +18,7 @@ import pandas as pd
 
 from ...core.errors import UserError
 from ...core.files import CONTROLS, read_text
-from ...study.plan import FLOORS, REFERENCE, Plan
+from ...study.plan import FLOORS, Plan, is_reference
 from . import columns
 from .categories import FLOOR, ORACLE
 from .column import DONE as DONE
@@ -92,7 +92,8 @@ def _whole(frame: pd.DataFrame) -> pd.DataFrame:
 def row_order(frame: pd.DataFrame, layout: Layout) -> list[tuple[str, str]]:
     """(label, condition) of every row: planned pairs, pairs outside the plan by name, then the reference rows."""
     pairs = set(zip(frame["label"], frame["condition"], strict=True))
-    floors = [(name, REFERENCE) for name in FLOORS if (name, REFERENCE) in pairs]
+    references = sorted({condition for _, condition in pairs if is_reference(condition)})
+    floors = [(name, condition) for condition in references for name in FLOORS if (name, condition) in pairs]
     extra = sorted(pairs - set(layout.pairs) - set(floors))
     return [*(pair for pair in layout.pairs if pair in pairs), *extra, *floors]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...study.artifacts import TrainingRecord, training_records
-from ...study.plan import REFERENCE
+from ...study.plan import is_reference
 from .layout import Layout
 from .tables import DONE
 from .text import words
@@ -55,7 +55,7 @@ def trainings(layout: Layout, records: Sequence[Mapping[str, Any]], output: Path
     needed: dict[str, list[tuple[str, str, str]]] = {}  # by identity: label, condition, digest of what was learned
     for record in records:
         cell, prepared = record["cell"], record["cell"].get("prepared") or ()
-        if prepared and cell["condition"] != REFERENCE and record["label"] in layout.trained:
+        if prepared and not is_reference(cell["condition"]) and record["label"] in layout.trained:
             learned = record["learned"]["sha256"] if record["state"] == DONE and record.get("learned") else ""
             needed.setdefault(prepared[0], []).append((record["label"], cell["condition"], learned))
     for record in records if layout.learned_display is not None else ():

@@ -25,6 +25,7 @@ _KEYS = {
     "refine_dx_px": ("Horizontal motion that the refinement found", "px"),
     "refine_dy_px": ("Vertical motion that the refinement found", "px"),
     "refine_theta_deg": ("Rotation that the refinement found", "deg"),
+    "match_factor": ("Factor of the intensity match", ""),
     "scale_0": ("Factor of the intensity match, red", ""),
     "scale_1": ("Factor of the intensity match, green", ""),
     "scale_2": ("Factor of the intensity match, blue", ""),

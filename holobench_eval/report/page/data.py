@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ...study.plan import REFERENCE
 from ..charts.look.methods import looks
 from ..data.columns import costs
 from ..data.phrases import counted
@@ -48,7 +47,10 @@ def page_data(report: Report) -> Json:
         },
         "floors": {
             name: [
-                {"name": results.layout.text.floor_name(floor), "mean": _number(results.row(floor, REFERENCE)[column])}
+                {
+                    "name": results.layout.text.floor_name(floor),
+                    "mean": _number(results.row(floor, results.reference(name))[column]),
+                }
                 for floor in results.floors
                 if results.has_pictures(name)
             ]

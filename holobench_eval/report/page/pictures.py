@@ -62,12 +62,15 @@ def _numbers(report: Report, found: Pictures) -> Json:
     targets = report.results.targets
     cells: dict[str, dict[str, list[int | None]]] = {}
     for (label, condition, target), number in found.numbers.items():
-        if condition:
+        if label:
             holes: list[int | None] = [None] * len(targets)
             cells.setdefault(condition, {}).setdefault(label, holes)[targets.index(target)] = number
     held = Counter(target for *_, target in found.numbers)
     return {
-        "targets": [found.numbers.get(("", "", target)) for target in targets],
+        "targets": {
+            name: [found.numbers.get(("", report.results.reference(name), target)) for target in targets]
+            for name in (*_pictured(report), *_changed(report))
+        },
         "cells": cells,
         "first": max(targets, key=lambda target: held[target]),  # the first of those with most pictures
     }
@@ -97,11 +100,17 @@ def _groups(report: Report) -> Iterator[list[Cell]]:
     ordered = report.thumbnails.by_quality(conditions[0])
     first = spread(ordered, TARGETS_IN_FULL) if len(ordered) > TARGETS_IN_FULL else ordered
     for target in first:
-        yield [("", "", target), *((label, name, target) for name in conditions for label in results.methods(name))]
+        cells = ((label, name, target) for name in conditions for label in results.methods(name))
+        yield [*_truths(report, target), *cells]
     for target in results.targets:
-        yield [("", "", target), *_roles(report, conditions, target)]
+        yield [*_truths(report, target), *_roles(report, conditions, target)]
     for target in first:
         yield list(_roles(report, _changed(report), target))
+
+
+def _truths(report: Report, target: str) -> list[Cell]:
+    """The pictures of a target: one, or one for each of those displays that show it differently."""
+    return [("", reference, target) for reference in report.results.by_reference]
 
 
 def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]:
@@ -135,5 +144,6 @@ def _files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
     names = zip(done["label"], done["condition"], done["target"], strict=True)
     captures = dict(zip(names, done["cell"], strict=True))
     paths = {cell: store.thumbnail(captures[cell]) for cell in cells if cell in captures}
-    targets = {("", "", target): store.target_thumbnail(target) for target in report.results.targets}
+    truths = (cell for target in report.results.targets for cell in _truths(report, target))
+    targets = {cell: store.target_thumbnail(target, reference) for cell in truths for _, reference, target in [cell]}
     return {cell: path for cell, path in (targets | paths).items() if path.is_file()}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...study.folders import alignment_name
-from ...study.plan import REFERENCE
+from ...study.plan import is_reference
 from ..data.results import Results
 from ..data.scores import Score, parse
 from ..data.tables import DONE
@@ -103,7 +103,7 @@ def _percent(scores: Mapping[str, float], key: str) -> str:
 
 
 def _captures(records: Records) -> list[Mapping[str, Any]]:
-    return [r for r in records if r["cell"]["condition"] != REFERENCE and r["cell"]["capture_sha256"]]
+    return [r for r in records if not is_reference(r["cell"]["condition"]) and r["cell"]["capture_sha256"]]
 
 
 def _count(captures: int) -> str:

@@ -33,13 +33,13 @@ def _render(report: Report, figures: Figures) -> Blocks:
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     for condition, stem in slugs(report.results.conditions).items():
-        if report.results.has_pictures(condition) and report.thumbnails.targets:
+        if report.results.has_pictures(condition) and report.thumbnails.targets(condition):
             yield from _comparison(report, condition, stem)
 
 
 def _comparison(report: Report, condition: str, stem: str) -> Iterator[tuple[Path, str]]:
     results, thumbnails, text = report.results, report.thumbnails, report.layout.text
-    targets, methods = thumbnails.targets, _best_first(results, condition)
+    targets, methods = thumbnails.targets(condition), _best_first(results, condition)
     sheets = pages_of_targets(report, condition)
     drawn = [target for sheet in sheets for target in sheet]
     tiles = {(name, target): thumbnails.tile(name, condition, target) for name in methods for target in drawn}
@@ -88,7 +88,7 @@ def _caption(results: Results, page: str, condition: str, drawn: list[str]) -> s
 
 def pages_of_targets(report: Report, condition: str) -> list[list[str]]:
     """The targets of each page, all of one size. Of focal stacks: every plane of a scene of medium quality."""
-    planes, targets = report.layout.planes, report.thumbnails.targets
+    planes, targets = report.layout.planes, report.thumbnails.targets(condition)
     if planes:
         scene = planes[report.thumbnails.middle(condition)][0]
         return list(chunks([target for target in targets if planes[target][0] == scene], TARGETS_A_PAGE))
@@ -106,7 +106,7 @@ def _grouped(keys: dict[str, object]) -> list[list[str]]:
 
 def _selection(report: Report, condition: str) -> list[str]:
     """All targets if they fit; else evenly spaced ones from worst to best by their mean over methods."""
-    targets = report.thumbnails.targets
+    targets = report.thumbnails.targets(condition)
     tall, wide = tile_size(next(iter(targets.values())).shape)
     row = 1.5 * tall * wide * (1 + min(METHODS_A_PAGE, len(report.results.methods(condition))))
     most = int(min(TARGETS_SHOWN, max(1, PIXELS // row)))

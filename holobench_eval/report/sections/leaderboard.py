@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...study.plan import REFERENCE
 from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
 from ..charts.look.methods import looks
 from ..data.categories import CATEGORIES, ONLINE, ORACLE, meanings
@@ -166,7 +165,7 @@ def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
         higher=results.headline.higher_is_better,
         baseline=_line(results, str(baseline), condition, "baseline", band=False) if known else None,
         oracle=_line(results, oracle, condition, "ceiling", band=True) if oracle else None,
-        constant=_constant(results) if has_constant else None,
+        constant=_constant(results, condition) if has_constant else None,
     )
 
 
@@ -188,9 +187,9 @@ def _line(results: Results, name: str, condition: str, role: str, band: bool) ->
     return Line(f"{role}: {name}, {results.headline.with_unit(mean)}", mean, **ends)
 
 
-def _constant(results: Results) -> Line:
+def _constant(results: Results, condition: str) -> Line:
     """The floor: the mean of a constant image."""
-    mean = float(results.row(CONSTANT, REFERENCE)[results.headline.column])
+    mean = float(results.row(CONSTANT, results.reference(condition))[results.headline.column])
     return Line(f"constant image, {results.headline.with_unit(mean)}", mean)
 
 

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from ...study.plan import REFERENCE
 from ..charts import paired
 from ..charts.quality import draw_quality
 from ..data.results import Results
 from ..data.scores import parse
 from ..data.tables import DONE, MEDIAN, PUBLISHED
-from ..data.text import FILES
+from ..data.text import FILES, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Column, Figures, Report, Section, column, method_rows
 
@@ -128,11 +127,17 @@ def stopped(results: Results, condition: str) -> list[str]:
 
 def _floors(results: Results) -> Markdown:
     """What images that no method made score."""
-    text, rows = results.layout.text, []
-    for name in results.floors:
-        row = results.row(name, REFERENCE)
-        rows.append([text.floor_name(name), f"{row['n']:.0f}", *(score.in_row(row) for score in results.leading)])
-    return table([text.instead, "n", *(score.heading for score in results.leading)], rows)
+    text, shown = results.layout.text, results.by_reference
+    rows = []
+    for condition, displays in shown.items():
+        for name in results.floors:
+            row = results.row(name, condition)
+            on = [words(displays)] * (len(shown) > 1)
+            rows.append(
+                [text.floor_name(name), *on, f"{row['n']:.0f}", *(score.in_row(row) for score in results.leading)]
+            )
+    displays_too = ["display"] * (len(shown) > 1)
+    return table([text.instead, *displays_too, "n", *(score.heading for score in results.leading)], rows)
 
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
@@ -143,13 +148,9 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         path = report.figures / f"quality-paired-{stem}.png"
         paired.draw(results, condition, path)
         yield path, paired.caption(results, condition)
-    floors = {
-        text.floor_name(name): float(results.row(name, REFERENCE)[results.headline.column])
-        for name in ("floor_constant", "floor_speckle")
-        if name in results.floors and all(map(results.has_pictures, results.conditions))
-    }
+    floors = [name for name in ("floor_constant", "floor_speckle") if name in results.floors]
     path = report.figures / "quality-by-target.png"
-    draw_quality(path, results, floors)
+    draw_quality(path, results, floors if all(map(results.has_pictures, results.conditions)) else ())
     yield (
         path,
         f"{results.headline.axis}{text.axis}, by method and display. Small dots: targets, at the same height in every "

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...study.plan import REFERENCE
+from ...study.plan import is_reference
+from ..data.categories import FLOOR
 from ..data.layout import Layout, TrainingSet
 from ..data.results import Results
 from ..data.tables import DONE
@@ -53,7 +54,7 @@ def _details_of(report: Report) -> Markdown:
 
 def counts(results: Results) -> str:
     """How large the study is, in one sentence."""
-    cells = results.frame[results.frame["condition"] != REFERENCE]
+    cells = results.frame[results.frame["category"] != FLOOR]
     done = int((cells["state"] == DONE).sum())
     parts = (
         (len(results.targets), "target"),
@@ -90,7 +91,7 @@ def _on_displays(report: Report) -> list[tuple[str, str]]:
 
 def _from_files(report: Report) -> list[tuple[str, str]]:
     """The same where the pictures were given."""
-    cells = [record["cell"] for record in report.records if record["cell"]["condition"] != REFERENCE]
+    cells = [record["cell"] for record in report.records if not is_reference(record["cell"]["condition"])]
     sizes = dict.fromkeys(" x ".join(map(str, cell["panel"])) for cell in cells if cell["panel"])
     return [
         _targets(report.results),
@@ -122,7 +123,7 @@ def _distinct(results: Results, column: str) -> str:
 def _methods(report: Report) -> Markdown:
     """Label, registered name and parameters of every method, in the order of the tables."""
     cells = {record["label"]: record["cell"] for record in report.records}
-    planned = report.results.table["condition"] != REFERENCE
+    planned = report.results.table["category"] != FLOOR
     rows = [
         [label, code(cells[label]["method"]), plain(cells[label]["params"]) + _limit(cells[label])]
         for label in dict.fromkeys(report.results.table.loc[planned, "label"])

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...study.plan import REFERENCE
 from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..charts.sweeps import Curve, Panel, draw_sweep
@@ -239,16 +238,19 @@ def _curves(report: Report) -> Iterator[tuple[Path, str]]:
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     """Rows of pictures of the target in the middle of their ranking by quality."""
     thumbnails = report.thumbnails
-    if not thumbnails.targets:
+    first = report.results.conditions[0]
+    if not thumbnails.targets(first):
         return
-    target = thumbnails.middle(report.results.conditions[0])
+    target = thumbnails.middle(first)
     for same in _by_kind(report):
         change, kind = same[0].kind.words, same[0].swept.kind
         for sweep in same:
             stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in sweep.swept.before)
             path = report.figures / f"sweep-{kind}-{stem}.jpg"
             rows = _rows(report, sweep, target)
-            draw_rows(path, f"{sweep.swept.before}: {change}", (target, thumbnails.targets[target]), rows)
+            draw_rows(
+                path, f"{sweep.swept.before}: {change}", (target, thumbnails.targets(sweep.swept.before)[target]), rows
+            )
             yield path, f"Captures of {target} on {sweep.swept.before} along a change: {change}."
 
 
@@ -259,15 +261,16 @@ def _panel(sweep: Sweep) -> Panel:
         means = tuple(sweep.mean(label, condition).mean for _, condition in points)
         reaches = tuple(_reach(sweep, label, condition) for _, condition in points)
         curves.append(Curve(label, means, reaches, looked[label], dashed=label == results.layout.baseline))
-    has_floor = CONSTANT in results.floors and results.has_pictures(sweep.swept.before)
+    before = sweep.swept.before
+    has_floor = CONSTANT in results.floors and results.has_pictures(before)
     return Panel(
-        title=sweep.swept.before,
+        title=before,
         axis=f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}",
         positions=tuple(float(value) if kind.numeric else float(index) for index, (value, _) in enumerate(points)),
         curves=tuple(curves),
         ticks=None if kind.numeric else tuple(value_text(value) for value, _ in points),
         nominal=kind.nominal,
-        floor=float(results.row(CONSTANT, REFERENCE)[results.headline.column]) if has_floor else None,
+        floor=float(results.row(CONSTANT, results.reference(before))[results.headline.column]) if has_floor else None,
     )
 
 

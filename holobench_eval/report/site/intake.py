@@ -18,9 +18,8 @@ import pandas as pd
 
 from ...core.errors import UserError
 from ...study import provenance
-from ...study.plan import REFERENCE
 from ..compare.runs import records_of
-from ..data.categories import CALIBRATED, CATEGORIES, ONLINE, ORACLE
+from ..data.categories import CALIBRATED, CATEGORIES, FLOOR, ONLINE, ORACLE
 from ..data.layout import Layout, network_of
 from ..data.results import Results
 from ..data.scores import METRICS, Score, parse
@@ -105,8 +104,8 @@ def read(folder: Path, own: Path) -> Source:
     checks.check_columns(folder, frame)
     checks.check_rows(folder, raw, frame)
     measure = _measure(folder, frame)
-    nominal = frame[frame["condition"].isin([REFERENCE, *_nominal(frame)])].reset_index(drop=True)
-    if set(nominal["condition"]) <= {REFERENCE}:
+    nominal = frame[(frame["category"] == FLOOR) | frame["condition"].isin(_nominal(frame))].reset_index(drop=True)
+    if (nominal["category"] == FLOOR).all():
         raise UserError(
             f"{folder / RECORDS}: no row of an unchanged display; expected rows whose condition is a display"
         )
@@ -177,8 +176,8 @@ def _measure(folder: Path, frame: pd.DataFrame) -> str:
 
 def _nominal(frame: pd.DataFrame) -> list[str]:
     """The conditions that are displays as they were calibrated."""
-    own = frame[frame["condition"] == frame["display"]]
-    return [str(name) for name in own["condition"].unique() if name != REFERENCE]
+    own = frame[(frame["condition"] == frame["display"]) & (frame["category"] != FLOOR)]
+    return [str(name) for name in own["condition"].unique()]
 
 
 def _tested(folder: Path, frame: pd.DataFrame) -> tuple[Score, str | None]:
@@ -207,7 +206,7 @@ def _layout(
     folder: Path, parameters: Mapping[str, str], frame: pd.DataFrame, measure: str, headline: str, baseline: str | None
 ) -> Layout:
     """What the tables need of the study, from its records alone."""
-    shown = frame[frame["condition"] != REFERENCE]
+    shown = frame[frame["category"] != FLOOR]
     by_category = {name: frozenset(shown.loc[shown["category"] == name, "label"]) for name in CATEGORIES}
     identities = [label for label, text in parameters.items() if _network(text) == "identity"]
     return Layout(

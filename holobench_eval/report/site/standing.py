@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import listed
-from ...study.plan import REFERENCE
 from ...study.versions import HARNESS
 from ..data.categories import ORACLE
 from ..data.phrases import CONSTANT, marked
@@ -137,8 +136,8 @@ def groups(sources: Sequence[Source]) -> list[Group]:
     """Every row of the sources in its group: those of this version first, the others last."""
     known, found = digests(sources), dict[tuple[Any, ...], list[_Comparable]]()
     for source in sources:
-        constant = _constant(source)
-        for row in _rows(source, known, constant.keys() == set(source.results.targets)):
+        for row in _rows(source, known):
+            constant = _constant(source, row.display.name)
             same = found.setdefault(row.key, [])
             part = next((each for each in same if _equal(each.constant, constant, row.metric)), None)
             if part is None:
@@ -161,11 +160,11 @@ def version(source: Source, display: Display) -> str:
     return UNRECORDED
 
 
-def _constant(source: Source) -> dict[str, float]:
+def _constant(source: Source, condition: str) -> dict[str, float]:
     results = source.results
     if CONSTANT not in results.floors:
         return {}
-    values = results.values(CONSTANT, REFERENCE)
+    values = results.values(CONSTANT, results.reference(condition))
     return {target: float(value) for target, value in zip(results.targets, values, strict=True) if np.isfinite(value)}
 
 
@@ -174,11 +173,12 @@ def _equal(a: Mapping[str, float], b: Mapping[str, float], metric: Score) -> boo
     return all(abs(a[target] - b[target]) <= tolerance for target in a)
 
 
-def _rows(source: Source, known: Mapping[str, set[str]], verified: bool) -> list[Row]:
+def _rows(source: Source, known: Mapping[str, set[str]]) -> list[Row]:
     results, rows = source.results, []
     targets = tuple(sorted(zip(results.targets, map(str, results.clusters), strict=True)))
     for condition in results.conditions:
         display = display_of(source, condition, known)
+        verified = _constant(source, condition).keys() == set(results.targets)
         for label in results.methods(condition):
             cells = results.cells(label, condition)
             first, values = cells.iloc[0], results.values(label, condition)

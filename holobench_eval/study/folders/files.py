@@ -50,7 +50,9 @@ def read_folders(captures: Path, targets: Path, linear: bool = False, dark: Dark
     capture_paths = {
         (folder.name, path.stem): path
         for folder in _methods(captures)
-        for path in _pictures(folder, captures, "a capture of each target, <target>.png", CAPTURE_SUFFIXES)
+        for path in _pictures(
+            folder, captures, f"a capture of each target, <target>.png{_deeper(folder)}", CAPTURE_SUFFIXES
+        )
     }
     for (_, name), path in capture_paths.items():
         if name not in target_paths:
@@ -86,6 +88,12 @@ def _methods(captures: Path) -> list[Path]:
     if not folders:
         raise UserError(f"{captures}: no folders in it; expected one for each method, <method>/<target>.png")
     return folders
+
+
+def _deeper(folder: Path) -> str:
+    """What to give where a folder of captures holds folders, as those of ``holoeval solve`` do."""
+    name = next((path.name for path in sorted(folder.iterdir()) if path.is_dir()), "")
+    return f", or --captures {folder} for those in its folder {name}" if name else ""
 
 
 def _pictures(folder: Path, root: Path, what: str, suffixes: tuple[str, ...] = SUFFIXES) -> list[Path]:

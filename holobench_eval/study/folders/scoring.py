@@ -323,8 +323,6 @@ class Scoring:
         """The scores by some metrics, in the domains that the values have."""
         weights, stored, names = self.lpips_weights, self.values == "stored", identity.named(metrics)
         columns = score(image, reference, lpips_weights=weights, stored=stored, metrics=names)
-        if len(image) == 1:
-            columns = {"match_factor" if name == "scale_0" else name: value for name, value in columns.items()}
         return identity.grouped(columns, metrics)
 
     def target_values(self, target: Values) -> Values:

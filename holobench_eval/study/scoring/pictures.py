@@ -34,7 +34,8 @@ def write_capture(path: Path, linear: Tensor) -> None:
     """
     scale = max(float(linear.max()), 1e-12) / 65535
     write_png(path, (linear.clamp_min(0) / scale).round(), bits=16)
-    note = {"scale": scale, "unit": "mean incident intensity on the panel", "channels": "red, green, blue"}
+    colours = {"channels": "red, green, blue"} if len(linear) > 1 else {}
+    note = {"scale": scale, "unit": "mean incident intensity on the panel", **colours}
     write_atomically(path.with_suffix(".json"), f"{json.dumps(note, indent=1)}\n".encode())
 
 

@@ -14,7 +14,7 @@ from holobench_eval.report import Results, records_frame
 from holobench_eval.report.answers import KINDS, kind_of
 from holobench_eval.report.answers.kind import MOST_COLUMNS, MOST_SENTENCES, subjects
 from holobench_eval.report.data.layout import Swept
-from holobench_eval.study.plan import REFERENCE
+from holobench_eval.study.plan import REFERENCE, is_reference, reference_of
 from tests.report.data import test_error_budget as budget_of_errors
 from tests.report.sections import test_focus as focus
 from tests.report.sections import test_ranks as ranks
@@ -36,8 +36,10 @@ def results_of(
     records, pairs = [], []
     for key, mean in means.items():
         label, _, display = key.partition("@")
-        condition = REFERENCE if label.startswith("floor_") else display or "bench"
-        if condition != REFERENCE:
+        condition = display or "bench"
+        if label.startswith("floor_"):
+            condition = reference_of(display) if display else REFERENCE
+        if not is_reference(condition):
             pairs.append((label, condition))
         for target, value in zip(TARGETS, mean + noise(label), strict=True):
             described = synthetic.cell((names or {}).get(label, label), target, condition, params={"label": label})
@@ -63,6 +65,12 @@ def name_of(results: Results) -> str:
 
 
 COMPARED = {"old": 17.0, "new": 19.0, "other": 20.0, "oracle": 25.0, "floor_constant": 15.0}
+
+
+def test_each_display_is_held_against_its_own_floor() -> None:
+    means = {"old@a": 17.0, "new@a": 19.0, "old@b": 17.0, "new@b": 19.0, "floor_constant": 16.0}
+    text = answer(results_of(means | {"floor_constant@b": 18.0}))
+    assert "a constant image in the place of a capture (16.05 dB on a and 18.05 dB on b): on b old." in text
 
 
 def test_the_method_that_the_question_names_is_answered_for_display_by_display() -> None:
@@ -176,6 +184,24 @@ def test_a_budget_names_the_fewest_captures_that_pass_and_who_never_does() -> No
     assert "Not shown to be better than old with any of their budgets: bad (up to 80)." in text
     assert "good +3.00 [+3.00, +3.00], from 40 to 160 captures" in text
     assert "The best row is good, 20 with 160 captures, 19.05 dB." in text
+
+
+def test_a_budget_is_answered_for_every_display_by_its_name() -> None:
+    means = {f"{label}@{display}": mean for display in "ab" for label, mean in (("old", 17.0), ("hil, 5", 18.0))}
+    means |= {"hil, 10@a": 19.0, "hil, 10@b": 16.0, "hil, 5@b": 15.0}
+    labels = [key.partition("@")[0] for key in means]
+    text = answer(
+        results_of(
+            means,
+            names={label: label.split(",")[0] for label in labels},
+            captures={label: int(label.split(", ")[1]) for label in labels if "," in label},
+            camera=frozenset(label for label in labels if "," in label),
+        )
+    )
+    assert "has 17.05 dB on a (fewer may do): hil 40" in text
+    assert "Worse than old on b, captures in total: hil with 40 and 80." in text
+    assert "What more captures change on b" in text
+    assert "The best row on a is hil, 10 with 80 captures" in text
 
 
 def prediction(**changes: Any) -> Results:

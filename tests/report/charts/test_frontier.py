@@ -128,7 +128,11 @@ def test_zero_captures_stand_left_of_the_logarithmic_part_side_by_side():
 
 @pytest.mark.parametrize(
     ("most", "expected"),
-    [(600, ["0", "20", "50", "100", "200", "500", "1,000"]), (9000, ["0", "100", "1,000", "10,000"])],
+    [
+        (600, ["0", "20", "50", "100", "200", "500", "1,000"]),
+        (9000, ["0", "100", "1,000", "10,000"]),
+        (24, ["0", "16", "24"]),
+    ],
 )
 def test_the_axis_names_zero_and_round_numbers_with_a_break_between(most, expected):
     axes = new_figure(400, 300).subplots()

@@ -12,6 +12,7 @@ from holobench_eval.core.hashing import digest
 from holobench_eval.report import Description, Results, records_frame
 from holobench_eval.report.page.pictures import TARGETS_IN_FULL, pictures
 from holobench_eval.report.section import Report
+from holobench_eval.study.plan import REFERENCE
 from holobench_eval.study.store import Store
 from tests.support import synthetic_study as synthetic
 
@@ -28,7 +29,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
 
 
 def held(report: Report, room: int) -> dict[str, set[tuple[str, str]]]:
-    """By target, the (method, condition) whose captures a page with so much room has; the target itself is ("", "")."""
+    """By target, the (method, condition) whose captures a page with so much room has; of the target ("", REFERENCE)."""
     found, _ = pictures(report, room)
     return {
         target: {(label, condition) for label, condition, name in found.numbers if name == target}
@@ -49,7 +50,7 @@ def test_the_page_holds_the_bytes_of_the_records(written: Written) -> None:
     index = TARGETS.index("chelsea")
     described = synthetic.cell("hil", "chelsea", "ideal")
     for number, path in (
-        (data["pictures"]["targets"][index], store.target_thumbnail("chelsea")),
+        (data["pictures"]["targets"]["ideal"][index], store.target_thumbnail("chelsea")),
         (data["pictures"]["cells"]["ideal"]["HIL"][index], store.thumbnail(digest(described))),
     ):
         text = re.search(rf'id="picture-{number}">(.*?)</script>', written.text)
@@ -77,7 +78,7 @@ def test_with_less_room_some_targets_are_full_and_others_have_best_baseline_and_
     first = pictures(report, int(0.85 * size(report)))[1]["first"]
     assert len(found[first]) == max(map(len, found.values()))  # the page begins with a target that has most
     for target in set(found) - set(full):
-        assert found[target] == {("", ""), *roles}
+        assert found[target] == {("", REFERENCE), *roles}
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.7, 0.99])
@@ -91,7 +92,7 @@ def test_no_page_takes_more_room_than_it_has_and_the_note_counts(report: Report,
 def test_a_capture_is_never_held_without_its_target(report: Report) -> None:
     for share in (0.2, 0.5, 0.8):
         for cells in held(report, int(share * size(report))).values():
-            assert not cells or ("", "") in cells
+            assert not cells or ("", REFERENCE) in cells
 
 
 def test_a_study_without_thumbnails_says_so(report: Report, tmp_path: Path) -> None:

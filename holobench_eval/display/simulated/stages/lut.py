@@ -41,11 +41,14 @@ class LookUpTable(Stage):
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Shape and stroke of the table, and how they vary over the panel."""
+        count = len(profile.panel.wavelengths)
+        given = self.gamma[:count], self.gain[:count]
         if self.table:
             yield Effect("look_up_table", f"a measured look-up table of {len(self.table)} levels")
-        elif set(self.gamma + self.gain) != {1.0}:
-            powers, gains = ("/".join(f"{value:g}" for value in given) for given in (self.gamma, self.gain))
-            yield Effect("look_up_table", f"look-up table, exponent {powers}, stroke {gains} of a turn (R/G/B)")
+        elif set(given[0] + given[1]) != {1.0}:
+            powers, gains = ("/".join(f"{value:g}" for value in values) for values in given)
+            order = " (R/G/B)" * (count > 1)
+            yield Effect("look_up_table", f"look-up table, exponent {powers}, stroke {gains} of a turn{order}")
         if self.variation:
             yield Effect("gain_map", f"stroke uneven over the panel, {percent(self.variation)} rms, smooth")
         if self.bend:

@@ -56,7 +56,7 @@ class Spectrum(Stage):
         if any(reaches):
             spread = max(reaches) * panel.distance * math.hypot(*panel.blaze) / panel.pitch**2
             nanometres = "/".join(f"{1e9 * reach:.2g}" for reach in reaches)
-            text = f"lines up to {nanometres} nm beside the nominal wavelengths (R/G/B)"
+            text = f"lines up to {nanometres} nm beside the nominal wavelengths{' (R/G/B)' * (len(colours) > 1)}"
             yield Effect("spectrum", f"{text}, which the blaze moves by up to {spread:.2g} px" if spread else text)
 
     def spectrum(self, geometry: Geometry) -> Sequence[tuple[float, Geometry]]:

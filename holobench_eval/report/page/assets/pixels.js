@@ -6,7 +6,7 @@ const MOST_DECODED = 24;
 /** The number of a picture in this page, or null; option: "truth", or a kind and a method, "capture:METHOD". */
 function pictureOf(option, target) {
   const index = data.targets.findIndex((item) => item.name === target);
-  if (option === "truth") return data.pictures.targets[index] ?? null;
+  if (option === "truth") return data.pictures.targets[state.display]?.[index] ?? null;
   const label = option.slice(option.indexOf(":") + 1);
   return data.pictures.cells[state.display]?.[label]?.[index] ?? null;
 }

@@ -11,7 +11,7 @@ let drawing = 0; // counts the pictures asked for, so that a late one does not r
 
 function setUpViewer() {
   byId("picture-note").textContent = data.pictures.note;
-  if (data.pictures.targets.every((number) => number === null)) {
+  if (Object.values(data.pictures.targets).flat().every((number) => number === null)) {
     for (const part of byId("viewer").querySelectorAll(".controls, #stage, #strip, #viewer-help")) part.hidden = true;
     return;
   }
@@ -63,7 +63,7 @@ const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 async function choose() {
   const rows = data.rows[state.display] ?? [];
   const absent = (option) => pictureOf(option, state.target) === null;
-  fill(byId("target"), data.targets.map((item) => [item.name, item.name, data.pictures.targets[data.targets.indexOf(item)] === null]), state.target);
+  fill(byId("target"), data.targets.map((item) => [item.name, item.name, pictureOf("truth", item.name) === null]), state.target);
   for (const side of ["left", "right"]) {
     const group = (kind) => rows.map((row) => [`${kind}:${row.method}`, NAMES[kind] + row.marked, absent(`${kind}:${row.method}`)]);
     const options = [[data.words.truth, [["truth", data.words.truth, absent("truth")]]], [`${data.words.scored}s`, group("capture")], ["absolute errors", group("error")], ["FLIP", group("flip")]];
@@ -108,7 +108,7 @@ function describeErrors() {
     context.fillRect(index, 0, 1, 10);
   });
   const shown = ["left", "right"].map((side) => chosen(side).split(":")[0]);
-  const which = state.channel === "all" ? "mean over red, green and blue" : ["red", "green", "blue"][Number(state.channel)];
+  const which = state.channel === "all" ? "mean over colours" : ["red", "green", "blue"][Number(state.channel)];
   byId("error-bar").hidden = byId("error-note").hidden = !shown.includes("error") && !shown.includes("flip");
   const absolute = `Absolute error, ${which}, in ${state.values === "linear" ? "linear light" : "sRGB values"} with full scale 1: black is 0, the brightest colour ${state.scale} and more. `;
   const flip = "FLIP (Andersson et al. 2020) at 67 pixels a degree, from 0 to 1, of all colours in sRGB.";

@@ -87,6 +87,8 @@ def _known(value: object) -> bool:
 def _table(rows: Sequence[Row]) -> Markdown:
     """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth."""
     colours = sorted({row["colour"] for row in rows if isinstance(row.get("colour"), int)})
+    if colours == [0]:  # of the only laser
+        rows, colours = [{**row, "colour": None} for row in rows], []
     columns: list[int | None] = [*colours, *([None] if any(row.get("colour") is None for row in rows) else [])]
     lines = []
     for name in dict.fromkeys(row["name"] for row in rows):

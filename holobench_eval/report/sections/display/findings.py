@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from ....core.errors import listed
-from ....study.plan import REFERENCE
 from ...data.categories import CALIBRATED, ONLINE
 from ...data.phrases import difference, margin, verdict
 from ...data.results import Results
@@ -194,7 +193,7 @@ def _floor(results: Results, condition: str, floor: str) -> list[str]:
     verdicts = [f"not better on average: {words(below)}"] if below else []
     verdicts += [f"better on average, without an interval clear of zero: {words(unclear)}"] if unclear else []
     told = "; ".join(verdicts) or f"all scored methods ({len(known)}) are better"
-    named, row = results.layout.text.floor_name(floor), results.row(floor, REFERENCE)
+    named, row = results.layout.text.floor_name(floor), results.row(floor, results.reference(condition))
     return [f"Floor: {named} scores {score.with_unit(row[score.column])}; {told}."]
 
 

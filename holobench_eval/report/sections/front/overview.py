@@ -43,7 +43,7 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     """A target, and its captures by the best method, those of the question, the baseline and the oracle."""
     results, thumbnails = report.results, report.thumbnails
     condition = next((name for name in results.conditions if results.has_pictures(name)), None)
-    if condition is None or not thumbnails.targets:
+    if condition is None or not thumbnails.targets(condition):
         return
     target = thumbnails.middle(condition)
     labels = chosen(results, condition)
@@ -51,7 +51,7 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     if any(tile.picture is not None for _, tile in tiles):
         path, text = report.figures / PICTURES, report.layout.text
         middle = ", the target in the middle of the ranking by quality" if len(results.targets) > 1 else ""
-        draw_rows(path, f"{condition}", (target, thumbnails.targets[target]), [Row("", tuple(tiles))])
+        draw_rows(path, f"{condition}", (target, thumbnails.targets(condition)[target]), [Row("", tuple(tiles))])
         yield (
             path,
             f"{text.scored.capitalize()}s of {target}{middle}, on {condition}. {text.picture}. Left: the {text.truth}.",

@@ -82,6 +82,12 @@ def test_provenance_of_strangers_shows_nothing_and_stops_nothing(facts: dict[str
     assert (diagnoses([unknown]), missing([unknown])) == ([], [])
 
 
+def test_the_only_laser_has_no_column_of_its_own() -> None:
+    rows = [{"name": "hue_of", "value": 2, "colour": 0}, {"name": "width", "value": 1.0, "colour": None}]
+    ((_, shown, _),) = diagnoses([trained(estimates=rows)])
+    assert lines(shown)[0] == ["quantity", "unit", "all", "largest difference", "stated error"]
+
+
 def test_numbers_of_a_stranger_are_shown_with_what_is_known_of_them() -> None:
     rows = [{"name": "hue_of", "value": 2, "colour": None}, {"name": "hue_of", "value": 1.0, "colour": 7, "error": "x"}]
     ((_, shown, verdict),) = diagnoses([trained(estimates=rows)])
