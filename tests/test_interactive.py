@@ -438,7 +438,7 @@ def test_levels_of_a_phase_are_read_back(display: hb.OpenDisplay, target, conven
         (lambda phase: np.round(40 * phase), {}, "expected finite radians"),
         (lambda phase: phase.astype(np.uint8), {}, "a phase of uint8; expected radians"),
         (lambda phase: phase, {"two_pi": 256}, "the panel has no parameter 'two_pi'; did you mean 'two_pi_level'"),
-        (lambda phase: phase, {"two_pi_level": (1.5, 2)}, "two_pi_level: 2 levels for 3 colours"),
+        (lambda phase: phase, {"two_pi_level": (150, 200)}, "two_pi_level: 2 levels for 3 colours"),
         (lambda phase: phase, {"correction": {"file": "gone.png"}}, "gone.png"),
     ],
 )
