@@ -1,7 +1,7 @@
 """Read an image file as linear light, or refuse it with one line: what was found and what would be right.
 
 A harness that converts whatever it meets scores images nobody looked at: a 16-bit file read as 8 bits, a palette read
-as gray levels, an alpha channel dropped. So only 8-bit sRGB is taken as it is, and the rest by explicit choice.
+as gray levels, alpha that matters dropped. So only 8-bit sRGB is taken as it is, and the rest by explicit choice.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBi
 
     content: the file; name: used in errors. gray: take one-channel images too, replicated to three channels.
     sixteen_bit: take 16-bit PNG and TIFF too, as sRGB levels or as linear light. UserError, one line, for an image that
-    is damaged, of another kind (`GrayImageError`: of one channel), larger than 33 million pixels, or of another colour
-    space than sRGB.
+    is damaged, of another kind (`GrayImageError`: of one channel), larger than 33 million pixels, of another colour
+    space than sRGB, or has alpha that is not opaque everywhere.
     """
     try:
         stored = open_picture(content)
@@ -96,12 +96,12 @@ def _fault(stored: Stored, gray: bool, sixteen_bit: SixteenBit) -> str | None:
     """What is wrong with the kind of an image, in words, or None."""
     if stored.has_palette:
         return "a palette image"
-    if stored.has_alpha:
-        return "an image with alpha"
     if stored.is_floating or stored.bits not in (8, 16):
         return f"a {stored.bits}-bit {'floating-point ' if stored.is_floating else ''}image"
     if stored.channels == 1 and not gray:
         return _ONE_CHANNEL
     if stored.bits == 16 and sixteen_bit == "refuse":
-        return "a 16-bit image (sixteen_bit: srgb or linear would say what its levels mean)"
+        return (
+            "a 16-bit image (in a study, sixteen_bit: srgb or linear of the dataset folder says what its levels mean)"
+        )
     return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import re
 import sys
+import warnings
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -279,6 +280,25 @@ def test_counts_of_a_camera_are_linear_light_whatever_their_type(target) -> None
         (lambda d, t: hb.score(t, target=t, values="stored"), "values: expected 'linear' or 'srgb'; got 'stored'"),
         (lambda d, t: hb.compare(t, {"a": levels_of(t)}), "capture 'a' of uint8; expected linear light"),
         (lambda d, t: d.solve("phases", t, file="gone.png"), "gone.png: no such file"),
+        (
+            lambda d, t: d.solve("double_phase", "astro.png"),
+            r"a target that is the path 'astro.png'; .* OpenDisplay.tar",
+        ),
+        (
+            lambda d, t: d.capture(Path("a.npy"), t),
+            "a phase that is the path 'a.npy'; .* the method phases reads files",
+        ),
+        (lambda d, t: hb.score(Path("a.png"), t), "a capture that is the path 'a.png'; expected linear light"),
+        (lambda d, t: d.solve(t, "wirtinger"), r"array in the place of its method; expected solve\(method, target\)"),
+        (lambda d, t: d.solve(lambda bench, target: 3, t), r"<lambda>' takes bench and target in this order; expected"),
+        (lambda d, t: hb.score(d.solve("double_phase", t), t), r"a capture that is the phase \[rad\]; expected linear"),
+        (
+            lambda d, t: hb.picture(t, d.solve("double_phase", t)),
+            r"a target that is the phase \[rad\]; expected linear",
+        ),
+        (lambda d, t: hb.compare(t, {"a": d.solve("double_phase", t)}), r"capture 'a' that is the phase \[rad\]"),
+        (lambda d, t: d.capture(t, t), "a phase that is the target, linear light .*; expected radians"),
+        (lambda d, t: hb.save_levels(t, "a.png"), "a phase that is the target, linear light .*; expected radians"),
         (lambda d, t: d.capture(np.zeros((3, 5, 5)), t), "the display shows"),
         (
             lambda d, t: d.capture(np.zeros((1, 128, 128)), t),
@@ -433,12 +453,12 @@ def test_levels_of_a_phase_are_read_back(display: hb.OpenDisplay, target, conven
 @pytest.mark.parametrize(
     ("change", "convention", "message"),
     [
-        (lambda phase: phase[:2], {}, r"a phase of \(2, 128, 128\); expected finite radians \(C, H, W\) of 1 or 3"),
-        (lambda phase: phase * np.nan, {}, "expected finite radians"),
-        (lambda phase: np.round(40 * phase), {}, "expected finite radians"),
+        (lambda phase: phase[:2], {}, r"a phase of \(2, 128, 128\); expected \(C, H, W\) of 1 or 3"),
+        (lambda phase: phase * np.nan, {}, "a phase holds 49152 values that are NaN or infinite"),
+        (lambda phase: np.round(40 * phase), {}, r"a phase has whole numbers up to \d+: levels; expected radians"),
         (lambda phase: phase.astype(np.uint8), {}, "a phase of uint8; expected radians"),
         (lambda phase: phase, {"two_pi": 256}, "the panel has no parameter 'two_pi'; did you mean 'two_pi_level'"),
-        (lambda phase: phase, {"two_pi_level": (1.5, 2)}, "two_pi_level: 2 levels for 3 colours"),
+        (lambda phase: phase, {"two_pi_level": (150, 200)}, "two_pi_level: 2 levels for 3 colours"),
         (lambda phase: phase, {"correction": {"file": "gone.png"}}, "gone.png"),
     ],
 )
@@ -447,6 +467,26 @@ def test_what_is_no_phase_is_not_saved(display, target, tmp_path: Path, change, 
         hb.save_levels(change(display.solve("double_phase", target)), tmp_path / "levels.png", **convention)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("turn", "convention", "says"),
+    [
+        (2 * np.pi, {}, []),
+        (2 * np.pi, {"two_pi_level": 1024}, ["level 255 is the last; 75% of a turn is shown as the nearer end"]),
+        (360, {}, ["the phase has values from 0.00 to 359.64, as degrees have"]),
+    ],
+)
+def test_a_phase_in_degrees_and_a_turn_out_of_reach_are_warned_of_where_levels_are_saved(
+    tmp_path: Path, turn: float, convention: dict[str, int], says: list[str]
+) -> None:
+    phase = turn * np.linspace(0, 0.999, 64 * 64).reshape(1, 64, 64)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        hb.save_levels(phase, tmp_path / "levels.png", **convention)
+    said = [str(each.message) for each in caught]
+    assert len(said) == len(says)
+    assert all(part in line for part, line in zip(says, said, strict=True))
 
 
 def test_a_device_is_asked_for_by_its_name(target: interactive.Array) -> None:

@@ -65,6 +65,7 @@ def read_text(path: Path, most: int) -> str:
     """The text of a file in UTF-8, with the ends of lines as ``\\n``, see `open_regular`. UserError: not UTF-8."""
     with open_regular(path, most) as file:
         try:
-            return io.TextIOWrapper(file, encoding="utf-8").read()
+            with io.TextIOWrapper(file, encoding="utf-8") as text:
+                return text.read()
         except UnicodeDecodeError as error:
             raise UserError(f"{path}: not UTF-8 text ({error.reason} at byte {error.start})") from None

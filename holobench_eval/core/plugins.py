@@ -114,6 +114,8 @@ def _from_file(kind: Kind, name: str, folder: Path | None) -> type[Any]:
 
 
 def _plugin_class(kind: Kind, name: str, found: Any) -> type[Any]:
+    if kind == "methods":
+        refuse_swapped(found, f"method '{name}'")
     if _is_function(kind, found):
         return _class_of(found, f"{kind[:-1]} '{name}'")
     function = "solve" if kind == "methods" else "items"
@@ -122,6 +124,16 @@ def _plugin_class(kind: Kind, name: str, found: Any) -> type[Any]:
         own = f"; its parameters are {inspect.signature(found)}" if inspect.isfunction(found) else ""
         raise UserError(f"{kind[:-1]} '{name}' is {other} a dataclass with a method '{function}'{own}")
     return found
+
+
+def refuse_swapped(method: Any, owner: str) -> None:
+    """UserError for a method, or its class or function, that takes bench and target by these names in this order."""
+    try:
+        names = [name for name in inspect.signature(getattr(method, "solve", method)).parameters if name != "self"]
+    except (TypeError, ValueError):  # it is not called, or is one of C, which does not tell
+        return
+    if names[:2] == ["bench", "target"]:
+        raise UserError(f"{owner} takes bench and target in this order; expected (target, bench)")
 
 
 def _is_function(kind: Kind, found: Any) -> bool:

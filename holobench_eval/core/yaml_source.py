@@ -91,7 +91,9 @@ def _read(path: Path) -> str:
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise UserError(f"{path}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+        raise UserError(
+            f"{path}: no YAML, since not UTF-8 text (byte {error.start}); expected a YAML file, saved as UTF-8"
+        ) from error
 
 
 def parse(name: str, text: str) -> Document:

@@ -26,6 +26,7 @@ UNITS = {  # what values in a span may be, and what makes radians of them
     (0.0, 256.0): ("levels of 8 bits", math.tau / 256),
     (0.0, 360.0): ("degrees", math.tau / 360),
     (-180.0, 180.0): ("degrees", math.tau / 360),
+    (-3600.0, 3600.0): ("degrees", math.tau / 360),  # of a phase that is not wrapped
 }
 MIRRORED = {"": (), "mirrored left to right": (-1,), "mirrored top to bottom": (-2,), "turned by 180 degrees": (-2, -1)}
 
@@ -33,14 +34,21 @@ MIRRORED = {"": (), "mirrored left to right": (-1,), "mirrored top to bottom": (
 def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
     """Refuse a phase ``(C, H, W)`` [rad] that no display can show. label: name of the method in the error message.
 
-    CellError for another shape or type, a subclass of ``Tensor`` among them, for values that are
-    not finite, too large or levels.
+    CellError for another shape or type, a subclass of ``Tensor`` among them, and as by ``check_radians``.
     """
     who = f"{label}: " if label else ""
     if not is_plain(phase):
         raise CellError(f"{who}phase is {type_name(phase)}, the display shows a plain torch.Tensor")
     if phase.ndim != 3 or tuple(phase.shape[-2:]) != spec.shape:
         raise CellError(f"{who}phase is {tuple(phase.shape)}, the display shows (C, {spec.shape[0]}, {spec.shape[1]})")
+    check_radians(phase, who)
+
+
+def check_radians(phase: Tensor, who: str) -> None:
+    """Refuse values that are no phase [rad] of any display. who: what stands before "phase" in the error message.
+
+    CellError for another type, and for values that are not finite, too large or levels.
+    """
     if phase.is_complex() or not phase.is_floating_point():
         raise CellError(f"{who}phase is {phase.dtype}, the display shows real numbers in radians")
     if bad := int((~torch.isfinite(phase.float())).sum()):  # in the precision that the display computes in
@@ -91,20 +99,21 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     if best >= own + BETTER and best >= UNLIKE:
         return f"fits its target better {how} (correlation {best:.2f} on the nominal model; as it is, {own:.2f})"
     correlation = f"correlation {own:.2f} with its target on the nominal model, where holograms have about 0.9"
-    if unit := _filled(low, high):
-        return f"has values from {low:.2f} to {high:.2f}, as {unit} have ({correlation})"
+    if filled := unit_doubt(phase):
+        return f"{filled} ({correlation})"
     if own < UNLIKE:
         as_amplitudes = " and is never negative, as amplitudes are" if low >= 0 and high < math.pi else ""
         return f"makes nothing like its target{as_amplitudes} ({correlation})"
     return ""
 
 
-def _filled(low: float, high: float) -> str:
-    """The unit whose span the values fill from end to end; empty where there is none."""
+def unit_doubt(phase: Tensor) -> str:
+    """Which other unit's span the values of a phase fill from end to end; empty where there is none."""
+    low, high = (float(value) for value in phase.aminmax())
     for (first, last), (unit, _) in UNITS.items():
         gap = EDGE * (last - first)
         if first <= low <= first + gap and last - gap <= high <= last:
-            return unit
+            return f"has values from {low:.2f} to {high:.2f}, as {unit} have"
     return ""
 
 

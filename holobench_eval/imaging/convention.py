@@ -9,12 +9,25 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
-from annotated_types import Interval, MaxLen, MinLen
+from annotated_types import MaxLen, MinLen
 from numpy.typing import NDArray
+from pydantic import AfterValidator, WithJsonSchema
 from torch import Tensor
 
+FEWEST, MOST = 8, 65536  # levels to a turn: below are strokes in radians or in pi
+
+
+def _turn(level: float) -> float:
+    if FEWEST <= level <= MOST:
+        return level
+    raise ValueError(
+        f"{level:g} is no level of a full turn; expected {FEWEST} to {MOST} (of a panel that lags 2.1 pi at level 255: "
+        "255 * 2 / 2.1 = 243)"
+    )
+
+
 Levels = NDArray[np.uint8]
-Level = Annotated[float, Interval(gt=1, le=65536)]
+Level = Annotated[float, AfterValidator(_turn), WithJsonSchema({"type": "number", "minimum": FEWEST, "maximum": MOST})]
 FullTurn = Level | Annotated[tuple[Level, ...], MinLen(1), MaxLen(3)]
 """The level that lags a full turn behind level 0: one for all colours, or one for each."""
 

@@ -13,11 +13,12 @@ from torch import Tensor
 
 from ..core.errors import UserError
 from ..optics.colour import srgb_decode
+from .described import PHASE
 
 Numbers = ArrayLike | Tensor
 FULL = {"uint8": 255, "uint16": 65535}  # scale of the levels of pictures
 LIGHT = "linear light in [0, 1] as floating point; OpenDisplay.target makes it of a picture"
-RADIANS = "radians as floating point, as np.angle gives them"
+RADIANS = "radians as floating point, as np.angle gives them; the method phases reads files"
 
 
 def array_of(values: Numbers, what: str) -> NDArray[Any]:
@@ -42,10 +43,19 @@ def tensor_of(values: Numbers, what: str, right: str) -> Tensor:
     what, right: these numbers and what is expected, in the UserError for others: integers may be levels of a panel or
     of a picture as well as counts.
     """
+    _refuse_other_kind(values, what, right)
     array = array_of(values, what)
     if array.dtype.kind != "f":
         raise UserError(f"{what} of {array.dtype}; expected {right}")
     return torch.from_numpy(array.astype(np.float32, order="C"))
+
+
+def _refuse_other_kind(values: object, what: str, right: str) -> None:
+    """UserError for a path, and for an array of this package that is a phase in the place of light or the reverse."""
+    is_path = isinstance(values, str | PurePath)
+    kind = f"path '{values}'" if is_path else getattr(values, "what", "")
+    if is_path or (kind and (kind == PHASE) != (right == RADIANS)):
+        raise UserError(f"{what} that is the {kind}; expected {right}")
 
 
 def capture_of(values: Numbers, what: str, meaning: object) -> Tensor:
@@ -56,6 +66,7 @@ def capture_of(values: Numbers, what: str, meaning: object) -> Tensor:
     """
     if meaning not in (None, "linear", "srgb"):
         raise UserError(f"values: expected 'linear' or 'srgb'; got {meaning!r}")
+    _refuse_other_kind(values, what, LIGHT)
     array = array_of(values, what)
     if array.dtype.kind not in ("fiu" if meaning else "f"):
         counts, levels = "values='linear' for counts of light", "values='srgb' for levels of a picture"

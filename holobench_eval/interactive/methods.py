@@ -11,7 +11,9 @@ from typing import Any
 from ..core import plugins
 from ..core.errors import UserError
 
-EXPECTED = "expected a name, path/to/file.py:Name, a function of target and bench, or a method's class or instance"
+EXPECTED = (
+    "expected a name, path/to/file.py:Name, a function of target and bench, or a method's dataclass or an instance"
+)
 
 
 class Function:
@@ -57,6 +59,7 @@ def method_of(given: object, params: Mapping[str, Any]) -> tuple[Any, str]:
             raise UserError(f"a partial of '{given.func.__name__}' with positional parameters; name each of them")
         params = {**given.keywords, **params}
         given = given.func
+    plugins.refuse_swapped(given, f"method '{getattr(given, '__name__', type(given).__name__)}'")
     if isinstance(given, type):
         if not (is_dataclass(given) and callable(getattr(given, "solve", None))):
             raise UserError(f"class '{given.__name__}' is not a dataclass with a method 'solve'; {EXPECTED}")

@@ -79,8 +79,8 @@ class OpenDisplay:
         ----------
         method
             A registered name, ``path/to/file.py:Name``, a function ``solve(target, bench)`` or a partial of one, or a
-            method's class or an instance of it. It is given tensors of torch, and returns one or an array of NumPy. A
-            method that has to be trained needs a study, which keeps what it learned.
+            method's dataclass or an instance of it. It is given tensors of torch, and returns one or an array of NumPy.
+            A method that has to be trained needs a study, which keeps what it learned.
         target
             ``(C, h, w)`` linear light in [0, 1], as ``target`` gives it.
         **params
@@ -98,6 +98,8 @@ class OpenDisplay:
         CellError
             The method failed, or gave what no display can show.
         """
+        if isinstance(method, np.ndarray | Tensor):
+            raise UserError("solve has an array in the place of its method; expected solve(method, target)")
         light = self._target(target)
         solver, label = self._solver(method, params)
         if traits_of(solver, label).trains:

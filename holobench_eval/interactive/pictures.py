@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +16,12 @@ from ..core.device import find
 from ..core.errors import CellError, UserError
 from ..core.io import write_png
 from ..core.schema import checked
+from ..display.phases import check_radians, unit_doubt
 from ..imaging.convention import Convention
 from ..methods.files.correction import on_panel
 from ..metrics import catalogue, match
 from ..metrics import score as _score
 from ..optics.colour import srgb_encode
-from ..optics.phase import are_levels
 from .described import Scores, refuse_swapped
 from .given import LIGHT, RADIANS, Numbers, as_in_config, capture_of, names, path_of, tensor_of
 
@@ -37,7 +38,7 @@ def score(
     values: str | None = None,
     device: str = "cpu",
 ) -> dict[str, float]:
-    """The scores of a capture by the metric protocol, by the names that the columns of a study have.
+    """The scores of a capture by the metric protocol, by their names.
 
     Parameters
     ----------
@@ -57,7 +58,8 @@ def score(
     Returns
     -------
     dict
-        Scores by name; ``psnr_linear`` is the one that reports lead with.
+        Scores by name; ``psnr_linear`` [dB] is the one that reports lead with. In the columns of a study the unit ends
+        the name: ``psnr_linear_db``.
 
     Raises
     ------
@@ -129,13 +131,18 @@ def save_levels(phase: Numbers, path: str | Path, **convention: Any) -> Path:
     place, radians = path_of(path, "path"), tensor_of(phase, "a phase", RADIANS)
     if place.suffix.lower() != ".png":
         raise UserError(f"path: '{path}' should end in .png")
-    if radians.ndim != 3 or len(radians) not in (1, 3) or not bool(radians.isfinite().all()) or are_levels(radians):
-        raise UserError(f"a phase of {tuple(radians.shape)}; expected finite radians (C, H, W) of 1 or 3 colours")
+    if radians.ndim != 3 or len(radians) not in (1, 3) or 0 in radians.shape:
+        raise UserError(f"a phase of {tuple(radians.shape)}; expected (C, H, W) of 1 or 3 colours")
     given = {name: as_in_config(value) for name, value in convention.items()}
     try:
+        check_radians(radians, "a ")
         meaning = on_panel(checked(Convention, given, "the panel"), (*radians.shape[1:],), len(radians), Path())
     except CellError as error:
         raise UserError(str(error)) from None
+    doubt = unit_doubt(radians)
+    for line in (doubt and f"the phase {doubt}", meaning.out_of_reach):
+        if line:
+            warnings.warn(line, stacklevel=2)
     write_png(place, torch.from_numpy(meaning.levels(radians)), bits=8)
     return place
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from torch import Tensor
 
-from ..imaging.convention import Convention
+from ..imaging.convention import FEWEST, MOST, Convention
 from ..imaging.warp import Array, Frame
 from .dark import Dark
 from .exposure import Averaged
@@ -103,7 +103,7 @@ def phase_sign(show: Show, phase: Tensor, convention: Convention) -> Check:
     return Check(
         False,
         f"phase convention: no letter F with either sign {figures}; look at the camera's focus, panel.distance, "
-        "panel.pitch, phase.two_pi_level and the iris",
+        f"panel.pitch, phase.two_pi_level{', phase.correction' if convention.correction else ''} and the iris",
     )
 
 
@@ -117,7 +117,7 @@ def full_turn(show: Show, phase: Tensor, convention: Convention) -> Check:
     fits: list[PatternFit] = []
     levels, light = [], []
     for ratio in (1.0, *(each for each in FULL_TURNS if each != 1)):
-        tried = np.clip(np.atleast_1d(convention.two_pi_level) * ratio, 2.0, 65536.0).tolist()
+        tried = np.clip(np.atleast_1d(convention.two_pi_level) * ratio, FEWEST, MOST).tolist()
         turn = replace(convention, two_pi_level=tuple(tried) if len(tried) > 1 else tried[0])
         picture = (show(phase, turn) + show(phase + math.pi, turn)) / 2
         fits = fits or [find_pattern(frame) for frame in _frames(picture)]

@@ -11,6 +11,8 @@ from ...core.errors import CellError
 from ...imaging.convention import Convention, per_colour
 from .arrays import read_array
 
+MOST_TURNS = 12  # of a map from end to end: of a panel that is uneven by six waves, twice in reflection
+
 
 def on_panel(convention: Convention, shape: tuple[int, int], colours: int, folder: Path) -> Convention:
     """A convention with its correction map read, for a panel of (rows, columns) in so many colours.
@@ -33,7 +35,13 @@ def on_panel(convention: Convention, shape: tuple[int, int], colours: int, folde
     ):
         given = " x ".join(map(str, levels.shape))
         raise CellError(f"{path}: a correction of {given} levels; the panel has {shape[0]} x {shape[1]} pixels")
-    return replace(convention, turns=levels / per_colour(convention.correction.two_pi_level))
+    turns = levels / per_colour(convention.correction.two_pi_level)
+    if (most := float(np.ptp(turns))) > MOST_TURNS:
+        raise CellError(
+            f"{path}: levels from {levels.min():g} to {levels.max():g}, which are {most:.0f} turns; set "
+            f"correction.two_pi_level to the level of this {levels.dtype} map that is a turn"
+        )
+    return replace(convention, turns=turns)
 
 
 def _check_colours(key: str, level: float | tuple[float, ...], colours: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -50,6 +51,14 @@ def test_a_file_that_is_none_or_is_huge_is_refused_at_once(reader: str, kind: st
         read(path)
     assert str(path) in str(caught.value)
     assert ("larger than" if kind == "huge" else "a pipe or a device; expected a regular file") in str(caught.value)
+
+
+def test_a_file_that_was_read_is_closed(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"text")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read_text(tmp_path / "file", 6)
+    assert not said
 
 
 def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:

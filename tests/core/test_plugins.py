@@ -129,6 +129,21 @@ def test_a_parameter_that_no_config_can_set_is_refused_in_one_line(
     assert str(found.value) == message
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def f(bench, target, gamma=1.0): ...\n",
+        "import dataclasses\n@dataclasses.dataclass\nclass f:\n    def solve(self, bench, target): ...\n",
+    ],
+)
+def test_a_method_that_takes_its_arguments_in_the_other_order_is_refused_when_it_is_loaded(
+    tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(UserError, match=r"'mine.py:f' takes bench and target in this order; expected \(target, bench"):
+        plugins.find("methods", "mine.py:f", tmp_path)
+
+
 def test_a_parameter_that_came_later_is_in_no_name_while_it_has_its_default() -> None:
     own = {"file": "a.png", "two_pi_level": 200}
     assert "correction" not in plugins.params_of(plugins.build("methods", "phases", own, None))

@@ -68,7 +68,7 @@ def test_files_that_are_no_configs_are_refused(tmp_path: Path) -> None:
         (tmp_path / "absent.yaml", "no such file"),
         (tmp_path, "Is a directory"),
         (large, "larger than"),
-        (binary, "not UTF-8"),
+        (binary, "no YAML, since not UTF-8 text"),
     ):
         with pytest.raises(UserError, match=message):
             load(path)

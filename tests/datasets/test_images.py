@@ -53,6 +53,13 @@ def test_eight_bit_rgb_is_decoded_to_linear_light(kind):
     assert torch.allclose(found, linear(PIXELS).permute(2, 0, 1), atol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["PNG", "TIFF", "WEBP"])
+def test_alpha_that_is_opaque_everywhere_is_left_out(kind):
+    options = {"lossless": True} if kind == "WEBP" else {}
+    found = decode(encoded(RGB.convert("RGBA"), kind, **options), "x")
+    assert torch.equal(found, decode(encoded(RGB), "x"))
+
+
 @pytest.mark.parametrize(("kind", "options"), [("JPEG", {"quality": 95}), ("WEBP", {"lossless": True})])
 def test_other_formats_are_read(kind, options):
     assert decode(encoded(RGB, kind, **options), "x").shape == (3, 12, 20)
@@ -60,8 +67,8 @@ def test_other_formats_are_read(kind, options):
 
 KINDS = {
     "one channel": (encoded(RGB.convert("L")), "one-channel"),
-    "alpha": (encoded(RGB.convert("RGBA")), "alpha"),
-    "gray with alpha": (encoded(RGB.convert("LA")), "alpha"),
+    "alpha": (encoded(Image.merge("RGBA", [*RGB.split(), RGB.getchannel(0)])), "alpha that is not opaque"),
+    "gray with alpha": (encoded(Image.merge("LA", RGB.split()[:2])), "one-channel"),
     "palette": (encoded(RGB.convert("P")), "palette"),
     "one bit": (encoded(RGB.convert("1")), "1-bit"),
     "CMYK": (encoded(RGB.convert("CMYK"), "JPEG"), "CMYK"),
@@ -127,7 +134,8 @@ def test_gray_is_replicated_when_it_is_asked_for():
     gray = PIXELS[..., 0]
     found = decode(encoded(Image.fromarray(gray)), "x", gray=True)
     assert torch.allclose(found, linear(gray).expand(3, -1, -1), atol=1e-6)
-    assert "alpha" in refusal(encoded(RGB.convert("LA")), gray=True)
+    assert torch.equal(decode(encoded(Image.fromarray(gray).convert("LA")), "x", gray=True), found)
+    assert "not opaque" in refusal(encoded(Image.merge("LA", RGB.split()[:2])), gray=True)
     assert "1-bit" in refusal(encoded(RGB.convert("1")), gray=True)
 
 

@@ -44,6 +44,10 @@ ODD = {
     "blue first": (lambda phase: phase.flip(0), "better with red and blue exchanged"),
     "degrees": (lambda phase: DEGREES * phase, "better read as degrees"),
     "degrees of both signs": (lambda phase: DEGREES * ((phase + math.pi) % TAU - math.pi), "better read as degrees"),
+    "degrees that are not wrapped": (
+        lambda phase: DEGREES * (phase + TAU * torch.tensor([-1.0, 0.0, 1.0])[:, None, None]),
+        "better read as degrees",
+    ),
     "levels": (lambda phase: LEVELS * phase, "better read as levels of 8 bits"),
     "turns": (lambda phase: phase / TAU, "better read as turns"),
     "turns of both signs": (lambda phase: (phase / TAU + 0.5) % 1 - 0.5, "better read as turns"),

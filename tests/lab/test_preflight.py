@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from holobench_eval.imaging.convention import Convention
+from holobench_eval.imaging.convention import Convention, Correction
 from holobench_eval.lab.dark import given_dark
 from holobench_eval.lab.exposure import averaged
 from holobench_eval.lab.preflight import full_turn, linearity, phase_sign
@@ -124,6 +124,9 @@ def test_a_picture_without_the_letter_is_refused():
     check = phase_sign(show, green(), Convention())
     assert not check.passed
     assert "no letter F with either sign" in check.line
+    assert "phase.correction" not in check.line
+    corrected = phase_sign(show, green(), Convention(correction=Correction("flat.bmp")))
+    assert "phase.two_pi_level, phase.correction and the iris" in corrected.line
 
 
 def test_the_letter_is_shown_with_random_phase_since_a_smooth_one_leaves_a_ghost_on_the_wrong_side():

@@ -58,7 +58,7 @@ def change(path, keys, value):
         (("panel",), [128], "panel has too few values: .128."),
         (("wavelengths",), [], "at least 1"),
         (("wavelengths",), ["green"], "valid number"),
-        (("phase", "two_pi_level"), 0, "greater than"),
+        (("phase", "two_pi_level"), 0, "0 is no level of a full turn"),
         (("format",), 2, "format"),
         (("session",), None, "valid string"),
         (("display",), "x" * 10**6, "at most 200"),

@@ -88,8 +88,8 @@ def test_radians_of_single_precision_arrive_to_the_last_bit(tmp_path: Path) -> N
 @given(
     sign=st.sampled_from([1, -1]),
     origin=st.floats(-7, 7),
-    two_pi=st.one_of(st.floats(2, 300), st.tuples(*3 * [st.floats(2, 300)])),
-    correction=st.one_of(st.none(), st.floats(2, 300), st.tuples(*3 * [st.floats(2, 300)])),
+    two_pi=st.one_of(st.floats(8, 300), st.tuples(*3 * [st.floats(8, 300)])),
+    correction=st.one_of(st.none(), st.floats(25, 300), st.tuples(*3 * [st.floats(25, 300)])),
     across=st.booleans(),
     down=st.booleans(),
     order=st.sampled_from(["rgb", "bgr"]),
@@ -302,11 +302,14 @@ def test_a_reader_that_crashes_or_does_not_end_is_one_line(
         ({"file": "{name}.npy"}, r"'\{name\}' stands for nothing; \{target\}, \{stem\} and \{channel\} do"),
         ({"file": "phases/{target}.jpg"}, "should end in .png"),
         ({"file": "{target}.npy", "amplitude": "{channel}.npy"}, "in both patterns or in none"),
-        ({"two_pi_level": 0}, "'two_pi_level': input should be greater than 1"),
-        ({"two_pi_level": [256, 0, 256]}, "'two_pi_level.1': input should be greater than 1"),
+        (
+            {"two_pi_level": 6.28},
+            r"'two_pi_level': 6.28 is no level of a full turn; expected 8 to .* \(of a panel that",
+        ),
+        ({"two_pi_level": [256, 0, 256]}, "'two_pi_level.1': 0 is no level of a full turn"),
         (
             {"correction": {"file": "a.png", "two_pi_level": 1}},
-            "'correction.two_pi_level': input should be greater than 1",
+            "'correction.two_pi_level': 1 is no level of a full turn",
         ),
     ],
 )
