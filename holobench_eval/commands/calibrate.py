@@ -22,8 +22,7 @@ def calibrate(
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Draws side by side.")] = None,
 ) -> None:
-    """Fit the free parameters of a profile to published figures, in minutes; with --draws, draw a family of displays,
-    two seconds each on a core."""
+    """Fit a profile to published figures; with --draws, draw the family of displays that have them."""
     if draws is not None:
         _family(profile, draws, output or RESULTS / f"{profile}-family", workers)
         return
