@@ -43,6 +43,7 @@ QUICK: dict[str, dict[str, Any]] = {
     **dict.fromkeys(("wirtinger", "sgd", "multi_plane"), _EARLY),
     "odak_sgd": {"iterations": 1},
     "wirtinger_gamma": {"images": 1, "of": _EARLY},
+    "wirtinger_veil": {"iterations": 6},
     "torchoptics_adam": {"iterations": 6},
     "oracle": {"iterations": 4, "rounds": 2},  # longer descents amplify rounding
     "online_camera": {"captures": 24, "start": _START},

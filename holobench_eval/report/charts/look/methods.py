@@ -27,6 +27,7 @@ MARKERS = "osD^v<>PXp*"
 REGISTRY = {
     "wirtinger": (NAVY, "o"),
     "wirtinger_gamma": (NAVY, "s"),
+    "wirtinger_veil": (NAVY, "P"),
     "double_phase": (AMBER, "^"),
     "double_phase_aa": (AMBER, "v"),
     "double_phase_bl": (AMBER, "<"),
