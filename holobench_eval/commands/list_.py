@@ -111,7 +111,7 @@ def profiles() -> Entries:
     from ..display import load_profile
     from ..display.simulated.profile import names
 
-    for name in names():
+    for name in (*names(), *names(family=True)):
         profile = load_profile(name)
         yield name, f"version {profile.version}: {profile.description}"
 

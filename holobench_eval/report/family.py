@@ -32,6 +32,7 @@ def write_family(folder: Path, family: Family, rows: Sequence[Row], found: Seque
             "figures determine best.",
             heading("What the figures determine"),
             _marginals(order),
+            _geometries(family, rows, fit),
             heading("Other ways to read the figures"),
             _readings(family, rows),
             heading("The displays that are kept"),
@@ -82,6 +83,14 @@ def _marginals(order: Sequence[Marginal]) -> Markdown:
         for one in order
     ]
     return blocks([table(head, lines), "The width is relative to that of the range: at 1 the figures say nothing."])
+
+
+def _geometries(family: Family, rows: Sequence[Row], fit: Sequence[Row]) -> Markdown:
+    lines = []
+    for number, given in enumerate(family.geometries):
+        drawn, kept = (sum(row["geometry"] == number for row in some) for some in (rows, fit))
+        lines.append([number + 1, ", ".join(f"{name} {value}" for name, value in given.items()), drawn, kept])
+    return table(["geometry", "what methods are told", "draws", "draws that fit"], lines)
 
 
 def _readings(family: Family, rows: Sequence[Row]) -> Markdown:

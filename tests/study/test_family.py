@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
+from holobench_eval.display.simulated import profile as profiles
 from holobench_eval.report.family import write_family
 from holobench_eval.study.calibration import family as families
 from holobench_eval.study.calibration import posterior
@@ -27,6 +30,7 @@ from holobench_eval.study.definition import Targets
 from holobench_eval.study.executors import Serial
 
 DRAWS = 6
+UNTOLD: dict[str, Any] = {"digest": "", "like": None, "description": ""}  # of a profile, by a draw
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +72,18 @@ def test_every_draw_of_a_family_is_a_profile_within_its_ranges(name: str) -> Non
     assert drawn(family, 7) == drawn(family, 7)
 
 
-def test_no_display_of_the_family_is_a_fog() -> None:
-    share = next(given for given in load_family("leto-2020").parameters if given.name == "stray_light.share")
-    assert share.high <= 0.3
+def test_the_displays_that_ship_are_draws_of_their_family_and_none_is_a_fog() -> None:
+    family, shipped = load_family("leto-2020"), profiles.names(family=True)
+    assert len(shipped) == family.members
+    outside = 0
+    for name in shipped:
+        profile = load_profile(name)
+        number = int(re.findall(r"Draw (\d+) of", (profiles.FAMILY / f"{name}.yaml").read_text())[0])
+        draw = drawn(family, number)
+        assert replace(profile, **UNTOLD) == replace(profile_of(family, draw, name), **UNTOLD)
+        assert profile.stray_light.share <= 0.3
+        outside += draw.is_outside
+    assert outside == round(family.members * family.outside.share)
 
 
 def test_a_parameter_that_a_profile_lacks_is_refused(small: Family) -> None:
@@ -95,8 +108,7 @@ def test_what_is_kept_fits_under_its_own_name_and_its_file_is_the_display(
         path = tmp_path / f"{member.profile.name}.yaml"
         posterior.write_member(path, small, member)
         loaded = load_profile(str(path))
-        same = {"digest": "", "like": None, "description": ""}
-        assert replace(loaded, **same) == replace(member.profile, **same)
+        assert replace(loaded, **UNTOLD) == replace(member.profile, **UNTOLD)
     report = write_family(tmp_path, small, found, kept, posterior.middle(small, found, kept)).read_text()
     assert "leto-2020-02" in report
     assert (tmp_path / "corner.png").stat().st_size > 10_000

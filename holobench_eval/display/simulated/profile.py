@@ -37,6 +37,8 @@ from .stages import (
     ZeroOrder,
 )
 
+PROFILES = Path(str(files(__package__) / "profiles"))
+FAMILY = PROFILES / "family"
 SMALLEST_PANEL, LARGEST_PANEL = 64, 8192
 DEEPEST = 4  # profiles in a row that are like one another
 
@@ -161,10 +163,9 @@ STAGES: dict[str, type[Stage]] = {
 """Every stage by its key in a profile, in the order in which light meets them: the fields of ``Profile``."""
 
 
-def names() -> list[str]:
-    """Names of the profiles that come with the package."""
-    folder = files(__package__) / "profiles"
-    return sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+def names(family: bool = False) -> list[str]:
+    """Names of the profiles that come with the package; those of a family are many, and given on their own."""
+    return sorted(path.stem for path in (FAMILY if family else PROFILES).glob("*.yaml"))
 
 
 def load_profile(name: str, folder: Path | None = None) -> Profile:
@@ -237,6 +238,7 @@ def _file(name: str, *folders: Path) -> Path:
         if path is None:
             raise UserError(f"profile '{name}': no such file: {candidates[0]}")
         return path
-    if name not in names():
+    path = next((path for path in (PROFILES / f"{name}.yaml", FAMILY / f"{name}.yaml") if path.is_file()), None)
+    if path is None or Path(name).name != name:
         raise UserError(f"unknown profile '{name}'; {suggest(name, names())}, or a path to a .yaml file")
-    return Path(str(files(__package__) / "profiles" / f"{name}.yaml"))
+    return path
