@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from ..core.errors import UserError
 from .options import RESULTS
 from .options import Profile as ProfileName
 
@@ -23,6 +24,8 @@ def calibrate(
     workers: Annotated[int | None, typer.Option(min=1, help="Draws side by side.")] = None,
 ) -> None:
     """Fit a profile to published figures; with --draws, draw the family of displays that have them."""
+    if draws is None and (output, workers) != (None, None):
+        raise UserError("--output and --workers go with --draws")
     if draws is not None:
         _family(profile, draws, output or RESULTS / f"{profile}-family", workers)
         return
@@ -75,6 +78,6 @@ def _family(name: str, draws: int, folder: Path, workers: int | None) -> None:
     for member in kept:
         path = folder / "displays" / f"{member.profile.name}.yaml"
         path.parent.mkdir(exist_ok=True)
-        write_member(path, family, member)
+        write_member(path, family, member, draws)
         print(path)
     print(write_family(folder, family, rows, kept, middle(family, rows, kept)))

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 LONGEST_VALUE, LONGEST_PATH = 60, 100  # characters of a file's own text that an error repeats
 KINDS: Mapping[str, frozenset[str]] = {  # of documents, and keys that the others have not
-    "a study": frozenset({"methods", "targets", "protocol"}),
+    "a study": frozenset({"methods", "targets", "protocol", "title"}),
     "a real bench": frozenset({"slm", "camera", "capture", "laser", "phase"}),
     "a simulated display": frozenset({"lut", "sensor", "relay", "like", "panel"}),
 }
@@ -120,15 +120,15 @@ def typed(document: Document, cls: type[T], data: Mapping[str, Any] | None = Non
     try:
         return checked(cls, document.data if data is None else data, adapter=_adapter(cls))  # type: ignore[arg-type]
     except FieldError as error:
-        kinds = kind_of(document.data), kind_of(cls.__dataclass_fields__)  # type: ignore[attr-defined]
-        if error.at_key and len(error.where) == 1 and "" not in kinds and kinds[0] != kinds[1]:
-            raise document.error((), f"the file describes {kinds[0]}; expected {kinds[1]}") from None
+        given, wanted = kinds_of(document.data), kinds_of(cls.__dataclass_fields__)  # type: ignore[attr-defined]
+        if error.at_key and len(error.where) == 1 and given and wanted and wanted[0] not in given:
+            raise document.error((), f"the file describes {given[0]}; expected {wanted[0]}") from None
         raise document.error(error.where, str(error), error.at_key) from None
 
 
-def kind_of(keys: Iterable[str]) -> str:
-    """What a document with these keys describes: a study, a real bench or a display; empty for anything else."""
-    return next((kind for kind, marks in KINDS.items() if not marks.isdisjoint(keys)), "")
+def kinds_of(keys: Iterable[str]) -> list[str]:
+    """What a document with these keys may describe: a study, a real bench or a display."""
+    return [kind for kind, marks in KINDS.items() if not marks.isdisjoint(keys)]
 
 
 @contextmanager

@@ -27,7 +27,7 @@ class Described(np.ndarray[Any, np.dtype[np.float32]]):
     what: str = ""
 
     def __array_finalize__(self, other: Any) -> None:
-        self.what = getattr(other, "what", "")
+        self.what = getattr(other, "what", "") if np.may_share_memory(self, other) else ""
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
         return np.asarray(array)[()]

@@ -81,13 +81,13 @@ def capture_of(values: Numbers, what: str, meaning: object) -> Tensor:
 
 
 def as_in_config(value: Any) -> Any:
-    """A parameter as a config would give it: a path as text, a number of NumPy's as one of Python.
+    """A parameter as a config would give it: a path as text, numbers of NumPy's as those of Python.
 
     All else stays as it is; what no config could hold is refused where the method is built.
     """
     if isinstance(value, PurePath):
         return str(value)
-    return value.item() if isinstance(value, np.generic) else value
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
 def path_of(value: object, what: str) -> Path:

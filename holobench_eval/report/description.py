@@ -11,7 +11,7 @@ from types import MappingProxyType
 from ..core.errors import UserError
 from ..core.installed import as_typed
 from ..display.api import DisplaySpec
-from ..display.simulated.profile import Profile, load_profile
+from ..display.simulated.profile import Profile, load_profile, names
 from ..display.simulated.stages import Panel
 from ..study import isolation
 from ..study.calibration import load_calibration
@@ -116,6 +116,8 @@ def simulated(
 def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
     measured = "simulated; the parameters are assumed or from data sheets, and none was measured on a real panel"
+    if profile.name in names(family=True):
+        return f"{measured}; drawn from ranges, and kept since its captures have published figures (docs/bench.md)"
     try:
         calibration = load_calibration(profile)
     except UserError:

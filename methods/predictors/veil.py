@@ -53,6 +53,8 @@ class WirtingerVeil:
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
+    version: ClassVar[int] = 2
+    form: ClassVar[frozenset[str]] = frozenset({"stray_light"})
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Photograph Wirtinger holograms of the patterns, and fit the veil.
@@ -141,7 +143,8 @@ def veiled(intensity: Tensor, share: float, reach: float) -> Tensor:
 
 def fitted(ideal: Tensor, captures: Tensor, region: Region) -> tuple[float, float]:
     """Share and reach of the veil with which ideal intensities ``(n, C, H, W)`` come nearest to captures
-    ``(n, C, h, w)`` of the region, at the best brightness of each colour, in the squared error.
+    ``(n, C, h, w)`` of the region, in the squared error, at the best brightness of each colour and with the best
+    constant, such as a camera's black level.
 
     Every reach of `REACHES` and every share of `SHARES` is tried.
     """
@@ -149,7 +152,7 @@ def fitted(ideal: Tensor, captures: Tensor, region: Region) -> tuple[float, floa
     errors = []
     for reach in REACHES:
         light, veil, seen = (
-            part.double().transpose(0, 1).flatten(1)  # a row a colour
+            (row := part.double().transpose(0, 1).flatten(1)) - row.mean(1, keepdim=True)  # a row a colour
             for part in (region.crop(ideal), region.crop(_veil(ideal, reach)), captures)
         )
         a, b = 1 - shares[:, None], shares[:, None]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.core.schema import kind_of
+from holobench_eval.core.schema import kinds_of
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.profile import Profile
 from holobench_eval.lab.bench_file import BenchFile, load_bench_file
@@ -38,4 +38,4 @@ def test_a_file_of_another_kind_is_refused_for_its_kind(given: str, wanted: str,
 
 def test_each_kind_is_that_of_its_own_keys() -> None:
     for kind, cls in zip(READERS, (Study, BenchFile, Profile), strict=True):
-        assert kind_of(cls.__dataclass_fields__) == kind
+        assert kinds_of(cls.__dataclass_fields__)[0] == kind

@@ -94,7 +94,7 @@ def test_a_parameter_that_a_profile_lacks_is_refused(small: Family) -> None:
 def test_draws_are_resumed_and_a_line_that_was_cut_short_is_drawn_again(rows: tuple[Path, list[Row]]) -> None:
     folder, found = rows
     assert [row["draw"] for row in found] == list(range(DRAWS))
-    np.testing.assert_equal(rows_of(folder / "draws.csv"), found)
+    np.testing.assert_equal(rows_of(folder / "draws.csv", list(found[0])), found)
 
 
 def test_what_is_kept_fits_under_its_own_name_and_its_file_is_the_display(
@@ -106,7 +106,7 @@ def test_what_is_kept_fits_under_its_own_name_and_its_file_is_the_display(
     for member in kept:
         assert missed(small, member.scores, "linear") <= 1
         path = tmp_path / f"{member.profile.name}.yaml"
-        posterior.write_member(path, small, member)
+        posterior.write_member(path, small, member, DRAWS)
         loaded = load_profile(str(path))
         assert replace(loaded, **UNTOLD) == replace(member.profile, **UNTOLD)
     report = write_family(tmp_path, small, found, kept, posterior.middle(small, found, kept)).read_text()
@@ -122,3 +122,19 @@ def test_too_few_draws_that_fit_are_said(small: Family, rows: tuple[Path, list[R
 def test_a_display_that_could_not_be_registered_fits_nothing(small: Family, rows: tuple[Path, list[Row]]) -> None:
     row = {**rows[1][0], "wirtinger.psnr_linear": float("nan")}
     assert missed(small, row, "linear") == float("inf")
+
+
+@pytest.mark.parametrize("line", ["1,2\n", "3,a\n", "1," * 60 + "\n"])
+def test_a_damaged_line_of_draws_is_said(rows: tuple[Path, list[Row]], tmp_path: Path, line: str) -> None:
+    (tmp_path / "draws.csv").write_text((rows[0] / "draws.csv").read_text() + line)
+    with pytest.raises(UserError, match=r"draws.csv:8: damaged"):
+        rows_of(tmp_path / "draws.csv", list(rows[1][0]))
+
+
+def test_draws_of_other_code_are_not_resumed(
+    small: Family, rows: tuple[Path, list[Row]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(families, "load_family", lambda _: small)
+    monkeypatch.setattr(families, "HARNESS", "another")
+    with pytest.raises(UserError, match="by other code"):
+        compute("leto-2020", rows[0], Serial(), DRAWS, lambda *_: None)

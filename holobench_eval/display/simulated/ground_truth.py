@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 
 from ...optics.angular_spectrum import angular_spectrum_phase
@@ -37,7 +39,7 @@ def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     return [
         estimate("lut_exponent", colour, law.exponent),
         estimate("phase_gain", colour, law.gain),
-        estimate("crosstalk", colour, profile.crosstalk.width),
+        estimate("crosstalk", colour, profile.crosstalk.width * math.sqrt(profile.crosstalk.ratio)),
         *undiffracted(unmodulated / modulated * _passed(bench), colour),
         estimate("light", colour, light * float(bench.response.mean())),
     ]

@@ -40,6 +40,7 @@ from .stages import (
 PROFILES = Path(str(files(__package__) / "profiles"))
 FAMILY = PROFILES / "family"
 SMALLEST_PANEL, LARGEST_PANEL = 64, 8192
+SMALLEST_GAMMA, STEEPEST = 0.2, 4  # of a look-up table; the furthest place of its exponent from the mean [rms]
 DEEPEST = 4  # profiles in a row that are like one another
 
 
@@ -134,6 +135,8 @@ class Profile:
         if min(shape) < SMALLEST_PANEL or max(shape) > LARGEST_PANEL:
             raise UserError(f"a panel has {SMALLEST_PANEL} to {LARGEST_PANEL} pixels a side, got {list(shape)}")
         rows, columns = (min(given, own) for given, own in zip(shape, self.panel.shape, strict=True))
+        if (rows, columns) == self.panel.shape:
+            return self
         distance = self.panel.distance * rows / self.panel.shape[0]
         return replace(self, panel=replace(self.panel, shape=(rows, columns), distance=distance))
 
@@ -198,6 +201,10 @@ def _built(document: Document, values: Mapping[str, Any]) -> Profile:
         levels = 2**profile.panel.bits
         message = f"the table has {len(profile.lut.table)} entries; a panel of {profile.panel.bits} bits has {levels}"
         raise document.error(("lut", "table"), message)
+    if profile.lut.bend and profile.lut.table:
+        raise document.error(("lut", "bend"), "a table has no exponent to bend; give gamma in the place of the table")
+    if min(profile.lut.gamma) < SMALLEST_GAMMA + STEEPEST * profile.lut.bend:
+        raise document.error(("lut", "bend"), f"{profile.lut.bend:g} bends some exponents to zero")
     spectra, colours = len(profile.spectrum.measured), len(profile.panel.wavelengths)
     if spectra not in (0, colours):
         message = f"there are {spectra} measured spectra; the panel has {colours} wavelengths"

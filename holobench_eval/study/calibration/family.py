@@ -7,8 +7,11 @@ Approximate Bayesian computation by rejection (Pritchard et al. 1999, Mol. Biol.
 from __future__ import annotations
 
 import csv
+import fcntl
+import hashlib
+import json
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -30,6 +33,7 @@ from ...metrics import score
 from ..definition import Targets
 from ..executors import Executor
 from ..opening import open_bench
+from ..versions import HARNESS, dataset_version, method_version
 
 FOLDER = Path(__file__).parent / "families"
 METRICS, DOMAINS = ("psnr", "ssim"), ("linear", "srgb")
@@ -65,8 +69,8 @@ class Outside:
 class Family:
     """What is drawn, and what captures have to be.
 
-    base: profile of all that is not drawn; panel: rows and columns [px]; seed: of draws, patterns and noise; draws: how
-    many; targets: the images; figures: PSNR [dB] and SSIM of captures, by method; tolerance: how far from it the mean
+    base: profile of all that is not drawn; panel: rows and columns [px]; seed: of draws, patterns and noise;
+    targets: the images; figures: PSNR [dB] and SSIM of captures, by method; tolerance: how far from it the mean
     over the images may be; members: how many displays are kept; geometries: parameters that methods are told, one of
     which is drawn; parameters: drawn for all; outside: for some.
     """
@@ -74,7 +78,6 @@ class Family:
     base: str
     panel: tuple[int, int]
     seed: int
-    draws: Annotated[int, Interval(ge=1)]
     targets: Targets
     figures: Annotated[Mapping[str, Mapping[str, float]], MinLen(1)]
     tolerance: Mapping[str, float]
@@ -178,31 +181,60 @@ def compute(name: str, folder: Path, executor: Executor, draws: int, tell: Calla
     """All rows of a family's first draws; those that the folder has are kept.
 
     A row has ``draw``, ``geometry``, ``outside``, every parameter, and ``figures_of``, NaN where the display cannot be
-    registered. tell: called after each draw with how many are done, and of how many.
+    registered. tell: called after each draw with how many are done, and of how many. UserError: the folder's draws
+    are of another family, or damaged.
     """
     family, path = load_family(name), folder / "draws.csv"
-    for number in range(len(family.geometries)):
-        _solve(family, number, folder)
-    columns = _columns(family)
-    content = path.read_bytes() if path.is_file() else (",".join(columns) + "\n").encode()
-    write_atomically(path, content[: content.rfind(b"\n") + 1])  # without a line that was cut short
-    known = {int(row["draw"]) for row in rows_of(path)}
-    left = [index for index in range(draws) if index not in known]
-    work = partial(_evaluated, name, folder)
-    for count, (_, result) in enumerate(executor.map(work, iter(left)), 1):
-        if isinstance(result, Exception):
-            raise result
-        with path.open("a", encoding="utf-8", newline="") as file:
-            csv.DictWriter(file, columns, lineterminator="\n").writerow(result)
-        tell(count, len(left))
-    return [row for row in rows_of(path) if row["draw"] < draws]
+    columns, work = _columns(family), partial(_evaluated, name, folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another run here waits, and then has the rows
+        _refuse_others(name, family, folder)
+        for number in range(len(family.geometries)):
+            _solve(family, number, folder)
+        content = path.read_bytes() if path.is_file() else (",".join(columns) + "\n").encode()
+        write_atomically(path, content[: content.rfind(b"\n") + 1])  # without a line that was cut short
+        known = {row["draw"] for row in rows_of(path, columns)}
+        left = [index for index in range(draws) if index not in known]
+        for count, (_, result) in enumerate(executor.map(work, iter(left)), 1):
+            if isinstance(result, Exception):
+                raise result
+            with path.open("a", encoding="utf-8", newline="") as file:
+                csv.DictWriter(file, columns, lineterminator="\n").writerow(result)
+            tell(count, len(left))
+        return [row for row in rows_of(path, columns) if row["draw"] < draws]
 
 
-def rows_of(path: Path) -> list[Row]:
-    """The rows of a file of draws, in the order of their numbers."""
+def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
+    """The rows of a file of draws, in the order of their numbers. UserError: it is damaged."""
     with path.open(encoding="utf-8", newline="") as file:
-        found = [{key: float(value or "nan") for key, value in row.items()} for row in csv.DictReader(file)]
-    return sorted(found, key=lambda row: row["draw"])
+        header, *lines = list(csv.reader(file)) or [[]]
+    if header != list(columns):
+        raise UserError(f"{path}: its first line does not name the columns of the draws; delete the file")
+    found = dict[float, Row]()
+    for number, line in enumerate(lines, 2):
+        try:
+            row = dict(zip(columns, (float(value or "nan") for value in line), strict=True))
+        except ValueError:
+            raise UserError(f"{path}:{number}: damaged; delete the line, and it is drawn again") from None
+        found[row["draw"]] = row
+    return [found[draw] for draw in sorted(found)]
+
+
+def _refuse_others(name: str, family: Family, folder: Path) -> None:
+    """UserError for a folder whose draws are of other ranges, or of other code."""
+    path, dataset = folder / "family.json", family.targets.dataset
+    own = {
+        "family": hashlib.sha256((FOLDER / f"{name}.yaml").read_bytes()).hexdigest(),
+        "base": load_profile(family.base).digest,
+        "code": HARNESS,
+        dataset: dataset_version(dataset, plugins.find("datasets", dataset)),
+        **{method: method_version(plugins.find("methods", method)) for method in family.figures},
+    }
+    known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    if known != own and (known is not None or (folder / "draws.csv").is_file()):
+        raise UserError(f"{folder}: has draws of another family, or by other code; choose another --output")
+    write_atomically(path, json.dumps(own, indent=1).encode())
 
 
 def _columns(family: Family) -> list[str]:

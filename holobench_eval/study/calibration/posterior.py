@@ -124,8 +124,8 @@ def middle(family: Family, rows: Sequence[Row], found: Sequence[Member]) -> Memb
     return min((member for member in found if not member.draw.is_outside), key=distance)
 
 
-def write_member(path: Path, family: Family, member: Member) -> None:
-    """Write a display's profile."""
+def write_member(path: Path, family: Family, member: Member, draws: int) -> None:
+    """Write a display's profile. draws: of how many it was chosen."""
     document: dict[str, Any] = {
         "like": family.base,
         "name": member.profile.name,
@@ -142,9 +142,7 @@ def write_member(path: Path, family: Family, member: Member) -> None:
         "{} {:.2f} dB and SSIM {:.3f}".format(method, *(member.scores[f"{method}.{name}_linear"] for name in METRICS))
         for method in family.figures
     )
-    head = (
-        f"# Draw {member.draw.index} of `holoeval calibrate {family.base} --draws {family.draws}`, see docs/bench.md.\n"
-    )
+    head = f"# Draw {member.draw.index} of `holoeval calibrate {family.base} --draws {draws}`, see docs/bench.md.\n"
     head += f"# Captures of its images have {reached}.\n"
     text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
     write_atomically(path, (head + text).encode())

@@ -65,6 +65,7 @@ def test_digest_follows_the_file(tmp_path):
             r"red comes first, .*: \[6.36e-07, 5.17e-07, 4.46e-07\]$",
         ),
         (("version: 1\n", ""), "missing key 'version'"),
+        (("version: 1\n", "version: 1\nlut: {bend: 0.25}\n"), ":4:13: 0.25 bends some exponents to zero"),
     ],
 )
 def test_a_fault_in_a_profile_is_one_line_with_its_place(tmp_path, change, message):

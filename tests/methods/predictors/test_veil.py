@@ -19,11 +19,12 @@ PANEL = (128, 128)
 
 
 @pytest.mark.parametrize(("share", "reach"), [(0.0, REACHES[20]), (0.3, REACHES[24]), (0.7, REACHES[12])])
-def test_a_veil_is_found_from_its_own_captures_at_any_brightness(share: float, reach: float) -> None:
+@pytest.mark.parametrize("black", [0.0, 0.05])
+def test_a_veil_is_found_at_any_brightness_and_black_level(share: float, reach: float, black: float) -> None:
     draw = torch.Generator().manual_seed(1)
     region, light = Region(16, 16, 96, 96), torch.rand(3, 1, 128, 128, generator=draw)
     light[:, :, :, 64:] = 0
-    captures = 0.6 * region.crop(veiled(light, share, reach))
+    captures = 0.6 * region.crop(veiled(light, share, reach)) + black
     found, far = fitted(light, captures, region)
     assert found == pytest.approx(share, abs=0.005)
     assert share == 0 or far == reach
