@@ -494,3 +494,11 @@ def test_a_device_is_asked_for_by_its_name(target: interactive.Array) -> None:
     for call in (lambda: hb.open_display("ideal", device="gpu"), lambda: hb.score(target, target, device="gpu")):
         with pytest.raises(UserError, match="unknown device 'gpu'; auto, cpu, cuda or cuda:N"):
             call()
+
+
+def test_an_array_made_like_one_of_a_display_is_plain(display: hb.OpenDisplay, target: interactive.Array) -> None:
+    phase = np.zeros_like(target, shape=(3, *display.spec.shape))
+    assert getattr(phase, "what", "") == ""
+    assert getattr(target[:, ::2], "what", "") == getattr(target, "what", "") != ""
+    light = np.empty_like(display.solve("double_phase", target))
+    assert getattr(light, "what", "") == ""

@@ -1,5 +1,6 @@
 """Methods from files."""
 
+import functools
 import gc
 import os
 import sys
@@ -149,3 +150,16 @@ def test_a_parameter_that_came_later_is_in_no_name_while_it_has_its_default() ->
     assert "correction" not in plugins.params_of(plugins.build("methods", "phases", own, None))
     given = {**own, "correction": {"file": "flat.bmp"}}
     assert plugins.params_of(plugins.build("methods", "phases", given, None))["correction"]["file"] == "flat.bmp"
+
+
+def test_a_method_that_turns_anothers_arguments_round_is_no_swapped_one() -> None:
+    def theirs(bench: object, target: object) -> object:
+        return bench
+
+    @functools.wraps(theirs)
+    def ours(target: object, bench: object) -> object:
+        return theirs(bench, target)
+
+    plugins.refuse_swapped(ours, "ours")
+    with pytest.raises(UserError, match="theirs takes bench and target"):
+        plugins.refuse_swapped(theirs, "theirs")
