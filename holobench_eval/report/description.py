@@ -117,7 +117,7 @@ def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
     measured = "simulated; the parameters are assumed or from data sheets, and none was measured on a real panel"
     if profile.name in names(family=True):
-        return f"{measured}; drawn from ranges, and kept since its captures have published figures (docs/bench.md)"
+        return f"{measured}; drawn from ranges, and kept since its captures have published figures"
     try:
         calibration = load_calibration(profile)
     except UserError:

@@ -164,7 +164,7 @@ def test_a_mapping_beside_null_is_shown_with_its_keys(pages: dict[str, str]) -> 
     [
         ("wirtinker", "unknown name 'wirtinker'; did you mean 'wirtinger'?"),
         ("leto2020", "unknown name 'leto2020'; did you mean 'leto-2020'?"),
-        ("leto", "unknown name 'leto'; names with it: leto-2020, leto-2020-b, "),
+        ("leto", "unknown name 'leto'; names with it: leto-2020, leto-2020-01, "),
         ("condition", "unknown kind 'condition'; did you mean 'conditions'?"),
         ("?", "unknown kind '?'; allowed: conditions, datasets, methods, metrics, profiles, studies, or a name that"),
     ],
