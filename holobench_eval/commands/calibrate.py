@@ -24,8 +24,6 @@ def calibrate(
     workers: Annotated[int | None, typer.Option(min=1, help="Draws side by side.")] = None,
 ) -> None:
     """Fit a profile to published figures; with --draws, draw the family of displays that have them."""
-    if draws is None and (output, workers) != (None, None):
-        raise UserError("--output and --workers go with --draws")
     if draws is not None:
         _family(profile, draws, output or RESULTS / f"{profile}-family", workers)
         return
@@ -38,6 +36,8 @@ def calibrate(
     screen = console()
     loaded = load_profile(profile)
     calibration = load_calibration(loaded)
+    if (output, workers) != (None, None):
+        raise UserError("--output and --workers go with --draws")
     with watching(screen) as watch:
         fitting = Fitting(
             profile, loaded, calibration, watch, lambda line: screen.print(line, highlight=False, soft_wrap=True)
