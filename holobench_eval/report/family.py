@@ -14,6 +14,7 @@ from .markdown import Markdown, blocks, bullets, code, heading, table
 
 SHOWN = 6  # parameters of the picture
 NARROW, WIDE = 0.7, 0.9  # of a parameter's range: determined, and not
+CUT = 0.1  # of its range: a quantile so near to an end is that of the range, and not of the figures
 
 
 def write_family(folder: Path, family: Family, rows: Sequence[Row], found: Sequence[Member], nearest: Member) -> Path:
@@ -64,8 +65,19 @@ def _answer(family: Family, rows: Sequence[Row], fit: Sequence[Row], order: Sequ
 
 
 def _range(one: Marginal) -> str:
+    near = CUT * (one.given.high - one.given.low)
+    ends = [
+        end
+        for end, value in ((one.given.low, one.quantiles[0]), (one.given.high, one.quantiles[2]))
+        if abs(end - value) < near
+    ]
+    cut = f" (cut where its range ends, at {' and '.join(f'{end:g}' for end in ends)})" if ends else ""
+    return f"{one.given.words}: {_span(one)} {one.given.unit}".rstrip() + cut
+
+
+def _span(one: Marginal) -> str:
     low, _, high = one.quantiles
-    return f"{one.given.words}: {low:.3g} to {high:.3g} {one.given.unit}".rstrip()
+    return f"{low:.3g} to {high:.3g}"
 
 
 def _marginals(order: Sequence[Marginal]) -> Markdown:
@@ -94,13 +106,14 @@ def _geometries(family: Family, rows: Sequence[Row], fit: Sequence[Row]) -> Mark
 
 
 def _readings(family: Family, rows: Sequence[Row]) -> Markdown:
-    first = [one.given.name for one in marginals(family, accepted(family, rows))[:2]]
+    first = [one.given for one in marginals(family, accepted(family, rows))[:2]]
     lines = []
     for reading in READINGS:
         fit = accepted(family, rows, reading)
-        found = {one.given.name: _range(one) for one in marginals(family, fit)} if len(fit) > 1 else {}
-        lines.append([reading.words, len(fit), *(found.get(name, "–") for name in first)])
-    return table(["figures held against captures", "draws that fit", "", ""], lines)
+        found = {one.given.name: _span(one) for one in marginals(family, fit)} if len(fit) > 1 else {}
+        lines.append([reading.words, len(fit), *(found.get(given.name, "–") for given in first)])
+    heads = [f"{given.words}, 5 to 95 % [{given.unit}]" for given in first]
+    return table(["figures held against captures", "draws that fit", *heads], lines)
 
 
 def _members(family: Family, found: Sequence[Member]) -> Markdown:

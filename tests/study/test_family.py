@@ -138,3 +138,18 @@ def test_draws_of_other_code_are_not_resumed(
     monkeypatch.setattr(families, "HARNESS", "another")
     with pytest.raises(UserError, match="by other code"):
         compute("leto-2020", rows[0], Serial(), DRAWS, lambda *_: None)
+
+
+def test_the_committed_report_follows_from_its_draws_and_the_displays_that_ship(tmp_path: Path) -> None:
+    """All but the picture: what was scored of a display stands in the head of its file."""
+    family, folder = load_family("leto-2020"), Path(__file__).parents[2] / "reports/family"
+    drawn_rows = rows_of(folder / "draws.csv", families.columns_of(family))
+    kept = []
+    for name in profiles.names(family=True):
+        head = (profiles.FAMILY / f"{name}.yaml").read_text()
+        number, *scores = map(float, re.findall(r"(?:Draw |double_phase |wirtinger |SSIM )([0-9.]+)(?= |,|\.\n)", head))
+        names = [f"{method}.{metric}_linear" for method in family.figures for metric in ("psnr", "ssim")]
+        draw = drawn(family, int(number))
+        kept.append(posterior.Member(draw, load_profile(name), dict(zip(names, scores, strict=True))))
+    nearest = posterior.middle(family, drawn_rows, kept)
+    assert write_family(tmp_path, family, drawn_rows, kept, nearest).read_text() == (folder / "report.md").read_text()

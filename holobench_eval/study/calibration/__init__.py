@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from annotated_types import MinLen
+from torch import Tensor
 
+from ...core import plugins
 from ...core.errors import UserError
 from ...core.schema import typed
 from ...core.yaml_source import load
-from ...display import Profile, load_profile
+from ...display import CalibratedBench, Profile, load_profile
 from ...display.simulated.stages import Panel
 from ..definition import Targets
 
@@ -81,3 +83,33 @@ def _right() -> str:
         f"calibrate takes {' or '.join(names())}, or a profile of the same panel that is like one of them and has its "
         "name with a suffix; a study with the method parametric_model estimates what a display of your own does"
     )
+
+
+def with_values(profile: Profile, values: Mapping[str, Any]) -> Profile:
+    """A profile with other values of some parameters, by ``stage.key``; a number stands for all colours."""
+    for name, value in values.items():
+        profile = _put(profile, name.split("."), value)
+    return profile
+
+
+def _put(holder: Any, path: list[str], value: Any) -> Any:
+    """What holds a parameter, with another value of it; a number stands for all colours."""
+    first, *rest = path
+    is_class = is_dataclass(holder)
+    if is_class and first not in {field.name for field in fields(holder)}:
+        raise UserError(f"{type(holder).__name__} has no parameter '{first}'")
+    old = getattr(holder, first) if is_class else holder.get(first, 0.0)
+    if rest:
+        new = _put(old, rest, value)
+    elif isinstance(old, tuple):
+        new = tuple(value) if isinstance(value, list | tuple) else (value,) * len(old)
+    else:
+        new = round(value) if isinstance(old, int) and not isinstance(old, bool) else value
+    return replace(holder, **{first: new}) if is_class else {**holder, first: new}
+
+
+def hologram(method: str, bench: CalibratedBench, target: Tensor, item: str) -> Tensor:
+    """The phase ``(C, H, W)`` [rad] of an image, by a method with its defaults; it knows the nominal optics alone."""
+    built = plugins.build("methods", method, {})
+    phase: Tensor = built.solve(target[None], bench.for_method(built, method, target, item, 0))[0]
+    return phase

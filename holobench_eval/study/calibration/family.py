@@ -12,7 +12,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from statistics import fmean
@@ -34,6 +34,7 @@ from ..definition import Targets
 from ..executors import Executor
 from ..opening import open_bench
 from ..versions import HARNESS, dataset_version, method_version
+from . import hologram, with_values
 
 FOLDER = Path(__file__).parent / "families"
 METRICS, DOMAINS = ("psnr", "ssim"), ("linear", "srgb")
@@ -130,26 +131,7 @@ def profile_of(family: Family, draw: Draw, name: str) -> Profile:
     """The display of a draw, under a name; its patterns are its own."""
     own = seed("patterns of a draw", family.seed, draw.index) % 10**6
     base = replace(load_profile(family.base), name=name, seed=own)
-    given = {**family.geometries[draw.geometry], **draw.values}
-    for path, value in given.items():
-        base = _put(base, path.split("."), value)
-    return base
-
-
-def _put(holder: Any, path: list[str], value: Any) -> Any:
-    """What holds a parameter, with another value of it; a number stands for all colours."""
-    first, *rest = path
-    is_class = is_dataclass(holder)
-    if is_class and first not in {field.name for field in fields(holder)}:
-        raise UserError(f"{type(holder).__name__} has no parameter '{first}'")
-    old = getattr(holder, first) if is_class else holder.get(first, 0.0)
-    if rest:
-        new = _put(old, rest, value)
-    elif isinstance(old, tuple):
-        new = tuple(value) if isinstance(value, list | tuple) else (value,) * len(old)
-    else:
-        new = round(value) if isinstance(old, int) and not isinstance(old, bool) else value
-    return replace(holder, **{first: new}) if is_class else {**holder, first: new}
+    return with_values(base, {**family.geometries[draw.geometry], **draw.values})
 
 
 def figures_of(family: Family, profile: Profile, kept: Holograms) -> dict[str, float]:
@@ -185,7 +167,7 @@ def compute(name: str, folder: Path, executor: Executor, draws: int, tell: Calla
     are of another family, or damaged.
     """
     family, path = load_family(name), folder / "draws.csv"
-    columns, work = _columns(family), partial(_evaluated, name, folder)
+    columns, work = columns_of(family), partial(_evaluated, name, folder)
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # another run here waits, and then has the rows
@@ -237,7 +219,8 @@ def _refuse_others(name: str, family: Family, folder: Path) -> None:
     write_atomically(path, json.dumps(own, indent=1).encode())
 
 
-def _columns(family: Family) -> list[str]:
+def columns_of(family: Family) -> list[str]:
+    """The columns of a file of draws."""
     scores = [f"{method}.{metric}_{domain}" for method in family.figures for metric in METRICS for domain in DOMAINS]
     parameters = [given.name for given in (*family.parameters, *family.outside.parameters)]
     return ["draw", "geometry", "outside", *parameters, *scores]
@@ -268,12 +251,7 @@ def _solve(family: Family, number: int, folder: Path) -> None:
     targets = {item: dataset.load(item, bench.spec.region.shape) for item in dataset.items()}
     kept = {TARGETS: targets}
     for name in family.figures:
-        method = plugins.build("methods", name, {})
-        kept[name] = {
-            item: method.solve(target[None], bench.for_method(method, name, target, item, 0))[0]
-            for item, target in targets.items()
-        }
-    folder.mkdir(parents=True, exist_ok=True)
+        kept[name] = {item: hologram(name, bench, target, item) for item, target in targets.items()}
     torch.save(kept, path.with_suffix(".part"))
     path.with_suffix(".part").replace(path)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
@@ -21,7 +21,7 @@ from torch import Tensor
 from ...core import plugins
 from ...core.errors import UserError
 from ...core.io import write_png
-from ...display import CalibratedBench, Profile
+from ...display import Profile
 from ...display.simulated.pipeline import SimulatedBench
 from ...metrics import match, score
 from ...optics import srgb_encode
@@ -31,21 +31,13 @@ from ..opening import open_bench
 from ..plan import plan
 from ..progress import Lines
 from ..run import run
-from . import Calibration
+from . import Calibration, hologram, with_values
 
 Values = Mapping[str, float]
 
 EVALUATIONS = 10  # of the figures, at most, beside those for slopes
 STEP = 0.03  # for slopes, in units of a parameter's range and its place in it
 TRAININGS, NEAR = 4, 0.25  # of the network, at most; error of its figure [dB] that is small enough
-
-
-def with_values(profile: Profile, values: Values) -> Profile:
-    """A profile with other values of some parameters."""
-    for name, value in values.items():
-        stage, _, key = name.partition(".")
-        profile = replace(profile, **{stage: replace(getattr(profile, stage), **{key: value})})
-    return profile
 
 
 @dataclass(frozen=True)
@@ -185,15 +177,9 @@ class Fitting:
         """Phases by method and image, solved once: no method knows the parameters that are fitted."""
         bench = open_bench(self.profile, self.calibration.panel, self.calibration.seed)
         return {
-            name: {item: _solved(name, bench, target, item) for item, target in self._targets.items()}
+            name: {item: hologram(name, bench, target, item) for item, target in self._targets.items()}
             for name in self.calibration.figures
         }
-
-
-def _solved(name: str, bench: CalibratedBench, target: Tensor, item: str) -> Tensor:
-    method = plugins.build("methods", name, {})
-    phase: Tensor = method.solve(target[None], bench.for_method(method, name, target, item, 0))[0]
-    return phase
 
 
 def _listed(values: Values) -> str:
