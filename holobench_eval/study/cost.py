@@ -104,7 +104,8 @@ def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
     """Reset the peak of memory and start the clock. device: where the solution is computed; process: the number of the
     one that computes it, None for this one. What another process takes on a GPU is not measured.
 
-    The allocator of this process is trimmed first, so that reused memory shows as growth.
+    The allocator of this process is trimmed first, so that reused memory shows as growth (but for the end of its memory
+    in a process whose program break could not be raised: glibc keeps that).
     """
     if process is None:
         _collect()
