@@ -67,7 +67,7 @@ class HIL:
     fallback: bool = False
 
     tuned: ClassVar[str] = (
-        "the network, rates and steps were chosen on a trial display that resembles leto-2020, with generated images"
+        "the network, rates and steps were chosen on a trial display that resembles leto-hazy, with generated images"
     )
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False

@@ -58,7 +58,7 @@ def test_a_function_of_a_file_is_shown_with_its_parameters(
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("leto-2020", ("Version ", "crosstalk: width = 0.361", "stray_light", "holoeval show leto-2020")),
+        ("leto-2020", ("Version ", "crosstalk: width = 0.4687", "stray_light", "holoeval show leto-2020")),
         ("drift", ("values [days] from 0 to 3650", "dust that settles", "sweeps: [{condition: drift")),
         ("draw", ("count: 3",)),
         ("ssim", ("IEEE Trans. Image Process. 13", "columns: ssim_linear, ssim_amplitude, ssim_srgb")),

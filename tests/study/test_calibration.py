@@ -87,7 +87,7 @@ MET = {0.62: (15.40, 17.49), 0.685: (15.51, 17.34), 0.7: (15.53, 17.27)}  # dB, 
 def test_no_prediction_is_bought_with_figures_outside_their_tolerance(
     monkeypatch: pytest.MonkeyPatch, start: float, tolerance: float, best: float
 ) -> None:
-    shipped, profile = load_calibration(load_profile("leto-2020")), load_profile("leto-2020")
+    shipped, profile = load_calibration(load_profile("leto-hazy")), load_profile("leto-hazy")
     assert shipped.prediction is not None
     calibration = replace(shipped, prediction=replace(shipped.prediction, tolerance=tolerance))
     profile = replace(profile, stray_light=replace(profile.stray_light, share=start))
@@ -103,7 +103,7 @@ def test_no_prediction_is_bought_with_figures_outside_their_tolerance(
     monkeypatch.setattr(Fitting, "predicted", predicted)
     monkeypatch.setattr(Fitting, "_quick", quick)
     monkeypatch.setattr(Fitting, "_fit_figures", lambda _, fixed: fixed)
-    found, _ = Fitting("leto-2020", profile, calibration, Lines(lambda line: None), lambda line: None).fit()
+    found, _ = Fitting("leto-hazy", profile, calibration, Lines(lambda line: None), lambda line: None).fit()
     assert tried[-1] == 0.7
     assert found["stray_light.share"] == max(best, start)
 
@@ -142,10 +142,10 @@ def test_a_profile_that_is_fitted_to_nothing_is_refused() -> None:
 
 
 def test_a_calibration_belongs_to_the_profile_of_its_name_and_to_others_of_its_kind(tmp_path: Path) -> None:
-    for name in ("leto-2020-b", "mine"):
-        (tmp_path / f"{name}.yaml").write_text(f"like: leto-2020\nname: {name}\n")
-    own = load_calibration(load_profile("leto-2020"))
-    assert load_calibration(load_profile("leto-2020-b.yaml", tmp_path)) == own
+    for name in ("leto-hazy-b", "mine"):
+        (tmp_path / f"{name}.yaml").write_text(f"like: leto-hazy\nname: {name}\n")
+    own = load_calibration(load_profile("leto-hazy"))
+    assert load_calibration(load_profile("leto-hazy-b.yaml", tmp_path)) == own
     for other in (load_profile("mine.yaml", tmp_path), load_profile("leto-sled")):
         with pytest.raises(UserError, match=f"'{other.name}' is not fitted to anything"):
             load_calibration(other)
@@ -154,22 +154,22 @@ def test_a_calibration_belongs_to_the_profile_of_its_name_and_to_others_of_its_k
 def test_a_display_that_no_figures_were_published_for_is_refused_in_one_line_that_says_what_is_right(
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "wide.yaml").write_text("like: leto-2020\nname: leto-2020-wide\npanel: {pitch: 8.0e-6}\n")
+    (tmp_path / "wide.yaml").write_text("like: leto-hazy\nname: leto-hazy-wide\npanel: {pitch: 8.0e-6}\n")
     (tmp_path / "same.yaml").write_text(
-        "name: leto-2020\nversion: 1\nseed: 1\ndescription: ours\npanel: {shape: [128, 128], pitch: 6.4e-6, "
+        "name: leto-hazy\nversion: 1\nseed: 1\ndescription: ours\npanel: {shape: [128, 128], pitch: 6.4e-6, "
         "wavelengths: [5.2e-7], distance: 0.012, bits: 8}\n"
     )
     for file, said in (
         (
             "wide.yaml",
-            "panel.pitch is 8e-06, and the figures that calibrate fits are of 'leto-2020', where it is 6.4e-06",
+            "panel.pitch is 8e-06, and the figures that calibrate fits are of 'leto-hazy', where it is 6.4e-06",
         ),
-        ("same.yaml", "profile 'leto-2020': panel.shape"),
+        ("same.yaml", "profile 'leto-hazy': panel.shape"),
     ):
         with pytest.raises(UserError) as refused:
             calibrate(str(tmp_path / file))
         line = str(refused.value)
         assert said in line
-        assert "calibrate takes leto-2020 or leto-aged" in line
+        assert "calibrate takes leto-hazy or leto-aged" in line
         assert "parametric_model" in line
         assert "\n" not in line

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -153,3 +153,10 @@ def test_the_committed_report_follows_from_its_draws_and_the_displays_that_ship(
         kept.append(posterior.Member(draw, load_profile(name), dict(zip(names, scores, strict=True))))
     nearest = posterior.middle(family, drawn_rows, kept)
     assert write_family(tmp_path, family, drawn_rows, kept, nearest).read_text() == (folder / "report.md").read_text()
+
+
+def test_the_display_without_a_number_is_the_member_nearest_to_the_middle() -> None:
+    named, member = load_profile("leto-2020"), load_profile("leto-2020-12")
+    apart = {"name", "version", "description", "like", "digest"}
+    assert {f.name for f in fields(named) if getattr(named, f.name) != getattr(member, f.name)} <= apart
+    assert named.stray_light.share <= 0.3

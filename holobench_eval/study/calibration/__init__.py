@@ -66,7 +66,8 @@ def load_calibration(profile: Profile) -> Calibration:
     like = profile.like or ""
     name = like if profile.name.startswith(f"{like}-") else profile.name
     if name not in names():
-        raise UserError(f"profile '{profile.name}' is not fitted to anything; {_right()}")
+        drawn = f"; --draws draws the family of {name}" if (FOLDER / "families" / f"{name}.yaml").exists() else ""
+        raise UserError(f"profile '{profile.name}' is not fitted to anything{drawn}; {_right()}")
     shipped = load_profile(name)
     for entry in fields(Panel):
         own, wanted = (getattr(panel, entry.name) for panel in (profile.panel, shipped.panel))

@@ -14,7 +14,7 @@ from .pictures import Picture
 
 NEARLY_ITSELF = 40.0  # dB: the noise of a good camera alone leaves less
 # Of white; constant light of so much leaves 26 dB. Real captures (Stanford 2021) have 2 to 5 %, simulated displays but
-# the hazy leto-2020 less than 2 %, and a black level of 6 % of full scale gives 3 to 17 %.
+# leto-hazy less than 2 %, and a black level of 6 % of full scale gives 3 to 17 %.
 LIFTED = 0.05
 NOISE = 1.25  # of the darkest hundredth of a capture, which noise puts below its black level
 ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of it has a high PSNR
