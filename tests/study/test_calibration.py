@@ -170,6 +170,6 @@ def test_a_display_that_no_figures_were_published_for_is_refused_in_one_line_tha
             calibrate(str(tmp_path / file))
         line = str(refused.value)
         assert said in line
-        assert "calibrate takes leto-hazy or leto-aged" in line
+        assert "calibrate takes leto-aged or leto-hazy" in line
         assert "parametric_model" in line
         assert "\n" not in line

@@ -130,7 +130,7 @@ def drawn(family: Family, index: int) -> Draw:
 def profile_of(family: Family, draw: Draw, name: str) -> Profile:
     """The display of a draw, under a name; its patterns are its own."""
     own = seed("patterns of a draw", family.seed, draw.index) % 10**6
-    base = replace(load_profile(family.base), name=name, seed=own)
+    base = replace(load_profile(family.base), name=name, version=1, seed=own)
     return with_values(base, {**family.geometries[draw.geometry], **draw.values})
 
 
