@@ -94,7 +94,7 @@ def turned(results: Results) -> str:
             results.ranking(condition)[:1], results.ranking(condition, score.key)[:1], strict=False
         ):
             ours, theirs = (score.mean_in(results.row(label, condition)) for label in (first, other))
-            parts += [f"on {condition} {other} ({theirs}; {first} {ours})"] * (ours != theirs)
+            parts += [f"on {condition} {other} ({theirs} against {ours} of {first})"] * (ours != theirs)
     return f"By {score.name} another method is first: {'; '.join(parts)}." if parts else ""
 
 
