@@ -1,4 +1,7 @@
-"""How often intervals hold the true mean: ``python -m tests.support.coverage`` prints the table of the docs."""
+"""How often intervals hold the true mean, and how often tests show a difference that is none.
+
+``python -m tests.support.coverage`` prints the tables of the docs.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from holobench_eval.report.data.statistics import Estimate, mean_interval, ratio_interval
+from holobench_eval.report.data.statistics import (
+    SIGNIFICANCE,
+    Estimate,
+    family_p,
+    mean_interval,
+    ratio_interval,
+    two_way,
+)
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, tuple[int, ...]], Array]
@@ -27,6 +37,8 @@ DESIGNS = {
     "8 alone": (1,) * 8,
     "4 alone": (1,) * 4,
 }
+VARIANCES = ((1, 1, 1), (4, 1, 1), (1, 4, 1), (1, 0, 1), (0, 1, 1), (0, 0, 1))  # of displays, of clusters, of the rest
+FAMILIES = ((15, 1), (20, 1), (40, 1), (15, 9), (20, 9), (40, 9))  # clusters or displays, and comparisons
 SHARED = 0.5  # share of the variance that the targets of a cluster have in common
 
 
@@ -58,14 +70,42 @@ def _holds(estimate: Estimate, truth: float) -> bool:
     return estimate.low <= truth <= estimate.high
 
 
+def two_way_coverage(
+    shape: str, displays: int, clusters: int, variances: tuple[float, float, float], count: int
+) -> float:
+    """The same of the mean over displays and clusters of targets; variances: of displays, of clusters, of the rest."""
+    rng = np.random.default_rng([displays, clusters, list(SHAPES).index(shape)])
+    sizes = ((count, displays, 1), (count, 1, clusters), (count, displays, clusters))
+    parts = (np.sqrt(variance) * SHAPES[shape](rng, size) for variance, size in zip(variances, sizes, strict=True))
+    return float(np.mean([low <= 0 <= high for _, low, high in map(two_way, sum(parts, np.zeros(sizes[2])))]))
+
+
+def false_positives(shape: str, clusters: int, comparisons: int, count: int) -> float:
+    """Share of families without a difference in which one is shown; comparisons are independent, which is the worst."""
+    drawn, _ = samples(shape, (1,) * clusters, count, comparisons)
+    return float(np.mean([(family_p(one) < SIGNIFICANCE).any() for one in drawn]))
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     print("| values |", " | ".join(DESIGNS), "| ratio, 28 in 15 |")
     print("|---|" + "---|" * (len(DESIGNS) + 1))
     for shape in SHAPES:
         found = [coverage(shape, sizes, 20_000) for sizes in DESIGNS.values()]
         found.append(ratio_coverage(shape, DESIGNS["28 in 15 clusters"], 20_000))
-        print(f"| {shape} |", " | ".join(f"{100 * share:.1f}" for share in found), "|")
+        _row(shape, found)
+    print("| displays, clusters, values |", " | ".join(map(str, VARIANCES)), "|")
+    for displays in (20, 5):
+        for shape in list(SHAPES)[:2]:
+            found = [two_way_coverage(shape, displays, 15, variances, 10_000) for variances in VARIANCES]
+            _row(f"{displays}, 15, {shape}", found)
+    print("| differences |", " | ".join(f"{g} clusters, family of {m}" for g, m in FAMILIES), "|")
+    for shape in list(SHAPES)[:3]:
+        _row(shape, [false_positives(shape, *family, 2000) for family in FAMILIES])
+
+
+def _row(name: str, shares: list[float]) -> None:
+    print(f"| {name} |", " | ".join(f"{100 * share:.1f}" for share in shares), "|", flush=True)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..data.categories import CATEGORIES, OFFLINE, ONLINE
-from ..data.phrases import counted, difference, floor_scores, relation, tested, value, verdict
+from ..data.phrases import counted, difference, floor_scores, power, relation, tested, turned, value, verdict
 from ..data.results import Results
 from ..data.scores import DOMAIN_NAMES
 from ..data.text import number, p_value, percent, words
@@ -165,6 +165,7 @@ def rows(results: Results) -> Markdown | None:
     many, captures = len(results.conditions) > 1, "total_captures" in results.table and results.layout.spends_captures
     baseline = results.layout.baseline
     headings = ["method", *(["display"] if many else []), results.headline.heading]
+    headings += [score.name for score in results.beside]
     headings += [f"difference to {baseline}", "verdict"] if results.against_baseline else []
     headings += ["captures in total"] if captures else []
     lines = []
@@ -172,13 +173,16 @@ def rows(results: Results) -> Markdown | None:
         for label in _ordered(results, condition):
             row, test = results.row(label, condition), tested(results, label, condition)
             line = [counted(results, label, condition), *([condition] if many else []), results.headline.in_row(row)]
+            line += [score.mean_in(row) for score in results.beside]
             if results.against_baseline:
                 line += (
                     _compared(results, label, condition) if test else ["baseline" if label == baseline else "–", "–"]
                 )
             lines.append([*line, *([number(row["total_captures"])] if captures else [])])
     note = "Captures in total: those for the training of a method and those for all scored targets." if captures else ""
-    return blocks([table(headings, lines), note]) if lines else None
+    named = [test for test in results.against_baseline if test.second in subjects(results)]
+    notes = [note, turned(results), power(results.headline, named or results.against_baseline)]
+    return blocks([table(headings, lines), " ".join(filter(None, notes))]) if lines else None
 
 
 def _ordered(results: Results, condition: str) -> list[str]:

@@ -11,7 +11,7 @@ from ..data.text import words
 from ..markdown import Markdown
 
 MOST_SENTENCES = 5
-MOST_COLUMNS = 6
+MOST_COLUMNS = 8
 PAPER = "Chakravarthula et al. 2020, ACM Trans. Graph. 39(6), 186, doi:10.1145/3414685.3417846."
 
 

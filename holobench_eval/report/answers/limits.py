@@ -58,9 +58,8 @@ def _sample(report: Report) -> str:
         smallest = 2.0 ** (1 - clusters)
         parts.append(
             f"p comes from sign flips of the {'clusters' if clusters < targets else 'targets'}, adjusted for "
-            f"{tests} comparison{'s' * int(tests > 1)} with {results.layout.baseline} by the largest of each flip "
-            "(max-t), so that a difference has a larger p among more comparisons; a bracket is for one difference "
-            f"alone, so one that excludes zero beside p above {SIGNIFICANCE} is a hint. A difference is shown at p < "
+            f"{tests} comparison{'s' * int(tests > 1)} with {results.layout.baseline} (min-p); brackets are not "
+            f"adjusted. A difference is shown at p < "
             f"{SIGNIFICANCE}; not shown does not mean that there is none."
         )
         if smallest >= SIGNIFICANCE:

@@ -11,15 +11,16 @@ from .column import Column
 from .columns import tabled
 from .results import Results
 from .scores import Score
-from .statistics import PairedTest
+from .statistics import POWER, PairedTest
 
 _KEYS = ("study", "measure", "display", "condition", "method", "label")  # as in table.csv, of the tested row
 _MEANINGS = {"method": "Name of the tested method in configs", "label": "Name of its row in tables"}
 _P = (
-    "Two-sided p of the mean difference, sign-flip max-t over clusters, adjusted for all tests of the study; empty: "
+    "Two-sided p of the mean difference, sign-flip min-p over clusters, adjusted for all tests of the study; empty: "
     "not tested"
 )
 _LOW = "Lower end of its 95 % interval over clusters of targets, of one comparison and not adjusted"
+_DETECTABLE = f"Size of a mean difference that a test of this one alone shows with {100 * POWER:.0f} % power"
 
 
 def of_tests(headline: Score) -> list[Column]:
@@ -46,6 +47,7 @@ def of_tests(headline: Score) -> list[Column]:
         difference("_lo", _LOW, lambda test: test.estimate.low),
         difference("_hi", "Upper end of that interval", lambda test: test.estimate.high),
         difference("_median", "Median of the differences over targets", lambda test: test.median),
+        difference("_detectable", _DETECTABLE, lambda test: test.estimate.detectable),
         Column("p_adjusted", _P, "number", source=lambda test: test.p),
     ]
 

@@ -6,14 +6,14 @@ interval, sample and p value, and says whether it is shown.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from .column import DONE
 from .results import Results
 from .scores import Score
-from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
+from .statistics import FEWEST, POWER, SIGNIFICANCE, Estimate, PairedTest
 from .text import p_value, sample, words
 
 CONSTANT = "floor_constant"
@@ -56,7 +56,7 @@ def relation(score: Score, test: PairedTest) -> str:
     if found == "not tested":
         return f"not tested against {test.first}, {told}"
     clusters = test.estimate.clusters
-    few = f" ({clusters} clusters can show nothing)" if 2.0 ** (1 - clusters) >= SIGNIFICANCE else ""
+    few = f" ({clusters} clusters can show no difference)" if 2.0 ** (1 - clusters) >= SIGNIFICANCE else ""
     return f"{difference(score, test.estimate)} against {test.first}, {p_value(test.p)}, not shown{few}"
 
 
@@ -67,6 +67,35 @@ def tested(results: Results, label: str, condition: str) -> PairedTest | None:
     return next(
         (test for test in results.against_baseline if (test.condition, test.second) == (condition, label)), None
     )
+
+
+def power(score: Score, tests: Sequence[PairedTest]) -> str:
+    """How large a difference some tests could have shown, each alone: one sentence, or none without a test."""
+    known = [test for test in tests if np.isfinite(test.p)]
+    if not known:
+        return ""
+    sizes = [test.estimate.detectable for test in known]
+    span = dict.fromkeys((score.number(min(sizes)), score.number(max(sizes))))
+    clusters = sorted({test.estimate.clusters for test in known})
+    of = f" of {known[0].second}" * (len({test.second for test in known}) == 1)
+    return (
+        f"Alone, a comparison{of} could have shown {' to '.join(span)}{f' {score.unit}' if score.unit else ''} "
+        f"({100 * POWER:.0f} % power, {words(list(map(str, clusters)))} clusters)."
+    )
+
+
+def turned(results: Results) -> str:
+    """Where another method is first by the score beside the headline: one sentence, or none."""
+    if not results.beside:
+        return ""
+    score, parts = results.beside[0], []
+    for condition in results.conditions:
+        for first, other in zip(
+            results.ranking(condition)[:1], results.ranking(condition, score.key)[:1], strict=False
+        ):
+            ours, theirs = (score.mean_in(results.row(label, condition)) for label in (first, other))
+            parts += [f"on {condition} {other} ({theirs} against {ours} of {first})"] * (ours != theirs)
+    return f"By {score.name} another method is first: {'; '.join(parts)}." if parts else ""
 
 
 def value(results: Results, label: str, condition: str) -> str:

@@ -62,6 +62,15 @@ class Results:
         return chosen
 
     @cached_property
+    def beside(self) -> list[Score]:
+        """MS-SSIM and brightness ratio, for tables of PSNR, which rewards fog; none where no record has MS-SSIM."""
+        keys = [score.key for score in self.scores]
+        structure = f"ms_ssim_{self.headline.domain}"
+        if self.headline.metric != "psnr" or structure not in keys:
+            return []
+        return [parse(key) for key in (structure, "brightness_ratio") if key in keys]
+
+    @cached_property
     def blur_scores(self) -> list[Score]:
         """The headline metric, of whole pictures, at each blur width, sharpest first; plain counts as width zero."""
         same = [s for s in self.scores if (s.metric, s.domain) == (self.headline.metric, self.headline.domain)]

@@ -19,6 +19,7 @@ from ...core.seeds import seed
 
 LEVEL = 0.95
 SIGNIFICANCE = 0.05
+POWER = 0.8
 # Below this many clusters no interval and no test is given: they would look like evidence and be none.
 FEWEST = 3
 MOST_ENUMERATED = 15  # clusters; of more, signs are drawn
@@ -42,6 +43,14 @@ class Estimate:
     def is_clear(self) -> bool:
         """Whether the interval lies on one side of zero; of one comparison, not adjusted for others."""
         return self.low > 0 or self.high < 0
+
+    @property
+    def detectable(self) -> float:
+        """The smallest mean difference that a t test of it alone shows with a probability of ``POWER``, in size: the
+        standard error times two quantiles of t (Bloom, Evaluation Review 19, 547, 1995). NaN without an interval."""
+        return (
+            (self.high - self.low) / 2 * (1 + float(stats.t.ppf(POWER, self.clusters - 1)) / _quantile(self.clusters))
+        )
 
 
 NONE = Estimate(np.nan, np.nan, np.nan, 0, 0)
@@ -94,6 +103,34 @@ def ratio_interval(numerator: Array, denominator: Array, clusters: Clusters | No
     return Estimate(ratio, float((cross - half) / square), float((cross + half) / square), n, count)
 
 
+def two_way(differences: Array) -> tuple[float, float, float]:
+    """Mean over displays and clusters of targets, and its 95 % interval for other displays and other targets.
+
+    Both are random and crossed: every display shows every cluster. The variance of the mean is (R + C - E) / (I J),
+    with the mean squares R of displays, C of clusters and E of what is left in an analysis of variance without repeats,
+    and at least the larger of R / (I J) and C / (I J). Student's t has the degrees of freedom of Satterthwaite
+    (Biometrics Bulletin 2, 110, 1946).
+
+    differences: ``(I displays, J clusters)``. Returns mean, low and high; no ends below three displays or clusters.
+    """
+    rows, columns = differences.shape
+    mean = float(differences.mean())
+    of_display, of_cluster = differences.mean(1, keepdims=True), differences.mean(0, keepdims=True)
+    if min(rows, columns) < FEWEST:
+        return mean, np.nan, np.nan
+    effects = (of_display - mean, of_cluster - mean, differences - of_display - of_cluster + mean)
+    freedom = np.array([rows - 1, columns - 1, (rows - 1) * (columns - 1)])
+    squares = np.array([(effect**2).mean() for effect in effects]) * rows * columns / freedom
+    r, c, e = squares
+    variance = max(r + c - e, r, c)
+    if variance == 0:
+        return mean, mean, mean
+    half = stats.t.ppf((1 + LEVEL) / 2, variance**2 / (squares**2 / freedom).sum()) * np.sqrt(
+        variance / (rows * columns)
+    )
+    return mean, float(mean - half), float(mean + half)
+
+
 @lru_cache(maxsize=1024)
 def _quantile(clusters: int) -> float:
     """Of Student's t; NaN for too few clusters."""
@@ -107,28 +144,33 @@ def _products(residuals: Array) -> Array:
 
 
 def family_p(differences: Array, clusters: Clusters | None = None) -> Array:
-    """Two-sided p values of several mean differences, adjusted for all of them: sign-flip max-t over clusters.
+    """Two-sided p values of several mean differences, adjusted for all of them: sign-flip min-p over clusters.
 
     If a comparison makes no difference, the sign of a cluster's differences is a coin's. One coin a cluster turns all
-    comparisons together, which keeps their correlation. Each observed |t| is compared with the largest of its own and
-    of all weaker ones (step-down: Westfall & Young, "Resampling-based multiple testing", 1993, algorithm 2.8).
-    All signs are counted up to ``MOST_ENUMERATED`` clusters; of more, ``DRAWN`` are drawn from a fixed seed.
+    comparisons together, which keeps their correlation. Every flip has a p of its own for each comparison, by its rank
+    among all flips of that comparison, so that none with heavy tails hides the others. Each observed p is compared with
+    the smallest of its own comparison and of all with larger ones (step-down: Westfall & Young, "Resampling-based
+    multiple testing", 1993, algorithm 2.8). Few clusters give few different p: of equal ones the larger |t| is taken
+    for the smaller. All signs are counted up to ``MOST_ENUMERATED`` clusters; of more, ``DRAWN`` are drawn from a fixed
+    seed.
 
     differences: ``(comparisons, targets)``, NaN for a hole, which is left out. Returns ``(comparisons,)``; NaN below
     three clusters.
     """
     known = np.isfinite(differences)
     sums = _sums(np.where(known, differences, 0.0), clusters)
+    tested = (_sums(known.astype(np.float64), clusters) > 0).sum(1) >= FEWEST
+    sums[~tested] = 0.0  # p is 1 at every flip
     # |sum of flipped sums| / norm rises with |t|, since flipping leaves the norm as it is.
     norms = np.sqrt((sums**2).sum(1, keepdims=True))
     shares = np.divide(sums, norms, out=np.zeros_like(sums), where=norms > 0)
-    observed = np.abs(shares.sum(1))
-    order = np.argsort(-observed, kind="stable")
-    flipped = np.abs(_signs(sums.shape[1]) @ shares[order].T)
-    largest = np.maximum.accumulate(flipped[:, ::-1], axis=1)[:, ::-1]  # of each comparison and all weaker ones
-    p = np.full(len(differences), np.nan)
-    p[order] = np.maximum.accumulate((largest >= observed[order] - 1e-9).mean(0))
-    return np.where((_sums(known.astype(np.float64), clusters) > 0).sum(1) >= FEWEST, p, np.nan)
+    flipped = np.abs(_signs(sums.shape[1]) @ shares.T).round(9)
+    ranks = stats.rankdata(-flipped, method="max", axis=0) - flipped / (1 + flipped.max())  # p times the count of flips
+    order = np.argsort(ranks[0], kind="stable")
+    smallest = np.minimum.accumulate(ranks[:, order[::-1]], axis=1)[:, ::-1]  # of each comparison and all weaker ones
+    p = np.empty(len(differences))
+    p[order] = np.maximum.accumulate((smallest <= ranks[0, order]).mean(0))
+    return np.where(tested, p, np.nan)
 
 
 @lru_cache(maxsize=8)

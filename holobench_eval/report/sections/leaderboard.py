@@ -42,6 +42,7 @@ def leaderboard(results: Results, condition: str) -> Markdown | None:
     closed = {name: results.gap_closed(name, condition) for name in names}
     gap = ["way to the ceiling [%]"] if any(closed.values()) else []
     known = costs(results.table, results.layout.text.each)
+    beside = [score.name for score in results.beside]
     rows = []
     for name in names:
         row = results.row(name, condition)
@@ -52,11 +53,12 @@ def leaderboard(results: Results, condition: str) -> Markdown | None:
                 marked(results, name, condition),
                 f"{row['n']:.0f} of {len(results.targets)}",
                 results.headline.in_row(row),
+                *(score.mean_in(row) for score in results.beside),
                 *([percent(closed[name])] if gap else []),
                 *(number(row[key]) for key in known),
             ]
         )
-    return table(["track", "rank", "method", "n", results.headline.axis, *gap, *known.values()], rows)
+    return table(["track", "rank", "method", "n", results.headline.axis, *beside, *gap, *known.values()], rows)
 
 
 def _order(results: Results, condition: str) -> list[str]:

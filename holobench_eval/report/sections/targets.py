@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..data.results import Results
-from ..data.statistics import FEWEST, SIGNIFICANCE, Array, PairedTest
+from ..data.statistics import FEWEST, POWER, SIGNIFICANCE, Array, PairedTest
 from ..data.text import sample
 from ..markdown import Markdown, blocks, heading, table
 from ..section import Blocks, Figures, Report, Section
@@ -22,10 +22,11 @@ def _paired_tests(report: Report, _: Figures) -> Blocks:
         return
     yield (
         f"Differences to the baseline {report.layout.baseline}, target by target, repeats averaged first: "
-        f"{results.headline.axis}{report.layout.text.axis}. Two-sided sign-flip max-t test (step-down) over "
+        f"{results.headline.axis}{report.layout.text.axis}. Two-sided sign-flip min-p test (step-down) over "
         f"clusters of targets; each p is adjusted for all {sum(np.isfinite(test.p) for test in tests)} tests of this "
         "table, in which the oracle has none; intervals are not adjusted. At "
         f"p >= {SIGNIFICANCE} a difference is not shown, which does not mean that there is none. "
+        f'"Could show": what a test of this comparison alone shows with {100 * POWER:.0f} % power. '
         f"Pairs with a hole are omitted and counted. Fewer than {FEWEST} clusters give no test and no interval."
     )
     yield _tests(results, tests)
@@ -41,12 +42,20 @@ def _tests(results: Results, tests: Sequence[PairedTest]) -> Markdown:
             score.estimate(test.estimate, signed=True),
             score.number(test.median, signed=True),
             f"{test.better(score.sign)} of {test.estimate.n}",
+            score.number(np.nan if np.isnan(test.p) else test.estimate.detectable),
             "no test" if np.isnan(test.p) else f"{test.p:.4f}",
             "–" if np.isnan(test.p) else "shown" if test.is_shown else "not shown",
         ]
         for test in tests
     ]
-    columns = [f"mean difference{score.brackets}", f"median{score.brackets}", "better on", "p", "difference"]
+    columns = [
+        f"mean difference{score.brackets}",
+        f"median{score.brackets}",
+        "better on",
+        f"could show{score.brackets}",
+        "p",
+        "difference",
+    ]
     return table(["comparison", "display", "complete pairs", *columns], rows)
 
 

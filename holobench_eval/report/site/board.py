@@ -25,6 +25,8 @@ HEADINGS = (  # key to sort by, heading, the better direction
     ("", "rank in category", ""),
     ("display", "display", "up"),
     ("score", "score", "down"),
+    ("structure", "MS-SSIM", "down"),
+    ("brightness", "brightness ratio", "down"),
     ("gain", "difference to the baseline", "down"),
     ("above", "above the constant image", "down"),
     ("captures", "captures in total", "up"),
@@ -73,7 +75,7 @@ def board(groups: Iterable[Group], names: Names, keep: Iterable[Row] | None = No
 
 def _within(key: str) -> Markup:
     """The class of columns that mean nothing beyond a group."""
-    return Markup(' class="within"') if key in ("", "score", "above") else Markup("")
+    return Markup(' class="within"') if key in ("", "score", "structure", "brightness", "above") else Markup("")
 
 
 def measured(group: Group) -> tuple[str, str]:
@@ -93,6 +95,8 @@ def describe(group: Group, names: Names) -> Markup:
         f"harness {group.harness}" if group.harness else "harness not recorded",
         f"baseline {' or '.join(group.baselines)}" if group.baselines else "no baseline",
     ]
+    if turned := _turned(group):
+        facts.append(f"by MS-SSIM first: {turned}")
     mark = f", {group.version}" if group.version in (ANOTHER, UNRECORDED) else ""
     return Markup("<strong>{}</strong> (group {}{}): {}.").format(
         link(names.display(group.display.title), group.display.marked), group.number, mark, "; ".join(facts)
@@ -122,6 +126,7 @@ def _row(row: Row, group: Group, names: Names) -> Markup:
         "version": group.version,
         "study": f"{studies} {row.whose}",
         "score": _value(sign * row.score.mean),
+        **dict(zip(("structure", "brightness"), map(_value, _beside(row)), strict=True)),
         "gain": _value(sign * row.gain.mean if row.gain else gain),
         "above": _value(sign * row.above.mean if row.above else math.nan),
         "captures": _value(_number(row, "total_captures", "captures")),
@@ -136,6 +141,7 @@ def _row(row: Row, group: Group, names: Names) -> Markup:
         ("across", Markup("{}{}").format(link(names.display(group.display.title), group.display.marked),
                                          quiet(f"group {group.number}, {group.metric.heading}, {group.version}"))),
         ("within", _estimate(row, row.score, signed=False)),
+        *(("within", "–" if math.isnan(value) else f"{value:.3f}") for value in _beside(row)),
         ("", _gain(row, group)),
         ("within", _estimate(row, row.above) if row.above else "–"),
         ("", _captures(row)),
@@ -169,6 +175,23 @@ def _gain(row: Row, group: Group) -> Markup:
         return Markup("–")
     kind = "interval" if len(group.baselines) > 1 else "interval to"
     return Markup('{}<span class="{}">to {}</span>').format(_estimate(row, row.gain), kind, row.baseline)
+
+
+def _beside(row: Row) -> tuple[float, float]:
+    """MS-SSIM and brightness ratio, where they stand beside the score."""
+    first, second = (*(_number(row, score.column) for score in row.source.results.beside), math.nan, math.nan)[:2]
+    return first, second
+
+
+def _turned(group: Group) -> str:
+    """Who is first of a category by MS-SSIM and not by the score."""
+    found = []
+    for category in group.ranked:
+        rows = [row for row in group.rows if row.rank is not None and row.category == category]
+        best = max(rows, key=lambda row: _beside(row)[0])  # NaN is never larger
+        if best.rank != 1 and not math.isnan(_beside(best)[0]):
+            found.append(f"{best.marked} ({category})")
+    return ", ".join(found)
 
 
 def _captures(row: Row) -> Markup:

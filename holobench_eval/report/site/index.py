@@ -22,8 +22,8 @@ FACTS = (
     "paired differences in one metric instead. They say less than a rank: baselines differ, too.",
     "Differences are paired with the baseline of the row's own study. Ranks count methods with their parameters: the "
     'row of an own study before those of others; any more are "further runs".',
-    "Above the constant image: the score minus that of an even picture in the place of a capture. Below zero, the "
-    "capture is no better than an even picture.",
+    "Above the constant image: the score minus that of an even picture in the place of a capture. Below zero, "
+    "the capture may still show the picture: MS-SSIM says more of that.",
     "Seconds were taken on the processor beside them. They do not compare between processors.",
     f'"{ANOTHER.capitalize()}": the harness, the files of the report or the profile are not those of this version. '
     f'"{UNRECORDED.capitalize()}": the report does not say.',

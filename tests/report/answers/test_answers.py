@@ -98,6 +98,33 @@ def test_without_a_named_method_the_best_one_is_compared_with_the_baseline() -> 
     assert "so other closes 38" in text
 
 
+def test_the_table_says_how_large_a_difference_the_tests_of_the_question_could_have_shown() -> None:
+    found = results_of(COMPARED, noise=lambda label: NOISE if label == "old" else -NOISE, question="Is new better?")
+    size = next(test for test in found.against_baseline if test.second == "new").estimate.detectable
+    text = str(kind_of(found).table(found))
+    assert f"Alone, a comparison of new could have shown {size:.2f} dB (80 % power, 8 clusters)." in text
+
+
+def with_ms_ssim(values: dict[str, float]) -> Results:
+    found = results_of({"old": 17.0, "new": 19.0})
+    frame = found.frame.assign(ms_ssim_linear=found.frame["label"].map(values), brightness_ratio=0.25)
+    return Results(frame, found.layout)
+
+
+def test_ms_ssim_and_brightness_stand_beside_psnr_and_who_is_first_by_ms_ssim_is_named() -> None:
+    found = with_ms_ssim({"old": 0.8, "new": 0.7})
+    text = str(kind_of(found).table(found))
+    assert "| MS-SSIM | brightness ratio |" in text
+    assert "| 0.700 | 0.250 |" in text
+    assert "By MS-SSIM another method is first: on bench old (0.800 against 0.700 of new)." in text
+
+
+@pytest.mark.parametrize("values", [{"old": 0.7, "new": 0.8}, {"old": 0.7004, "new": 0.7}, {}])
+def test_nothing_is_said_of_ms_ssim_where_it_has_the_same_order_or_none(values: dict[str, float]) -> None:
+    found = with_ms_ssim(values) if values else results_of({"old": 17.0, "new": 19.0})
+    assert "By MS-SSIM" not in str(kind_of(found).table(found))
+
+
 def test_who_is_no_better_than_a_constant_image_is_named() -> None:
     text = answer(results_of({"old": 14.0, "new": 19.0, "floor_constant": 15.0}))
     assert "No better on average than a constant image in the place of a capture (15.05 dB): on bench old." in text

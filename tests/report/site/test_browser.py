@@ -128,7 +128,7 @@ def test_across_groups_scores_and_ranks_are_gone_and_differences_sort(reader: Re
     assert "do not compare" in reader.page.inner_text("#status")
     reader.page.select_option("#arrange", "within")
     assert reader.page.locator("tr.group:visible").count() == 2
-    assert reader.page.locator("td.within:visible").count() == 72
+    assert reader.page.locator("td.within:visible").count() == 120
 
 
 def test_across_groups_there_is_one_measure_and_one_metric(
