@@ -65,11 +65,12 @@ def write_report(
 
 
 def print_headline(console: Console, results: Results) -> None:
-    """Print the headline score, rank and captures of every method, a table a condition, in 80 columns; and what is odd
-    about phases."""
+    """Print the headline score, rank and captures of every method, a table a condition unless there are many displays,
+    in 80 columns; and what is odd about phases."""
+    from ..report.data import over_displays
     from ..report.data.phrases import remarks
 
-    for condition in results.conditions:
+    for condition in [] if over_displays.applies(results) else results.conditions:
         console.print(headline_table(results, condition))
     for remark in remarks(results):
         console.print(remark, style="yellow", markup=False, highlight=False, soft_wrap=True)

@@ -214,14 +214,15 @@ class Sheet:
 
 
 def sheets(study: Study, output: Path) -> list[Sheet]:
-    """The sheet of every display of a study that has stages; learned and real displays have none."""
+    """The sheet of every display of a study that has stages, of many the first; learned and real ones have none."""
     from ..display import load_profile
+    from ..report.data.over_displays import FEWEST_DISPLAYS
     from ..study.displays import condition
 
-    panel, folder = study.display.panel, study.folder
+    panel, folder, profiles = study.display.panel, study.folder, study.display.profiles
     return [
         Sheet(condition(source, panel, folder), load_profile(source, folder).scaling_note(panel), study.seed, output)
-        for source in study.display.profiles
+        for source in (profiles[:1] if len(profiles) >= FEWEST_DISPLAYS else profiles)
     ]
 
 

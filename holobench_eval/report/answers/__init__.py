@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 from ..data.results import Results
-from . import ablation, budget, comparison, error_budget, focus, learned_display, prediction, ranks, sweeps
+from . import (
+    ablation,
+    budget,
+    comparison,
+    error_budget,
+    focus,
+    learned_display,
+    over_displays,
+    prediction,
+    ranks,
+    sweeps,
+)
 from .kind import Kind
 
 # The first that applies answers; a comparison of methods is what any study is.
@@ -14,6 +25,7 @@ KINDS = (
     focus.KIND,
     ranks.KIND,
     sweeps.KIND,
+    over_displays.KIND,
     ablation.KIND,
     budget.KIND,
     comparison.KIND,

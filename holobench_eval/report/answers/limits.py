@@ -92,18 +92,21 @@ def _displays(report: Report) -> Iterator[str]:
 
 def _form(report: Report) -> Iterator[str]:
     """Which methods fit a model that has the bench's own equations for some of its effects."""
+    same: dict[tuple[tuple[str, ...], tuple[str, ...]], dict[str, int]] = {}
     for display in report.description.displays:
-        same: dict[tuple[str, ...], list[str]] = {}
+        here: dict[tuple[str, ...], list[str]] = {}
         for label, effects in display.modelled.items():
             if effects and label in report.results.methods(display.name):
-                same.setdefault(effects, []).append(label)
-        for effects, labels in same.items():
-            which = ", ".join(name.replace("_", " ") for name in effects)
-            yield (
-                f"Inverse crime on {display.name}: the model of {words(labels)} has the bench's own form for "
-                f"{len(effects)} of its {display.effects} effects ({which}), so a real display may suit it less than "
-                "this one."
-            )
+                here.setdefault(effects, []).append(label)
+        for effects, labels in here.items():
+            same.setdefault((effects, tuple(labels)), {})[display.name] = display.effects
+    for (effects, labels), totals in same.items():
+        ends = dict.fromkeys((min(totals.values()), max(totals.values())))
+        yield (
+            f"Inverse crime on {words(list(totals))}: the model of {words(labels)} has the bench's own form for "
+            f"{len(effects)} of its {' to '.join(map(str, ends))} effects "
+            f"({', '.join(name.replace('_', ' ') for name in effects)}), so a real display may suit it less."
+        )
 
 
 def _tuned(report: Report) -> Iterator[str]:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from ...core import plugins
 from ...datasets.base import clusters_of
 from ...display.simulated.changes import KINDS, draws
-from ...display.simulated.profile import load_profile
+from ...display.simulated.profile import Profile, load_profile
 from ...display.traits import traits_of
 from ...study import isolation
 from ...study.definition import PREDICTIONS, Study
@@ -96,7 +96,8 @@ class Layout:
     of others. real: whether the display exists. clusters: of every target, such as the photograph of a crop (empty:
     each target is its own). metrics: names of those the study wants (None: all). study: its name, the config's file
     without the ending; params: every parameter of a method, by label; capture_limits: the most captures that a display
-    allows a method for a target, by label; panels: rows and columns of the panel of each display [px].
+    allows a method for a target, by label; panels: rows and columns of the panel of each display [px];
+    profiles: of simulated displays.
     """
 
     title: str
@@ -133,6 +134,7 @@ class Layout:
     params: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     capture_limits: Mapping[str, int] = field(default_factory=dict)
     panels: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    profiles: Mapping[str, Profile] = field(default_factory=dict)
 
     def category(self, label: str) -> str:
         """The category that a method competes in."""
@@ -202,6 +204,11 @@ def layout_of(study: Study) -> Layout:
     reported = study.reported
     conditions = displays(study)
     names = {source: condition.name for source, condition in conditions.items()}
+    profiles = {
+        condition.name: load_profile(source, study.folder)
+        for source, condition in conditions.items()
+        if condition.real is None and condition.learned is None
+    }
     traits = {entry.label: isolation.traits(entry.name, study.folder) for entry in study.methods}
     trained = frozenset(label for label, method in traits.items() if method.trains)
     return Layout(
@@ -223,7 +230,7 @@ def layout_of(study: Study) -> Layout:
         reported_beside=names[reported.beside] if reported and reported.beside else None,
         question=study.question,
         would_change=study.would_change,
-        about=_about(study, conditions),
+        about=_about(study, profiles),
         tuned={label: method.tuned for label, method in traits.items() if method.tuned is not None},
         note=study.note,
         measure=study.measure,
@@ -243,10 +250,11 @@ def layout_of(study: Study) -> Layout:
         params={entry.label: entry.params for entry in study.methods},
         capture_limits={entry.label: entry.captures for entry in study.methods if entry.captures is not None},
         panels={condition.name: condition.spec.shape for condition in conditions.values()},
+        profiles=profiles,
     )
 
 
-def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
+def _about(study: Study, profiles: Mapping[str, Profile]) -> dict[str, str]:
     """What methods and displays are that go by their registered name alone, or read files: the first sentence of a
     docstring, the description of a profile."""
     methods = {
@@ -255,12 +263,8 @@ def _about(study: Study, conditions: Mapping[str, Condition]) -> dict[str, str]:
         for cls in [isolation.find(entry.name, study.folder)]
         if entry.label == entry.name.rpartition(":")[2] or "files" in traits_of(cls).functions  # others made the phases
     }
-    profiles = {
-        condition.name: load_profile(source, study.folder).description
-        for source, condition in conditions.items()
-        if condition.real is None and condition.learned is None
-    }
-    return {name: " ".join(text.replace("`", "").split()) for name, text in (methods | profiles).items() if text}
+    described = {name: profile.description for name, profile in profiles.items()}
+    return {name: " ".join(text.replace("`", "").split()) for name, text in (methods | described).items() if text}
 
 
 def network_of(params: Any) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from ..charts.comparison import ZOOM, draw_comparison, tile_size
 from ..charts.gallery import Column, chunks, error_limit, error_map, most_detailed, spread
 from ..charts.style import slugs
+from ..data import over_displays
 from ..data.categories import OFFLINE, ONLINE
 from ..data.results import Results
 from ..markdown import heading
@@ -32,7 +33,8 @@ def _render(report: Report, figures: Figures) -> Blocks:
 
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
-    for condition, stem in slugs(report.results.conditions).items():
+    many = over_displays.applies(report.results)  # of many displays, the first stands for all
+    for condition, stem in list(slugs(report.results.conditions).items())[: 1 if many else None]:
         if report.results.has_pictures(condition) and report.thumbnails.targets(condition):
             yield from _comparison(report, condition, stem)
 

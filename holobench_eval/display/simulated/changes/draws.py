@@ -141,7 +141,9 @@ PARAMETERS: Mapping[str, Parameter] = {
     "zero_phase": Parameter("phase of the unmodulated light", "rad", -TAU / 2, TAU / 2, "unknown", _zero_phase),
     "specks": Parameter("specks of dust on the panel", "", 0.0, 50.0, "assumed", _specks),
     "linewidth": Parameter("width of the laser line", "nm", 1.0, 5.0, "1-5 nm of laser diodes", _width),
-    "stray": Parameter("stray light", "of the light", 0.0, 0.3, "assumed, a contrast of 6:1 in a fine checkerboard", _share),
+    "stray": Parameter(
+        "stray light", "of the light", 0.0, 0.3, "assumed, a contrast of 6:1 in a fine checkerboard", _share
+    ),
     "reach": Parameter("reach of the stray light", "panel heights", 0.05, 0.3, "assumed", _reach),
 }
 """What is drawn. Ranges without another source are those of the sources that the profiles name."""

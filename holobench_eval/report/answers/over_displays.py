@@ -1,0 +1,95 @@
+"""Many displays: on how many is a method better, by how much over all of them, and what decides it?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..data.over_displays import Margin, applies, cause, margins, parameters, published, shown_on
+from ..data.results import Results
+from ..data.text import words
+from ..markdown import Markdown, table
+from .kind import Kind, subjects
+
+MOST = 3  # methods that the answer names beside those of the question
+CLEAR = 0.3  # share of the variance over displays that a parameter has to predict to be named as what decides
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """The methods of the question, then the best; what decides their margins; where no score could be had."""
+    found, asked = margins(results), subjects(results)
+    if not found:
+        yield "No display has a score of every method for every target."
+        return
+    count = len(shown_on(results))
+    about = [each for label in asked for each in found if each.label == label]
+    for each in about:
+        yield f"{_told(results, each, count)}{_published(results, each)}."
+    for each in [each for each in found if each not in about][:MOST]:
+        yield f"{_told(results, each, count)}."
+    yield from _decides(results, about or found[:1])
+    if count < len(results.conditions):
+        left = [name for name in results.conditions if name not in shown_on(results)]
+        yield f"Left out, since scores are missing: {words(left)}."
+
+
+def _told(results: Results, each: Margin, count: int) -> str:
+    score, (low, high) = results.headline, each.spread
+    worse = f" and worse on {each.worse}" if each.worse else ""
+    return (
+        f"{each.label} is shown better than {results.layout.baseline} on {each.better} of {count} displays{worse}; "
+        f"median {score.with_unit(each.median, signed=True)}, {score.number(low, signed=True)} to "
+        f"{score.number(high, signed=True)} on nine in ten, mean over displays and pictures "
+        f"{score.estimate(each.over_both, signed=True)}"
+    )
+
+
+def _published(results: Results, each: Margin) -> str:
+    """Where the published margin falls among those of the displays."""
+    score, margin = results.headline, published(results, each.label)
+    if margin is None:
+        return ""
+    above = int((each.values >= margin).sum())
+    return f"; {above} of the displays have the published {score.with_unit(margin, signed=True)} or more"
+
+
+def _decides(results: Results, about: list[Margin]) -> Iterator[str]:
+    known = parameters(results)
+    for each in about:
+        if found := cause(each.values, known):
+            of = f"the margin of {each.label}"
+            share = f"R2 {max(found.explained, 0.0):.2f} of displays left out"
+            if found.explained >= CLEAR:
+                yield f"What decides {of}: {found.parameter} (rank correlation {found.rho:+.2f}, {share})."
+            else:
+                yield f"No parameter of the displays predicts {of} (the best is {found.parameter}, {share})."
+
+
+def summary(results: Results) -> Markdown:
+    """A row for every method."""
+    score, found, count = results.headline, margins(results), len(shown_on(results))
+    columns = ["method", f"over displays and pictures{score.brackets}", f"median{score.brackets}"]
+    columns += ["5 to 95 % of displays", f"better on [of {count}]", "worse on"]
+    rows = [
+        [
+            each.label,
+            score.estimate(each.over_both, signed=True),
+            score.number(each.median, signed=True),
+            " to ".join(score.number(end, signed=True) for end in each.spread),
+            str(each.better),
+            str(each.worse),
+        ]
+        for each in found
+    ]
+    return table(columns, rows)
+
+
+KIND = Kind(
+    question="On how many of the displays is a method better than the baseline, and by how much over all of them?",
+    applies=applies,
+    sentences=sentences,
+    table=lambda results: summary(results) if margins(results) else None,
+    limits=(
+        "Displays: drawn from assumed ranges, so that an interval over them speaks for displays of these ranges. "
+        "Better and worse are shown by one family of tests over all methods and displays.",
+    ),
+)

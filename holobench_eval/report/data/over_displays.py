@@ -1,0 +1,140 @@
+"""Methods against the baseline over many displays: their margins, and what of a display goes with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from ...study.calibration.family import load_family, names
+from .results import Results
+from .statistics import Array, Estimate, two_way
+
+FEWEST_DISPLAYS = 8  # from which on a study asks about displays and not about each of them
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A method minus the baseline. values: ``(displays,)`` means over targets; over_both: their mean, with an interval
+    over displays and clusters of targets together; better, worse: displays on which the family of tests shows it."""
+
+    label: str
+    values: Array
+    over_both: Estimate
+    better: int
+    worse: int
+
+    @property
+    def median(self) -> float:
+        """Over displays."""
+        return float(np.median(self.values))
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """The 5 and 95 % quantiles over displays."""
+        low, high = np.quantile(self.values, (0.05, 0.95))
+        return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A parameter of the displays that goes with a margin. rho: Spearman's; explained: the share of the variance over
+    displays that a line in it predicts of a display that it was not fitted to (R2, leaving one out; the parameter is
+    chosen anew each time, so that the choice is paid for)."""
+
+    parameter: str
+    rho: float
+    explained: float
+
+
+def applies(results: Results) -> bool:
+    """Whether a study is about displays: it has many, simulated, without a change, and a baseline."""
+    layout = results.layout
+    return len(results.conditions) >= FEWEST_DISPLAYS and not layout.predicts and layout.baseline is not None
+
+
+def shown_on(results: Results) -> list[str]:
+    """The displays on which every method that is compared has a score for every target."""
+    rows = [label for label in results.layout.methods if label not in results.layout.privileged]
+    return [name for name in results.conditions if all(results.is_complete(label, name) for label in rows)]
+
+
+def margins(results: Results) -> list[Margin]:
+    """Every method but the baseline and oracles, the best first."""
+    where, sign = shown_on(results), results.headline.sign
+    baseline = str(results.layout.baseline)
+    names, index = np.unique(results.clusters, return_inverse=True)
+    shares = np.eye(len(names))[index] / np.bincount(index)
+    found = []
+    for label in results.layout.methods if where else ():
+        if label == baseline or label in results.layout.privileged:
+            continue
+        differences = np.stack([results.values(label, name) - results.values(baseline, name) for name in where])
+        tests = [test for test in results.against_baseline if test.second == label and test.condition in where]
+        better, worse = (
+            sum(test.is_shown and side * sign * test.estimate.mean > 0 for test in tests) for side in (1, -1)
+        )
+        found.append(Margin(label, differences.mean(1), _over_both(differences @ shares), better, worse))
+    return sorted(found, key=lambda one: -sign * one.over_both.mean)
+
+
+def published(results: Results, label: str) -> float | None:
+    """The margin of two published figures, where a method and the baseline have one."""
+    figures, metric = results.layout.reported, results.headline.metric
+    own, other = (figures.get(name, {}).get(metric) for name in (label, str(results.layout.baseline)))
+    return None if own is None or other is None else own - other
+
+
+def parameters(results: Results) -> dict[str, Array]:
+    """What differs between the displays of a family, ``(displays,)`` by words; empty where they are of none."""
+    profiles = [results.layout.profiles[name] for name in shown_on(results) if name in results.layout.profiles]
+    family = next((name for name in names() if all(one.name.startswith(f"{name}-") for one in profiles)), None)
+    if family is None or len(profiles) < FEWEST_DISPLAYS:
+        return {}
+    loaded = load_family(family)
+    values = {
+        given.words: np.array([_number(profile, given.name) for profile in profiles])
+        for given in (*loaded.parameters, *loaded.outside.parameters)
+    }
+    return {words: column for words, column in values.items() if np.ptp(column) > 0}
+
+
+def cause(values: Array, known: Mapping[str, Array]) -> Cause | None:
+    """The parameter that goes best with ``(displays,)`` margins."""
+    if not known or not np.ptp(values):
+        return None
+    words, columns = list(known), np.stack(list(known.values()))
+    predicted, mean = np.empty_like(values), np.empty_like(values)
+    for left in range(len(values)):
+        kept = np.arange(len(values)) != left
+        best = columns[_strongest(columns[:, kept], values[kept])]
+        slope, intercept = np.polyfit(best[kept], values[kept], 1)
+        predicted[left], mean[left] = slope * best[left] + intercept, values[kept].mean()
+    explained = 1 - np.square(values - predicted).sum() / np.square(values - mean).sum()
+    strongest = _strongest(columns, values)
+    rho = float(stats.spearmanr(columns[strongest], values).statistic)
+    return Cause(words[strongest], rho, float(explained))
+
+
+def _strongest(columns: Array, values: Array) -> int:
+    """The row that correlates best with the values; the first where nothing varies."""
+    products = (columns - columns.mean(1, keepdims=True)) @ (values - values.mean())
+    scales = columns.std(1) * values.std()
+    return int(np.argmax(np.abs(np.divide(products, scales, out=np.zeros_like(products), where=scales > 0))))
+
+
+def _number(profile: Any, name: str) -> float:
+    first, second, *rest = name.split(".")
+    value = attrgetter(f"{first}.{second}")(profile)
+    for key in rest:
+        value = value.get(key, 0.0)
+    return float(np.mean(value))
+
+
+def _over_both(differences: Array) -> Estimate:
+    """Of ``(displays, clusters)``."""
+    return Estimate(*two_way(differences), *differences.shape)
