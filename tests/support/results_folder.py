@@ -18,7 +18,7 @@ from holobench_eval.study.versions import HARNESS
 from tests.support import synthetic_study as synthetic
 
 TARGETS = synthetic.TARGETS[:4]
-SCORES = ("psnr_linear", "ssim_linear", "efficiency")
+SCORES = ("psnr_linear", "ssim_linear", "ms_ssim_linear", "efficiency")
 REPORT = """\
 # A title
 

@@ -135,7 +135,7 @@ def floor(results: Results) -> Iterator[str]:
     scores = floor_scores(results)
     constant = f"a constant image in the place of a {results.layout.text.scored}{f' ({scores})' if scores else ''}"
     if parts:
-        yield f"No better on average than {constant}: {'; '.join(parts)}."
+        yield f"By {results.headline.title} no better on average than {constant}: {'; '.join(parts)}."
     elif known:
         every = "Every method" if whole else "Every method with a score for every target"
         yield f"{every} is better on average than {constant}."

@@ -59,8 +59,7 @@ def _sample(report: Report) -> str:
         parts.append(
             f"p comes from sign flips of the {'clusters' if clusters < targets else 'targets'}, adjusted for "
             f"{tests} comparison{'s' * int(tests > 1)} with {results.layout.baseline} (min-p); brackets are not "
-            f"adjusted. A difference is shown at p < "
-            f"{SIGNIFICANCE}; not shown does not mean that there is none."
+            f"adjusted. A difference is shown at p < {SIGNIFICANCE}; not shown does not mean that there is none."
         )
         if smallest >= SIGNIFICANCE:
             parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")

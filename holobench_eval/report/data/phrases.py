@@ -90,11 +90,9 @@ def turned(results: Results) -> str:
         return ""
     score, parts = results.beside[0], []
     for condition in results.conditions:
-        for first, other in zip(
-            results.ranking(condition)[:1], results.ranking(condition, score.key)[:1], strict=False
-        ):
-            ours, theirs = (score.mean_in(results.row(label, condition)) for label in (first, other))
-            parts += [f"on {condition} {other} ({theirs} against {ours} of {first})"] * (ours != theirs)
+        if (ranking := results.ranking(condition)) and (by_it := results.ranking(condition, score.key)):
+            ours, theirs = (score.mean_in(results.row(label, condition)) for label in (ranking[0], by_it[0]))
+            parts += [f"on {condition} {by_it[0]} ({theirs} against {ours} of {ranking[0]})"] * (ours != theirs)
     return f"By {score.name} another method is first: {'; '.join(parts)}." if parts else ""
 
 

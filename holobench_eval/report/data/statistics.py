@@ -48,9 +48,8 @@ class Estimate:
     def detectable(self) -> float:
         """The smallest mean difference that a t test of it alone shows with a probability of ``POWER``, in size: the
         standard error times two quantiles of t (Bloom, Evaluation Review 19, 547, 1995). NaN without an interval."""
-        return (
-            (self.high - self.low) / 2 * (1 + float(stats.t.ppf(POWER, self.clusters - 1)) / _quantile(self.clusters))
-        )
+        quantiles = float(stats.t.ppf(POWER, self.clusters - 1)) / _quantile(self.clusters) + 1
+        return (self.high - self.low) / 2 * quantiles
 
 
 NONE = Estimate(np.nan, np.nan, np.nan, 0, 0)
@@ -125,9 +124,8 @@ def two_way(differences: Array) -> tuple[float, float, float]:
     variance = max(r + c - e, r, c)
     if variance == 0:
         return mean, mean, mean
-    half = stats.t.ppf((1 + LEVEL) / 2, variance**2 / (squares**2 / freedom).sum()) * np.sqrt(
-        variance / (rows * columns)
-    )
+    quantile = stats.t.ppf((1 + LEVEL) / 2, variance**2 / (squares**2 / freedom).sum())
+    half = quantile * np.sqrt(variance / (rows * columns))
     return mean, float(mean - half), float(mean + half)
 
 

@@ -188,7 +188,7 @@ def _turned(group: Group) -> str:
     found = []
     for category in group.ranked:
         rows = [row for row in group.rows if row.rank is not None and row.category == category]
-        best = max(rows, key=lambda row: _beside(row)[0])  # NaN is never larger
+        best = max(rows, key=lambda row: round(_beside(row)[0], 3))  # of equal ones the best by the score
         if best.rank != 1 and not math.isnan(_beside(best)[0]):
             found.append(f"{best.marked} ({category})")
     return ", ".join(found)

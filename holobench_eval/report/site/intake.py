@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -111,12 +111,11 @@ def read(folder: Path, own: Path) -> Source:
         )
     checks.check_displays(folder, known, nominal, measure)
     headline, baseline = _tested(folder, nominal)
-    # A site shows the headline; error budgets are made of further scores.
-    spare = [name for name in score_columns(nominal) if name != headline.column and measure != "error_budget"]
     parameters = _parameters(folder)
-    results = Results(
-        nominal.drop(columns=spare), _layout(folder, parameters, nominal, measure, headline.key, baseline)
-    )
+    results = Results(nominal, _layout(folder, parameters, nominal, measure, headline.key, baseline))
+    if measure != "error_budget":  # which is made of further scores than those that a site shows
+        kept = {score.column for score in (headline, *results.beside)}
+        results = replace(results, frame=nominal.drop(columns=[*{*score_columns(nominal)} - kept]))
     changed = frame["condition"].nunique() - nominal["condition"].nunique()
     return Source(folder, folder.resolve().name, by, results, measure, _panels(frame), known, parameters, changed)
 

@@ -127,7 +127,9 @@ def test_nothing_is_said_of_ms_ssim_where_it_has_the_same_order_or_none(values: 
 
 def test_who_is_no_better_than_a_constant_image_is_named() -> None:
     text = answer(results_of({"old": 14.0, "new": 19.0, "floor_constant": 15.0}))
-    assert "No better on average than a constant image in the place of a capture (15.05 dB): on bench old." in text
+    assert (
+        "By PSNR no better on average than a constant image in the place of a capture (15.05 dB): on bench old." in text
+    )
 
 
 def test_a_method_that_lacks_a_target_is_not_counted_among_every_method() -> None:

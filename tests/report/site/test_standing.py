@@ -284,3 +284,12 @@ def test_means_of_committed_reports_are_those_of_their_tables(name: str) -> None
         for row in group.rows
     }
     assert found == expected
+
+
+def test_ms_ssim_stands_beside_psnr_and_who_is_first_by_it_is_named(study: Records, tmp_path: Path) -> None:
+    ms_ssim = {"Double phase": 0.9, "Wirtinger": 0.5}
+    records = [r | {"scores": r["scores"] | {"ms_ssim_linear": ms_ssim.get(r["label"], 0.4)}} for r in study]
+    group = of(groups([taken(write_results(tmp_path / "theirs", records))]), "ideal")
+    page = str(board([group], Names({str(tmp_path / "theirs"): "theirs"})))
+    assert "by MS-SSIM first: Double phase (" in page
+    assert '<td class="within">0.500</td>' in page
