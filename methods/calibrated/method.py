@@ -23,7 +23,7 @@ from ..learned.retrieval import SquaredErrorRetrieval, check_region, lpips_weigh
 from ..learned.samples import Sample, Schedule, Steps
 from ..wirtinger import Wirtinger
 from .approximator import ModelApproximator
-from .patterns import pattern_samples
+from .patterns import dark_samples, pattern_samples
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ class ThroughModel(ABC):
         check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec).to(bench.device)
         start, search = partial(hologram, self.start, bench=bench), partial(retrieve, settings=self.search)
-        train(bench, approximator, start, search, self.training, self._earlier(bench))
+        dark = dark_samples(bench) if approximator.terms else []
+        train(bench, approximator, start, search, self.training, [*self._earlier(bench), *dark])
 
         def solve(image: TrainingImage) -> Tensor:
             return retrieve(approximator.image(bench.light(image)), image.target, start(image), self.retrieval)
@@ -111,7 +112,7 @@ class ThroughModel(ABC):
         return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve)}
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
-        """Samples that every round learns from, beside its own."""
+        """Samples that every round learns from, beside its own and, of a model with terms, those of dark patterns."""
         return ()
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:

@@ -14,70 +14,35 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...display.api import DisplaySpec, ideal_image
-from ...optics.phasor import squared_modulus
-from ..calibrated.approximator import ModelApproximator, PredictedCapture, Rates
+from ...display.api import DisplaySpec, ideal_light
+from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.display_model import FORM, DisplayModel
 from ..calibrated.method import SearchRetrieval, ThroughModel
+from ..calibrated.terms import ImageTerms
 from ..hil.networks import Network
 from ..learned.samples import Schedule, Steps
 from ..learned.weights import seeded, start_at_zero
 from ..wirtinger import Wirtinger
-from .terms import ImageTerms
 
 
 class IdealImage(nn.Module):
-    """Phase ``(C, H, W)`` [rad] to the intensity ``(C, h, w)`` of the nominal model; nothing to learn."""
+    """Phase ``(C, H, W)`` [rad] to the intensity ``(C, H, W)`` of the nominal model; nothing to learn."""
 
     def __init__(self, spec: DisplaySpec) -> None:
         super().__init__()
         self.spec = spec
 
-    def forward(self, phase: Tensor) -> Tensor:
+    def over_panel(self, phase: Tensor) -> Tensor:
         """See the class."""
-        return ideal_image(phase, self.spec)
-
-
-class WithTerms(nn.Module):
-    """Light in the region, an intensity (real) or a field (complex), and what then happens to its intensity."""
-
-    def __init__(self, light: nn.Module, spec: DisplaySpec) -> None:
-        super().__init__()
-        self.light = light
-        self.terms = ImageTerms(len(spec.wavelengths), spec.region.shape)
-
-
-class TermsCapture(PredictedCapture):
-    """The terms of a `WithTerms`, and what a network adds; it sees what they see, and the outcome."""
-
-    model: WithTerms
-
-    def forward(self, phase: Tensor, light: Tensor) -> Tensor:
-        """See the base."""
-        white = light[:, None, None]
-        output: Tensor = self.model.light(phase)
-        if output.is_complex():
-            field = output / white.sqrt()
-            intensity = squared_modulus(field)
-            seen = [intensity, field.real, field.imag]
-        else:
-            intensity = output / white
-            seen = [intensity]
-        capture: Tensor = self.model.terms(intensity)
-        if self.network is None:
-            return capture
-        added: Tensor = self.network(torch.cat([capture, *seen])[None])[0]
-        return capture + added
+        return ideal_light(phase, self.spec)
 
 
 class SquaredErrorApproximator(ModelApproximator):
-    """`ModelApproximator` of a `WithTerms` by the squared error."""
+    """`ModelApproximator` by the squared error."""
 
-    CAPTURE: ClassVar[type[PredictedCapture]] = TermsCapture
     LOSS: ClassVar[str] = "l2"
 
     def error(self, predicted: Tensor, capture: Tensor) -> Tensor:
@@ -106,7 +71,7 @@ class NestedPrediction(ThroughModel):
     start: Wirtinger = Wirtinger(iterations=50)
 
     RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = 2
 
     @abstractmethod
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
@@ -124,7 +89,7 @@ class ImageTermsModel(NestedPrediction):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
-        return SquaredErrorApproximator(WithTerms(IdealImage(spec), spec), None, self.RATES)
+        return SquaredErrorApproximator(IdealImage(spec), None, self.RATES, ImageTerms(spec))
 
 
 @dataclass(frozen=True)
@@ -133,7 +98,7 @@ class ImageNetwork(NestedPrediction):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
-        return SquaredErrorApproximator(WithTerms(IdealImage(spec), spec), self._network(spec, 2), self.RATES)
+        return SquaredErrorApproximator(IdealImage(spec), self._network(spec, 2), self.RATES, ImageTerms(spec))
 
 
 @dataclass(frozen=True)
@@ -144,4 +109,4 @@ class FieldNetwork(NestedPrediction):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
-        return SquaredErrorApproximator(WithTerms(DisplayModel(spec), spec), self._network(spec, 4), self.RATES)
+        return SquaredErrorApproximator(DisplayModel(spec), self._network(spec, 4), self.RATES, ImageTerms(spec))
