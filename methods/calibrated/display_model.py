@@ -34,11 +34,15 @@ GAIN_GRID, SOURCE_GRID = 4, 24
 # Zernike polynomials of the aberration, see optics.zernike.
 MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "spherical")
 FIRST_CROSSTALK = 0.3
-# Effects (Profile.effects) that the model has a term for. All others of a bench lie outside its form:
-# fringes, of which SOURCE_GRID follows the coarser ones alone, and the light from between the pixels as far as it is
-# not simply unmodulated, are among them.
+# Effects (Profile.effects) that the model, with its haze (terms.py), has a term for. All others of a bench lie outside
+# its form: fringes, of which SOURCE_GRID follows the coarser ones alone, and the light from between the pixels as far
+# as it is not simply unmodulated, are among them.
 FORM = frozenset(
-    {"blaze", "look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES}
+    {
+        *("blaze", "look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift"),
+        *MODES,
+        "stray_light",
+    }
 )
 
 

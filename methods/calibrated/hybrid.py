@@ -15,7 +15,7 @@ from ...display.estimates import Estimate
 from ...optics.phasor import phasor
 from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
-from .diagnosis import Diagnosed, diagnose
+from .diagnosis import Diagnosed
 from .display_model import FORM, DisplayModel
 from .method import Calibrated
 from .networks import ColourByColour
@@ -77,4 +77,5 @@ class HybridModel(Diagnosed, Calibrated):
 
     def estimates(self, learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
         """Those of the ``DisplayModel``; what map and network took over is not among them."""
-        return diagnose({name: value for name, value in learned["model"].items() if name != "fine"}, spec)
+        model = {name: value for name, value in learned["model"].items() if name != "fine"}
+        return super().estimates({**learned, "model": model}, spec)

@@ -17,11 +17,23 @@ import math
 import torch
 from torch import Tensor, nn
 
-from ...display.api import DisplaySpec
+from ...display.api import DisplaySpec, ideal_light
 
 DEGREE = 4  # of the polynomial: a Gaussian beam off its centre needs 2, a cos^4 vignetting 4
 FIRST_BLUR, FIRST_SHARE, FIRST_REACH = 0.4, 0.05, 0.1  # px; of the light; of the panel's height
 DARK = 1e-6  # below it the slope of a power is not followed
+
+
+class IdealImage(nn.Module):
+    """Phase ``(C, H, W)`` [rad] to the intensity ``(C, H, W)`` of the nominal model; nothing to learn."""
+
+    def __init__(self, spec: DisplaySpec) -> None:
+        super().__init__()
+        self.spec = spec
+
+    def over_panel(self, phase: Tensor) -> Tensor:
+        """See the class."""
+        return ideal_light(phase, self.spec)
 
 
 class Haze(nn.Module):

@@ -27,14 +27,14 @@ from .networks import Network
 RATES = Rates(model=1e-2, network=3e-4)
 
 
-def residual_network(spec: DisplaySpec, network: Network, seed: int) -> nn.Module:
-    """A generator that adds to the prediction of a display model and starts at zero.
+def residual_network(spec: DisplaySpec, network: Network, inputs: int, seed: int) -> nn.Module:
+    """A generator that adds to the prediction of a model and starts at zero; inputs: images a colour that it sees.
 
     The physics is learned first, and the network learns what it leaves.
     """
     channels = len(spec.wavelengths)
     with seeded("residual network", seed):
-        return start_at_zero(network.generator(4 * channels, channels))
+        return start_at_zero(network.generator(inputs * channels, channels))
 
 
 @dataclass(frozen=True)
@@ -71,5 +71,5 @@ class HILPlus(Diagnosed, ThroughModel):
             raise UserError(
                 "hil_plus: a residual network has no dropout, whose random numbers a resumed training lacks"
             )
-        network = residual_network(spec, self.network, self.seed)
+        network = residual_network(spec, self.network, 4, self.seed)
         return ModelApproximator(DisplayModel(spec), network, RATES, Haze(spec))

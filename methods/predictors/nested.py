@@ -4,40 +4,31 @@ image terms    a few numbers on the ideal intensity: shading, blur, haze and ton
 image network  the same, and a U-Net that sees the ideal intensity and adds to it
 field network  the same on the intensity of a field that interferes (`DisplayModel`), and the U-Net sees the field too
 
-Each begins as the ideal image, learns from captures of the same holograms, and has the squared error as its loss, since
-that is what is divided. So a later one can only fail to explain what an earlier one does by its training.
+Each begins as the ideal image, learns from captures of the same holograms and of dark patterns, and has the squared
+error as its loss, since that is what is divided. So a later one can only fail to explain what an earlier one does by its training.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...display.api import DisplaySpec, ideal_light
+from ...display.api import DisplaySpec
+from ...display.training import TrainingBench
 from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.display_model import FORM, DisplayModel
 from ..calibrated.method import SearchRetrieval, ThroughModel
-from ..calibrated.terms import ImageTerms
+from ..calibrated.patterns import dark_samples
+from ..calibrated.terms import IdealImage, ImageTerms
 from ..hil.networks import Network
-from ..learned.samples import Schedule, Steps
+from ..learned.samples import Sample, Schedule, Steps
 from ..learned.weights import seeded, start_at_zero
 from ..wirtinger import Wirtinger
-
-
-class IdealImage(nn.Module):
-    """Phase ``(C, H, W)`` [rad] to the intensity ``(C, H, W)`` of the nominal model; nothing to learn."""
-
-    def __init__(self, spec: DisplaySpec) -> None:
-        super().__init__()
-        self.spec = spec
-
-    def over_panel(self, phase: Tensor) -> Tensor:
-        """See the class."""
-        return ideal_light(phase, self.spec)
 
 
 class SquaredErrorApproximator(ModelApproximator):
@@ -55,7 +46,7 @@ class OneRound(Schedule):
     """Captures of the start alone: what is learned is asked about holograms of the same kind."""
 
     rounds: Annotated[int, Interval(ge=1, le=1)] = 1
-    steps: Steps = 600
+    steps: Steps = 1000
 
 
 @dataclass(frozen=True)
@@ -72,6 +63,10 @@ class NestedPrediction(ThroughModel):
 
     RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
     version: ClassVar[int] = 2
+
+    def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
+        """Dark patterns are learned from as often as eight images each: natural ones confound haze with tone."""
+        return 7 * dark_samples(bench)
 
     @abstractmethod
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:

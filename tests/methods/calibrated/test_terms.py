@@ -8,8 +8,8 @@ from torch import Tensor
 
 from holobench_eval.display.simulated.stages.stray_light import gaussian
 from holobench_eval.methods.calibrated.approximator import MODEL_BETAS
-from holobench_eval.methods.descent import cosine_decay
 from holobench_eval.methods.calibrated.terms import ImageTerms, spread
+from holobench_eval.methods.descent import cosine_decay
 from holobench_eval.metrics.error_budget import unexplained
 from tests.support.small_training import pictures, small_spec
 

@@ -19,6 +19,7 @@ from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.hil.terms_first import HILTerms
 from holobench_eval.methods.hil.tuned import HILTuned
 from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval
@@ -45,6 +46,7 @@ METHODS: dict[str, Any] = {
     "hil": HIL(SMALL, ApproximatorLoss(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), **SHORT),
     "hil_tuned": HILTuned(SMALL, ApproximatorLoss(l1=1.0, perceptual=0.0), retrieval=PLAIN, offsets=2, **SHORT),
     "hil_nh3d": HILNH3D(Network("unet", levels=2, width=4), retrieval=PLAIN, **SHORT),
+    "hil_terms": HILTerms(retrieval=PLAIN, network=Network("unet", levels=2, width=4), **SHORT),
     "hil_plus": HILPlus(network=SMALL, retrieval=PLAIN, **SHORT),
 }
 names = pytest.mark.parametrize("name", METHODS)
