@@ -2,7 +2,7 @@
 
 For one colour and the intensity I of a hologram at a white pixel's unit, the capture is
 
-    (g S (x, y) ((1 - h) B_s * I + h V_r * I)) ^ gamma + b
+    g (S (x, y) ((1 - h) B_s * I + h V_r * I)) ^ gamma + b
 
 with brightness g, light b that is there whatever is shown, the shading S = exp of a polynomial in the place, a blur
 B_s by a Gaussian of widths s along both axes, and a haze: the share h of the light arrives spread by a Gaussian V_r of
@@ -88,7 +88,7 @@ class ImageTerms(Haze):
         light = self._hazy(rows @ intensity @ columns.mT, intensity)
         shading = torch.exp(torch.einsum("cm,mhw->chw", self.shading, self.monomials))
         gain, gamma = (value.exp()[:, None, None] for value in (self.gain, self.gamma))
-        return (gain * shading * light).clamp_min(DARK) ** gamma + self.offset[:, None, None]
+        return gain * (shading * light).clamp_min(DARK) ** gamma + self.offset[:, None, None]
 
 
 def spread(side: int, width: Tensor, lossless: bool = False) -> Tensor:

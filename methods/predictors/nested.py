@@ -5,7 +5,8 @@ image network  the same, and a U-Net that sees the ideal intensity and adds to i
 field network  the same on the intensity of a field that interferes (`DisplayModel`), and the U-Net sees the field too
 
 Each begins as the ideal image, learns from captures of the same holograms and of dark patterns, and has the squared
-error as its loss, since that is what is divided. So a later one can only fail to explain what an earlier one does by its training.
+error as its loss, since that is what is divided. So a later one can only fail to explain what an earlier one does by
+its training.
 """
 
 from __future__ import annotations

@@ -226,3 +226,19 @@ def test_the_fallback_is_taken_where_wirtinger_holograms_are_captured_closer_and
     assert torch.equal(phase, Wirtinger().solve(target[None], solving_bench(worse, target, SPEC, on)))
     monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=1))
     assert not method.prepare(training_bench(SPEC, Memory(), images=2))["fell_back"]
+
+
+@pytest.mark.parametrize(
+    ("panel", "region", "lacks"),
+    [(64, 52, "MS-SSIM at 2 of its 5 scales and the perceptual distance"), (96, 78, "MS-SSIM at 2 of its 5 scales")],
+)
+def test_hil_trains_and_solves_on_a_small_panel_and_says_what_its_loss_lacks(
+    panel: int, region: int, lacks: str
+) -> None:
+    spec = small_spec(panel, region, colours=3)
+    method = replace(METHODS["hil"], retrieval=PhaseRetrieval(iterations=2, step=0.06))
+    learned = method.prepare(training_bench(spec, Memory(), images=2))
+    assert learned["left_out"] == lacks
+    target = pictures(spec, first=20)
+    phase = method.solve(target, solving_bench(method, target[0], spec, learned))
+    assert not torch.equal(phase, method.start.solve(target, solving_bench(method, target[0], spec, learned)))
