@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import count, islice
 from typing import Annotated, ClassVar, NamedTuple
 
 import torch
@@ -23,7 +21,9 @@ VERSION = 1  # part of every digest of a crop: raise it when another rule places
 # without those that have no crop of 208 pixels: text is smaller, and at its own resolution retina is flat but for its
 # black corners
 NAMES = tuple(name for name in FILES if name not in ("text", "retina"))
-STILL_LIFE, STILL_LIVES = "still-life", 2  # the renderings that come first, as they did before there were others
+# One or two renderings are those that studies had before there were others: still lifes of one layout, one cluster.
+# With more they are left out, being alike, and of a spectrum f^-0.6 where that of photographs is f^-1.3.
+STILL_LIFE, STILL_LIVES = "still-life", 2
 
 # Smallest contrast of a crop, linear light (rms difference from its mean colour): a constant image would score
 # 26 dB on a flatter one, more than most captures score on anything.
@@ -48,10 +48,10 @@ class Crops:
     place in the grid: ``astronaut-2`` is the second square, row by row. Crops of one photograph are one cluster. The
     photographs are decoded as sRGB.
 
-    Renderings are two still lifes, then a landscape, a street, things on a table, stones, and so on in turn. Each is a
-    cluster: its numbers are drawn independently of all others', so that a mean over renderings is one over what these
-    generators draw. Those of a kind share its generator, and may be alike in what no interval counts: a report says
-    beside its mean what photographs alone give.
+    Renderings are a landscape, a street, things on a table, stones, and so on in turn. Each is a cluster: its numbers
+    are drawn independently of all others', so that a mean over renderings is one over what these generators draw. Those
+    of a kind share its generator, and may be alike in what no interval counts; their names tell the kinds apart. One or
+    two renderings are the still lifes of earlier studies, which are alike and one cluster.
 
     size: pixels a side; 208 is the region that is scored on a panel of 256 x 256. A smaller region shows the middle
     of a crop, a larger one is refused: nothing is resized. each: crops of a photograph, at most. names: the
@@ -71,7 +71,7 @@ class Crops:
 
     def items(self) -> list[str]:
         """``photograph-place``, photograph by photograph, then the renderings. UserError for one without a crop."""
-        return [*self._places(), *islice(_names(), self.renderings)]
+        return [*self._places(), *_names(self.renderings)]
 
     def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
         """The middle of a crop as ``(channels, *shape)`` linear light in [0, 1]. UserError for a larger shape."""
@@ -96,9 +96,11 @@ class Crops:
         return named_digest("crop", VERSION, photograph, place.top, place.left, self.size)
 
     def cluster(self, item: str) -> str:
-        """The photograph of a crop; a rendering is a cluster of its own."""
+        """The photograph of a crop; a rendering is a cluster of its own, and still lifes are one."""
         place = self._place(item)
-        return item if place is None else place.photograph
+        if place is None:
+            return STILL_LIFE if _kind(item) == STILL_LIFE else item
+        return place.photograph
 
     def _place(self, item: str) -> Crop | None:
         return self._places().get(known("crop", item, self.items()))
@@ -108,10 +110,10 @@ class Crops:
         return {item: crop for name in self.names for item, crop in _best(name, self.size, self.each)}
 
 
-def _names() -> Iterator[str]:
-    """The renderings' names, without end."""
-    yield from (f"{STILL_LIFE}-{number}" for number in range(1, STILL_LIVES + 1))
-    yield from (f"{kind}-{number}" for number in count(1) for kind in renderings.SCENES)
+def _names(count: int) -> list[str]:
+    """So many renderings."""
+    kinds = [STILL_LIFE] if count <= STILL_LIVES else list(renderings.SCENES)
+    return [f"{kinds[index % len(kinds)]}-{index // len(kinds) + 1}" for index in range(count)]
 
 
 def _kind(rendering: str) -> str:

@@ -85,7 +85,7 @@ def test_the_clusters_of_targets_are_those_of_the_dataset(study):
         re.sub("targets: .*", "targets: {dataset: crops, params: {names: [astronaut], each: 2, renderings: 1}}", CONFIG)
     )
     clusters = layout_of(load_study(study.file)).clusters
-    assert clusters == {"astronaut-1": "astronaut", "astronaut-2": "astronaut", "still-life-1": "still-life-1"}
+    assert clusters == {"astronaut-1": "astronaut", "astronaut-2": "astronaut", "still-life-1": "still-life"}
 
 
 def test_rows_whose_network_is_the_ideal_image_are_known(tmp_path):
