@@ -16,7 +16,7 @@ from .intake import Source
 DIGITS = 8  # of a digest, in a name
 PLACE = {"real": "photographed", "learned": "learned"}  # what stands in the place of a profile, in a name
 # What a profile says of where a value comes from.
-ASSUMED, FITTED, STATED, UNSAID = "assumed", "fitted", "stated", "not said"
+ASSUMED, DRAWN, FITTED, STATED, UNSAID = "assumed", "drawn", "fitted", "stated", "not said"
 
 _COUNTS = {"one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6}
 _NEXT = re.compile(rf"as the next(?: ({'|'.join(_COUNTS)}))?")
@@ -130,13 +130,14 @@ def _parameters(text: str) -> Iterator[Parameter]:
         above = ""
         if value and key not in ("name", "description", "version", "seed", "like"):
             stated = STATED if comment else UNSAID
-            basis = FITTED if "CALIBRATED" in comment else ASSUMED if assumed else stated
+            marked = FITTED if "CALIBRATED" in comment else DRAWN if "DRAWN" in comment else None
+            basis = marked or (ASSUMED if assumed else stated)
             yield Parameter(stage, key, value, comment, basis)
 
 
 def counted(found: Sequence[Parameter]) -> dict[str, int]:
     """How many parameters are of each basis, by the words of the file."""
-    return {basis: sum(each.basis == basis for each in found) for basis in (FITTED, ASSUMED, STATED, UNSAID)}
+    return {basis: sum(each.basis == basis for each in found) for basis in (FITTED, DRAWN, ASSUMED, STATED, UNSAID)}
 
 
 def ancestors(profile: Profile) -> list[str]:

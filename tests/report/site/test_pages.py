@@ -14,7 +14,7 @@ import pytest
 
 from holobench_eval.display.simulated.profile import load_profile, names
 from holobench_eval.report.site import write_site
-from holobench_eval.report.site.displays import ASSUMED, FITTED, STATED, parameters
+from holobench_eval.report.site.displays import ASSUMED, DRAWN, FITTED, STATED, parameters
 from holobench_eval.report.site.html import slug
 from holobench_eval.report.site.intake import read
 from holobench_eval.report.site.standing import groups
@@ -175,18 +175,21 @@ def test_the_page_of_a_display_has_its_parameters_with_their_sources(site: Site)
 
 
 def test_what_a_profile_assumes_is_read_from_its_comments() -> None:
-    found = {(each.stage, each.key): each for each in parameters("leto-2020")}
     basis = {
-        ("panel", "pitch"): STATED,
-        ("panel", "distance"): ASSUMED,
-        ("crosstalk", "crosstalk"): FITTED,
-        ("coherent_noise", "specks"): ASSUMED,  # "assumed, as the next six"
-        ("coherent_noise", "plane_distance"): ASSUMED,
-        ("propagation", "distance_error"): STATED,
-        ("drift", "pose"): ASSUMED,  # said of the whole stage
+        ("leto-aged", "panel", "pitch"): STATED,
+        ("leto-aged", "panel", "distance"): ASSUMED,
+        ("leto-aged", "zero_order", "fraction"): FITTED,
+        ("leto-2020", "crosstalk", "crosstalk"): DRAWN,
+        ("leto-2020", "coherent_noise", "specks"): DRAWN,
+        ("leto-aged", "coherent_noise", "specks"): ASSUMED,  # "assumed, as the next six"
+        ("leto-aged", "coherent_noise", "plane_distance"): ASSUMED,
+        ("leto-2020", "propagation", "distance_error"): DRAWN,
+        ("leto-2020", "drift", "pose"): ASSUMED,  # said of the entire stage
     }
+    found = {(name, each.stage, each.key): each for name in ("leto-2020", "leto-aged") for each in parameters(name)}
     assert {key: found[key].basis for key in basis} == basis
-    assert found["propagation", "aberration"].source.startswith("rms waves at 517 nm")
+    assert found["leto-2020", "propagation", "aberration"].source.startswith("rms waves at 517 nm")
+
 
 
 @pytest.mark.parametrize("name", names())
