@@ -12,7 +12,7 @@ from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, words
 from ..markdown import Markdown
 from ..section import Report
-from .kind import Kind
+from .kind import Kind, subjects
 
 
 def limits(report: Report, kind: Kind) -> Iterator[Markdown]:
@@ -30,6 +30,7 @@ def _all(report: Report) -> Iterator[str]:
     yield from _displays(report)
     yield from _form(report)
     yield from _tuned(report)
+    yield from _without(report)
     if report.layout.note:
         yield f"Note: {report.layout.note}"
     if report.layout.privileged:
@@ -116,3 +117,16 @@ def _tuned(report: Report) -> Iterator[str]:
     if parts:
         others = "The others have the settings of their papers, of this package or of the config."
         yield f"Tuned: {'; '.join(parts)}. {others}"
+
+
+def _without(report: Report) -> Iterator[str]:
+    """Weights of others that the trained methods of the question take where a machine has them, and that it had not."""
+    same: dict[tuple[str, ...], list[str]] = {}
+    for training in report.trainings:
+        files = (training.fact("description") or {}).get("external") or {}
+        absent = tuple(name for name, digest in files.items() if digest == "absent")
+        for label in training.labels if absent else ():
+            if label in subjects(report.results) and label not in same.setdefault(absent, []):
+                same[absent].append(label)
+    for absent, labels in same.items():
+        yield f"Weights: {words(labels)} learned without {words(list(absent))}, which this machine has not."

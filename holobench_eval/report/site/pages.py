@@ -156,8 +156,8 @@ def _stages(display: Display) -> Markup:
         headings = ("stage", "parameter", "value", "basis", "what the profile says of it")
         parts.append(
             Markup(
-                "<h2>{}</h2><p>{}Of {} parameters: {}. Fitted, drawn and assumed are what the profile calls so; stated is all "
-                "else that it says something of.</p>{}"
+                "<h2>{}</h2><p>{}Of {} parameters: {}. Fitted, drawn and assumed are what the profile calls so; stated "
+                "is all else that it says something of.</p>{}"
             ).format(heading, note, len(found), text, table(heading, headings, rows, numbers=False))
         )
     effects = listed(

@@ -262,3 +262,17 @@ def test_two_reports_of_one_training_have_equal_bytes(found, tmp_path):
         reports.append([path.read_bytes() for path in kept])
     assert len(reports[0]) > 4
     assert np.all([a == b for a, b in zip(*reports, strict=True)])
+
+
+def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_limits(found, tmp_path):
+    weights = {"VGG-19 weights": "absent", "LPIPS weights (AlexNet)": "0123"}
+    described = description("hil") | {"external": weights}
+    records = [
+        record | {"cell": record["cell"] | {"prepared": [digest(described)]}} if record["label"] == "HIL" else record
+        for record in found
+    ]
+    keep(tmp_path, "hil", description=described)
+    keep(tmp_path, "unet")
+    text = written(records, tmp_path, question="Is HIL better than U-Net?")
+    assert "**Weights.** HIL learned without VGG-19 weights, which this machine has not." in text
+    assert "**Weights.**" not in written(records, tmp_path, question="Is U-Net better?")

@@ -191,7 +191,6 @@ def test_what_a_profile_assumes_is_read_from_its_comments() -> None:
     assert found["leto-2020", "propagation", "aberration"].source.startswith("rms waves at 517 nm")
 
 
-
 @pytest.mark.parametrize("name", names())
 def test_no_parameter_of_a_profile_is_lost(name: str) -> None:
     profile = load_profile(name)
