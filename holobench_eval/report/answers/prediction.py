@@ -1,7 +1,12 @@
-"""Prediction (paper Table 1): which network predicts the captures of a display best, and is any better than none?"""
+"""Prediction (paper Table 1): which network predicts the captures of a display best, and is any better than none?
+
+Where the study measures control, also which one answers a change of the hologram as the display does: that is what a
+method needs that optimises through a network.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from ..data.phrases import short, tested, value, verdict
@@ -12,9 +17,11 @@ from .kind import Kind, subjects
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """The best, the named ones against the baseline, the published order, and who predicts worse than no network."""
+    """The best, the named ones against the baseline, control, the published order, and who predicts worse than no
+    network."""
     yield from _against(results)
     yield best(results)
+    yield from controlled(results)
     yield from reported(results)
     yield from _untrained(results)
     yield from floor(results)
@@ -30,6 +37,20 @@ def _against(results: Results) -> Iterator[str]:
         baseline = str(results.layout.baseline)
         found = "; ".join(f"{name}: {words(labels)}" for name, labels in parts.items())
         yield f"Compared with {baseline}, which has {value(results, baseline, condition)} on {condition}: {found}."
+
+
+def controlled(results: Results) -> Iterator[str]:
+    """Who leads by control on each display, and what the one has that predicts best, else the next one."""
+    for score, condition in itertools.product(results.control, results.conditions):
+        ranking, best_known = results.ranking(condition, score.key), results.ranking(condition)[:1]
+        own = {label: score.number(float(results.values(label, condition, score.key).mean())) for label in ranking}
+        others = [f"{label}, which predicts best, {own[label]}" for label in best_known if label in ranking[1:]]
+        others = others or [f"the next, {label}, {own[label]}" for label in ranking[1:2]]
+        if ranking:
+            yield (
+                f"By control, {ranking[0]} leads on {condition}: it answers {own[ranking[0]]} of what a change of the "
+                f"hologram changes on the display{''.join(f'; {other}' for other in others)}."
+            )
 
 
 def reported(results: Results) -> Iterator[str]:

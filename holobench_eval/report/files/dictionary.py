@@ -38,6 +38,10 @@ _KEYS = {
     "unexplained_by_ideal_image": ("The same that the ideal image of the hologram leaves", _WHITE),
     "unexplained": ("The same that the method's prediction leaves", _WHITE),
     "unexplained_but_noise": ("The same that the picture without temporal noise would leave", _WHITE),
+    "control": ("Mean of the three scores of control", ""),
+    "control_half": ("What the model answers of the display's answer, if a half of the picture loses its light", ""),
+    "control_patch": ("The same, if a patch of the picture becomes white, or black where it was bright", ""),
+    "control_phase": ("The same, if the phase in the middle of the panel moves by 0.5 rad rms", ""),
     "error_of_ideal_image": ("Squared error of the ideal image against the target", _WHITE),
 }
 _VARIANTS = {
