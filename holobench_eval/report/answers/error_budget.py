@@ -15,17 +15,17 @@ from .prediction import controlled
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """A sentence a display: what the image-domain predictions, then all of them, explain, and what remains; who leads
-    by control."""
+    """What explains most, and who leads by control; then a sentence a display: what the image-domain predictions, then
+    all of them, explain, and what remains."""
     found = budgets(results)
     if not found:
         yield "No display has the scores of all methods for all targets, so none has a budget."
         return
     largest = [f"on {budget.condition} {_most(budget)}" for budget in found]
     yield f"What explains most of the squared error: {'; '.join(largest)}."
+    yield from controlled(results)
     for budget in found:
         yield _reading(budget)
-    yield from controlled(results)
 
 
 def _most(budget: Budget) -> str:

@@ -40,17 +40,17 @@ def _against(results: Results) -> Iterator[str]:
 
 
 def controlled(results: Results) -> Iterator[str]:
-    """Who leads by control on each display, and what the one has that predicts best, else the next one."""
+    """Who leads by control on each display, before the one that predicts best, else before the next."""
+    parts = []
     for score, condition in itertools.product(results.control, results.conditions):
-        ranking, best_known = results.ranking(condition, score.key), results.ranking(condition)[:1]
+        ranking, predicting = results.ranking(condition, score.key), results.ranking(condition)[:1]
         own = {label: score.number(float(results.values(label, condition, score.key).mean())) for label in ranking}
-        others = [f"{label}, which predicts best, {own[label]}" for label in best_known if label in ranking[1:]]
-        others = others or [f"the next, {label}, {own[label]}" for label in ranking[1:2]]
-        if ranking:
-            yield (
-                f"By control, {ranking[0]} leads on {condition}: it answers {own[ranking[0]]} of what a change of the "
-                f"hologram changes on the display{''.join(f'; {other}' for other in others)}."
-            )
+        others = [f", before {label}, which predicts best, with {own[label]}" for label in predicting if label in own]
+        if predicting == ranking[:1]:
+            others = [f", before {label} with {own[label]}" for label in ranking[1:2]]
+        parts += [f"{first} leads on {condition} with {own[first]}{''.join(others)}" for first in ranking[:1]]
+    if parts:
+        yield f"By control, what a model answers of a change on the display (1: all of it), {'; '.join(parts)}."
 
 
 def reported(results: Results) -> Iterator[str]:
