@@ -12,7 +12,10 @@ unit of the exposure, which is the same for all four, and the sum is over all co
 that matches P to C: models may predict in any unit, as for all other scores. It is taken from the unchanged pair
 alone, so what a change does to brightness is a part of the answer.
 
-Both captures have noise, of power N each, so even the noise-free picture has no more than 1 - 2 N / |C' - C|^2.
+Both captures have noise that nobody predicts, so even a perfect model has less than 1. How much it has on average is
+known from a second capture C" of the unchanged hologram, which differs from the first by as much noise::
+
+    most = 1 - |C" - C|^2 / |C' - C|^2
 """
 
 from __future__ import annotations
@@ -25,16 +28,19 @@ from .protocol import match
 
 NAME, VERSION = "control", "1"
 HALF, PATCH, PHASE = CHANGES = ("half", "patch", "phase")
-COLUMNS = (NAME, *(f"{NAME}_{change}" for change in CHANGES))
+MOST = f"{NAME}_most"
+COLUMNS = (NAME, *(f"{NAME}_{change}" for change in CHANGES), MOST)
 
 
-def control(capture: Tensor, prediction: Tensor, changed: Mapping[str, tuple[Tensor, Tensor]]) -> dict[str, float]:
-    """The control of every change, and their mean.
+def control(
+    capture: Tensor, again: Tensor, prediction: Tensor, changed: Mapping[str, tuple[Tensor, Tensor]]
+) -> dict[str, float]:
+    """The control of every change, their mean, and the mean of the most that noise allows.
 
     Parameters
     ----------
-    capture, prediction
-        Of the unchanged hologram, ``(C, h, w)`` linear light, each in any unit.
+    capture, again, prediction
+        Of the unchanged hologram, ``(C, h, w)`` linear light: two captures in one unit, the prediction in any.
     changed
         By change, capture and prediction of the changed hologram, in the same units.
 
@@ -44,13 +50,15 @@ def control(capture: Tensor, prediction: Tensor, changed: Mapping[str, tuple[Ten
 
     >>> import torch
     >>> before = torch.tensor([[[1.0, 2.0]]])
-    >>> control(before, 2 * before, {"patch": (before + 1, 2 * before + 1)})
-    {'control_patch': 0.75, 'control': 0.75}
+    >>> control(before, before + 0.5, 2 * before, {"patch": (before + 1, 2 * before + 1)})
+    {'control_patch': 0.75, 'control': 0.75, 'control_most': 0.75}
     """
-    _, factors = match(prediction.double(), capture.double())
-    found = {}
+    capture, again, prediction = capture.double(), again.double(), prediction.double()
+    _, factors = match(prediction, capture)
+    noise, found, most = (again - capture).square().sum(), {}, []
     for change, (other, answered) in changed.items():
-        wanted = other.double() - capture.double()
-        answer = factors.view(-1, 1, 1) * (answered.double() - prediction.double())
-        found[f"{NAME}_{change}"] = 1 - float((answer - wanted).square().sum() / wanted.square().sum())
-    return found | {NAME: sum(found.values()) / len(found)}
+        wanted, answer = other - capture, factors.view(-1, 1, 1) * (answered - prediction)
+        size = wanted.square().sum()
+        found[f"{NAME}_{change}"] = 1 - float((answer - wanted).square().sum() / size)
+        most.append(1 - float(noise / size))
+    return found | {NAME: sum(found.values()) / len(found), MOST: sum(most) / len(most)}

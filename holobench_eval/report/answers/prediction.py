@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
+from ...metrics.control import MOST
 from ..data.phrases import short, tested, value, verdict
 from ..data.results import Results
 from ..data.text import words
@@ -48,7 +49,9 @@ def controlled(results: Results) -> Iterator[str]:
         others = [f", before {label}, which predicts best, with {own[label]}" for label in predicting if label in own]
         if predicting == ranking[:1]:
             others = [f", before {label} with {own[label]}" for label in ranking[1:2]]
-        parts += [f"{first} leads on {condition} with {own[first]}{''.join(others)}" for first in ranking[:1]]
+        for first in ranking[:1]:
+            most = score.number(float(results.values(first, condition, MOST).mean()))
+            parts.append(f"{first} leads on {condition} with {own[first]} of {most} that noise allows{''.join(others)}")
     if parts:
         yield f"By control, what a model answers of a change on the display (1: all of it), {'; '.join(parts)}."
 

@@ -6,14 +6,14 @@ from ...display.api import ideal_image
 from ...metrics import error_budget as budget
 from .job import Job, Measured
 from .picture import refuse_saturated
-from .prediction import AGAIN, Foreseen, ask, changes_of, compared, shown
+from .prediction import AGAIN, Foreseen, ask, compared, further, shown
 
 
 def error_budget(job: Job) -> Measured:
     """Predict the capture of a hologram, and compare what leaves how much of it unexplained: the target, the hologram's
     ideal image, the prediction, and a second capture, which has the noise alone; see ``metrics.error_budget``."""
     cell, display = job.task.cells[0], job.task.conditions[0]
-    ask(job, cell, display, ("", AGAIN, *changes_of(job)))
+    ask(job, cell, display, dict.fromkeys(("", AGAIN, *further(job))))
 
     def scores(seen: Foreseen) -> dict[str, float]:
         _, again = shown(job, cell, display, AGAIN)

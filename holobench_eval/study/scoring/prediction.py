@@ -46,14 +46,14 @@ def prediction(job: Job) -> Measured:
 @dataclass(frozen=True)
 class Foreseen:
     """A hologram of a target ``(C, h, w)``, its capture, and the prediction of that ``(C, h, w)``, in the same unit;
-    the same of the changed holograms, by change, where the study asks for control; what the prediction took, what was
-    learned before, and what was read."""
+    the columns of control, where the study asks for it; what the prediction took, what was learned before, and what was
+    read."""
 
     hologram: Solution
     target: Tensor
     capture: RectifiedCapture
     prediction: Tensor
-    changed: dict[str, tuple[Tensor, Tensor]]
+    answers: dict[str, float]
     taken: cost.Cost
     learned: Artifact | None
     reads: Reads
@@ -62,10 +62,10 @@ class Foreseen:
 def _foresee(job: Job) -> Foreseen:
     """Predict the captures of the hologram of the task's target, and of its changes."""
     task, cell, display = job.task, job.task.cells[0], job.task.conditions[0]
-    target, changes = job.target(cell, display), changes_of(job)
-    ask(job, cell, display, ("", *changes))
+    target = job.target(cell, display)
+    ask(job, cell, display, ("", *further(job)))
     hologram, capture = shown(job, cell, display)
-    others = {change: shown(job, cell, display, change) for change in changes}
+    others = {variant: shown(job, cell, display, variant) for variant in further(job)}
     method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
     gate(method, cell.method, cell.code, digests(method, cell.target), cell.files)
     for photograph in (capture, *(other for _, other in others.values())):
@@ -92,8 +92,12 @@ def _foresee(job: Job) -> Foreseen:
         return predicted.detach().cpu()[0], taken, ready.reads
 
     predicted, taken, reads = predict(hologram.phase)
-    changed = {change: (other.image, predict(own.phase)[0]) for change, (own, other) in others.items()}
-    return Foreseen(hologram, target, capture, predicted, changed, taken, learned, reads)
+    answers: dict[str, float] = {}
+    if others:
+        again = others.pop(AGAIN)[1].image
+        changed = {change: (other.image, predict(own.phase)[0]) for change, (own, other) in others.items()}
+        answers = control.control(capture.image, again, predicted, changed)
+    return Foreseen(hologram, target, capture, predicted, answers, taken, learned, reads)
 
 
 def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
@@ -103,16 +107,15 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
     image = factors.view(-1, 1, 1) * seen.prediction
     taken = seen.taken
     cost.keep(job.timing, taken.seconds)
-    further = more(seen)
-    answers = control.control(seen.capture.image, seen.prediction, seen.changed) if seen.changed else {}
+    figures = more(seen)
 
     def compare(cell: Cell, _: Condition) -> Record:
         keep_pictures(job, cell, image, wanted, seen.hologram.phase)
         keep_capture(job, cell, image, wanted)
         return job.record(
             cell,
-            scores=scores_of(job, cell, image, wanted, job.setting.metrics, answers),
-            figures=further,
+            scores=scores_of(job, cell, image, wanted, job.setting.metrics, seen.answers),
+            figures=figures,
             alone=job.alone,
             registration_residual_px=seen.capture.residual,
             saturated=seen.capture.saturated,
@@ -140,9 +143,9 @@ def floor(job: Job) -> Measured:
     return reference
 
 
-def changes_of(job: Job) -> tuple[str, ...]:
-    """The changes of a hologram that the study asks models to answer."""
-    return control.CHANGES if control.NAME in job.setting.metrics else ()
+def further(job: Job) -> tuple[str, ...]:
+    """The captures that control needs beside that of the hologram, see ``shown``; none where it is not asked for."""
+    return (AGAIN, *control.CHANGES) if control.NAME in job.setting.metrics else ()
 
 
 def ask(job: Job, cell: Cell, display: Condition, variants: Collection[str]) -> None:
