@@ -1,4 +1,7 @@
-"""Changes of a hologram that display and model have to answer, the same for all methods; see ``metrics.control``."""
+"""Changes of a hologram that display and model have to answer, the same for all methods; see ``metrics.control``.
+
+Any change here is a new version of that metric.
+"""
 
 from __future__ import annotations
 
