@@ -18,9 +18,10 @@ def study_schema() -> dict[str, Any]:
     from ..core.json_schema import json_schemas
     from ..display.simulated.changes import KINDS
     from ..display.simulated.profile import names as profiles
-    from ..metrics import catalogue
+    from ..metrics import catalogue, control
     from ..study.definition import Study
     from ..study.focal_stacks import SCORES
+    from ..study.identity import SPECKLE
 
     classes: dict[str, type[Any]] = {"study": Study}
     for kind in plugins.KINDS:
@@ -38,7 +39,7 @@ def study_schema() -> dict[str, Any]:
 
     methods, datasets = plugins.names("methods"), plugins.names("datasets")
     method, dataset = _one_of(methods, r"\.py:"), _one_of(datasets, r"\.py:")
-    profile = _one_of(profiles(), r"\.ya?ml$")
+    profile = _one_of([*profiles(), *profiles(family=True)], r"\.ya?ml$")
     for key, definition, choice in (
         ("name", "MethodEntry", method),
         ("name", "Probe", method),
@@ -68,7 +69,7 @@ def study_schema() -> dict[str, Any]:
     metrics = catalogue()
     columns = [*(column for metric in metrics for column in metric.columns), *SCORES]
     study["properties"]["headline"] |= {"enum": columns}
-    wanted = {"type": "array", "items": {"enum": [*(metric.name for metric in metrics), "speckle_contrast"]}}
+    wanted = {"type": "array", "items": {"enum": [*(metric.name for metric in metrics), SPECKLE, control.NAME]}}
     shared["Protocol"]["properties"]["metrics"] |= {"anyOf": [wanted, {"type": "null"}]}
     entries = study["properties"]["methods"]
     entries["items"] = {"anyOf": [method, entries["items"]]}

@@ -18,7 +18,7 @@ from ..display.simulated.changes import KINDS, Value, altered, checked
 from ..display.simulated.profile import load_profile
 from ..display.traits import traits_of
 from ..imaging.grid import SMALLEST_REGION
-from ..metrics import catalogue
+from ..metrics import catalogue, control
 from ..metrics.lpips import find_weights
 from . import isolation
 from .changes import Changes, changed, chosen
@@ -303,8 +303,12 @@ def _check_metrics(study: Study, document: Document) -> None:
     """
     wanted, headline, metrics = study.protocol.metrics, study.headline, {metric.name: metric for metric in catalogue()}
     for index, name in enumerate(wanted or ()):
-        known = [*metrics, SPECKLE]
-        _refuse_unknown(document, ("protocol", "metrics", index), name, known, f"unknown metric '{name}'")
+        where: Keys = ("protocol", "metrics", index)
+        _refuse_unknown(document, where, name, [*metrics, SPECKLE, control.NAME], f"unknown metric '{name}'")
+        if name == control.NAME and not study.predicts:
+            raise document.error(where, "control is a score of models; measure: prediction or error_budget has it")
+        if name == control.NAME and "matched" in {entry.exposure for entry in study.methods}:
+            raise document.error(where, "control compares captures of equal light; leave out exposure: matched")
     columns = {column: metric for metric in metrics.values() for column in metric.columns}
     further = SCORES if study.measure == "focus" else ()
     _refuse_unknown(document, ("headline",), headline, [*columns, *further], f"unknown metric '{headline}'")

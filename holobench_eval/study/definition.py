@@ -157,7 +157,8 @@ class Protocol:
     """How captures are scored.
 
     version: of the metric protocol; metrics: names of the metrics to compute (None: all; they take 10 s for a capture
-    of 1080 x 1920 pixels); lpips_weights: a file or folder of LPIPS trunk weights (None: torch's hub cache).
+    of 1080 x 1920 pixels), and for predictions ``control``, which takes four more captures of each target and is
+    computed only where it is named; lpips_weights: a file or folder of LPIPS trunk weights (None: torch's hub cache).
     """
 
     version: Literal["v2"] = "v2"

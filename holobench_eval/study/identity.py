@@ -23,7 +23,7 @@ from typing import Any
 
 from ..core.hashing import canonical, file_digest
 from ..display import DisplaySpec
-from ..metrics import catalogue
+from ..metrics import catalogue, control
 from ..metrics.lpips import find_weights
 from ..metrics.protocol import VERSION as PROTOCOL
 from ..metrics.speckle import VERSION as SPECKLE_VERSION
@@ -128,6 +128,7 @@ def scores_of(study: Study) -> dict[str, str]:
     """The version of every metric that a study scores by, by its name.
 
     A study that names none gets all that can be computed here, and the headline's: weights of LPIPS may come later.
+    Control, which takes captures of its own, has to be named.
     """
     weights, wanted = study.protocol.lpips_weights, study.protocol.metrics
     path = None if weights is None else Path(weights)
@@ -154,7 +155,7 @@ def versions_of(names: Collection[str], weights: Path | None = None) -> dict[str
 def versions() -> dict[str, str]:
     """The version of every score: of the protocol, and of the metric."""
     known = {metric.name: metric.version for metric in catalogue()}
-    known |= {SPECKLE: SPECKLE_VERSION, INFOCUS: INFOCUS_VERSION}
+    known |= {SPECKLE: SPECKLE_VERSION, INFOCUS: INFOCUS_VERSION, control.NAME: control.VERSION}
     return {name: f"{PROTOCOL}, {version}" for name, version in known.items()} | {MATCH: PROTOCOL, REFINED: PROTOCOL}
 
 
@@ -204,5 +205,5 @@ def parted(version: str) -> tuple[str, str]:
 
 def named(metrics: Collection[str]) -> list[str]:
     """The names that ``metrics.score`` has to be given for scores by these names."""
-    own = [name for name in metrics if name not in (MATCH, REFINED, INFOCUS)]
+    own = [name for name in metrics if name not in (MATCH, REFINED, INFOCUS, control.NAME)]
     return own if REFINED not in metrics or set(own) & set(REPEATED) else [*own, REPEATED[0]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from .queue import Drawing, Queue, Step
 from .scoring import starts
 from .scoring.cell import work
 from .scoring.job import Job, Setting
-from .scoring.scores import kept_capture
+from .scoring.scores import is_kept
 from .store import Record, Store, appears, late
 from .training import TrainingJob, train
 
@@ -124,7 +124,9 @@ def run(
         missing = frozenset(name for name, state in states.items() if state in again and not rescore)
         missing, outdated = starts.affected(plan, missing, states, phases)
         unscored = {cell.id: cell for cell in plan.cells if states[cell.id] == "unscored" and cell.id not in missing}
-        scorable = frozenset(name for name, cell in unscored.items() if _is_scorable(cell, store, phases, not rescore))
+        scorable = frozenset(
+            name for name, cell in unscored.items() if _is_scorable(cell, store, phases, metrics, not rescore)
+        )
         if missing or scorable:
             refuse_unscored(study)
         refuse_unavailable(plan, missing, study.folder)
@@ -162,10 +164,11 @@ def run(
         return Outcome(store.load(plan), described, len(missing), solved, rescored, len(unscored) - rescored)
 
 
-def _is_scorable(cell: Cell, store: Store, phases: Phases, solves: bool) -> bool:
+def _is_scorable(cell: Cell, store: Store, phases: Phases, metrics: Mapping[str, str], solves: bool) -> bool:
     """Whether a captured cell can be scored again: from its kept capture, or on a display that is no real one from its
-    phase, since a real photograph is never taken again for a metric. solves: whether a phase may be solved again."""
-    if kept_capture(store.capture(cell.id)):
+    phase, since a real photograph is never taken again for a metric. metrics: versions of those that are wanted;
+    solves: whether a phase may be solved again."""
+    if is_kept(cell, store, metrics):
         return True
     if cell.shown_on is not None and cell.shown_on.real:
         return False

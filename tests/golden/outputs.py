@@ -26,9 +26,10 @@ from holobench_eval.core import plugins, seeds
 from holobench_eval.display import DisplaySpec, load_profile
 from holobench_eval.display.simulated import profile as profiles
 from holobench_eval.imaging.align import align
-from holobench_eval.metrics import catalogue, match, score
+from holobench_eval.metrics import catalogue, control, match, score
 from holobench_eval.metrics.protocol import VERSION as PROTOCOL
 from holobench_eval.study.opening import open_bench
+from holobench_eval.study.scoring.changed import changed_target, moved_phase
 from holobench_eval.study.versions import ALIGNMENT, HARNESS, method_version
 from tests.support import photographed
 from tests.support.small_training import (
@@ -114,6 +115,7 @@ def complaint(name: str, case: Case, numbers: Numbers, recorded: Mapping[str, An
         "metric": "`version` of the `Metric`",
         "profile": "`version` in the profile's YAML, or HARNESS where the bench is another",
         "alignment": "ALIGNMENT",
+        "control": "VERSION in holobench_eval/metrics/control.py",
         "protocol": "VERSION in holobench_eval/metrics/protocol.py, or HARNESS",
     }[name.split()[0]]
     return (
@@ -139,6 +141,7 @@ def cases() -> dict[str, Case]:
     for metric in catalogue():
         if not metric.name.startswith("lpips"):  # its weights are in no package
             known[f"metric {metric.name}"] = Case(_with_harness(metric.version), partial(_scores, metric.name), EXACT)
+    known["control"] = Case(_with_harness(control.VERSION), _control, EXACT)
     known["alignment"] = Case(ALIGNMENT, _alignment)
     for name, cls in methods.items():
         if _installed(cls):
@@ -194,6 +197,16 @@ def _scores(metric: str | None) -> dict[str, Tensor]:
         factors = match(capture, target * torch.tensor([1.0, 0.01, 0.0]).view(3, 1, 1))[1].tolist()
         kept |= {f"scale_{channel} of a target in red": factor for channel, factor in enumerate(factors)}
     return {name: torch.tensor(value, dtype=torch.float64) for name, value in kept.items()}
+
+
+def _control() -> dict[str, Tensor]:
+    """The changes of a target and of a phase, and the scores of a model that takes gamma for light."""
+    target, again = _smooth(3, (96, 128), 0.0, 1.0), _smooth(3, (96, 128), 0.01, 1.0)
+    changed = {change: changed_target(target, change, 3, "golden") for change in (control.HALF, control.PATCH)}
+    answers = {change: (other, other.square()) for change, other in changed.items()}
+    scores = control.control(target, again, target.square(), answers)
+    moved = {control.PHASE: moved_phase(_smooth(3, (96, 128), -9.0, 9.0), 3, "golden")}
+    return changed | moved | {name: torch.tensor(value, dtype=torch.float64) for name, value in scores.items()}
 
 
 def _alignment() -> dict[str, Tensor]:

@@ -29,7 +29,11 @@ METHODS = """[
   {name: image_network, params: {start: {iterations: 20}, training: {steps: 20}}},
   {name: field_network, params: {start: {iterations: 20}, training: {steps: 180}}}]"""
 STUDY = (
-    ("seed: 3", "seed: 3\nmeasure: error_budget\nholograms: {params: {iterations: 20}}"),
+    (
+        "seed: 3",
+        "seed: 3\nmeasure: error_budget\nholograms: {params: {iterations: 20}}\n"
+        "protocol: {metrics: [psnr, ssim, control]}",
+    ),
     ("{profiles: [ideal], panel: [128, 128]}", "{profiles: [shaded.yaml, unmodulated.yaml]}"),
     ("count: 1}", "count: 3}"),
     ('"trained.py:Unseen", held_out: 1}', '"trained.py:Unseen", params: {count: 7}, held_out: 2}'),
@@ -70,6 +74,17 @@ def test_light_that_interferes_is_left_to_the_field(found) -> None:
     *_, network, field = budget.explained
     assert field.gain.mean > network.gain.mean + 3
     assert budget.noise.gain.mean > field.gain.mean - 0.5
+
+
+def test_only_a_model_of_the_field_controls_light_that_interferes(found) -> None:
+    control = {
+        label: [
+            r["scores"]["control"] for r in found[1] if (r["label"], r["cell"]["profile"]) == (label, "unmodulated")
+        ]
+        for label in ("image_terms", "image_network", "field_network")
+    }
+    assert all(len(values) == 3 for values in control.values())
+    assert min(control["field_network"]) > max(control["image_terms"] + control["image_network"])
 
 
 def test_the_parts_add_up_to_the_error_of_the_captures(found) -> None:

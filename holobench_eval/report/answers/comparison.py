@@ -165,7 +165,8 @@ def rows(results: Results) -> Markdown | None:
     many, captures = len(results.conditions) > 1, "total_captures" in results.table and results.layout.spends_captures
     baseline = results.layout.baseline
     headings = ["method", *(["display"] if many else []), results.headline.heading]
-    headings += [score.name for score in results.beside]
+    beside = [*results.beside, *results.control]
+    headings += [score.name for score in beside]
     headings += [f"difference to {baseline}", "verdict"] if results.against_baseline else []
     headings += ["captures in total"] if captures else []
     lines = []
@@ -173,7 +174,7 @@ def rows(results: Results) -> Markdown | None:
         for label in _ordered(results, condition):
             row, test = results.row(label, condition), tested(results, label, condition)
             line = [counted(results, label, condition), *([condition] if many else []), results.headline.in_row(row)]
-            line += [score.mean_in(row) for score in results.beside]
+            line += [score.mean_in(row) for score in beside]
             if results.against_baseline:
                 line += (
                     _compared(results, label, condition) if test else ["baseline" if label == baseline else "–", "–"]

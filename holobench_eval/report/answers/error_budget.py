@@ -6,20 +6,24 @@ from collections.abc import Iterator
 
 from ..data.error_budget import Budget, Part, budgets
 from ..data.results import Results
+from ..data.scores import Score
 from ..data.statistics import Estimate
 from ..data.text import percent, words
 from ..markdown import Markdown, table
 from .kind import Kind
+from .prediction import controlled
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """A sentence a display: what the image-domain predictions, then all of them, explain, and what remains."""
+    """What explains most, and who leads by control; then a sentence a display: what the image-domain predictions, then
+    all of them, explain, and what remains."""
     found = budgets(results)
     if not found:
         yield "No display has the scores of all methods for all targets, so none has a budget."
         return
     largest = [f"on {budget.condition} {_most(budget)}" for budget in found]
     yield f"What explains most of the squared error: {'; '.join(largest)}."
+    yield from controlled(results)
     for budget in found:
         yield _reading(budget)
 
@@ -57,7 +61,8 @@ def _interval(found: Estimate) -> str:
 
 
 def rows(results: Results) -> Markdown | None:
-    """A row a display and part: its share, what removing it and all above it would gain, what it leaves by itself."""
+    """A row a display and part: its share, what removing it and all above it would gain, what it leaves by itself, and
+    the control of its model."""
     lines = [
         [
             budget.condition,
@@ -65,12 +70,19 @@ def rows(results: Results) -> Markdown | None:
             _percent(part),
             _interval(part.gain) if part.gain else "–",
             percent(part.alone),
+            *(_control(results, score, part, budget.condition) for score in results.control),
         ]
         for budget in budgets(results)
         for part in budget.parts
     ]
     columns = ["display", "explained by", "share of the squared error [%]", "PSNR gained, with all above [dB]"]
-    return table([*columns, "left by it alone [%]"], lines) if lines else None
+    columns += ["left by it alone [%]", *(score.heading for score in results.control)]
+    return table(columns, lines) if lines else None
+
+
+def _control(results: Results, score: Score, part: Part, condition: str) -> str:
+    is_model = part.label in results.methods(condition)
+    return score.in_row(results.row(part.label, condition)) if is_model else "–"
 
 
 KIND = Kind(

@@ -1,9 +1,15 @@
-"""Prediction (paper Table 1): which network predicts the captures of a display best, and is any better than none?"""
+"""Prediction (paper Table 1): which network predicts the captures of a display best, and is any better than none?
+
+Where the study measures control, also which one answers a change of the hologram as the display does: that is what a
+method needs that optimises through a network.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
+from ...metrics.control import MOST
 from ..data.phrases import short, tested, value, verdict
 from ..data.results import Results
 from ..data.text import words
@@ -12,9 +18,11 @@ from .kind import Kind, subjects
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """The best, the named ones against the baseline, the published order, and who predicts worse than no network."""
+    """The best, the named ones against the baseline, control, the published order, and who predicts worse than no
+    network."""
     yield from _against(results)
     yield best(results)
+    yield from controlled(results)
     yield from reported(results)
     yield from _untrained(results)
     yield from floor(results)
@@ -30,6 +38,22 @@ def _against(results: Results) -> Iterator[str]:
         baseline = str(results.layout.baseline)
         found = "; ".join(f"{name}: {words(labels)}" for name, labels in parts.items())
         yield f"Compared with {baseline}, which has {value(results, baseline, condition)} on {condition}: {found}."
+
+
+def controlled(results: Results) -> Iterator[str]:
+    """Who leads by control on each display, before the one that predicts best, else before the next."""
+    parts = []
+    for score, condition in itertools.product(results.control, results.conditions):
+        ranking, predicting = results.ranking(condition, score.key), results.ranking(condition)[:1]
+        own = {label: score.number(float(results.values(label, condition, score.key).mean())) for label in ranking}
+        others = [f", before {label}, which predicts best, with {own[label]}" for label in predicting if label in own]
+        if predicting == ranking[:1]:
+            others = [f", before {label} with {own[label]}" for label in ranking[1:2]]
+        for first in ranking[:1]:
+            most = score.number(float(results.values(first, condition, MOST).mean()))
+            parts.append(f"{first} leads on {condition} with {own[first]} of {most} that noise allows{''.join(others)}")
+    if parts:
+        yield f"By control, what a model answers of a change on the display (1: all of it), {'; '.join(parts)}."
 
 
 def reported(results: Results) -> Iterator[str]:

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...core.errors import UserError, suggest
+from ...metrics import control
 from ...study.plan import FLOORS, REFERENCE, is_reference, reference_of
 from .categories import CATEGORIES, FLOOR, OFFLINE, ORACLE
 from .layout import Layout
@@ -19,7 +20,7 @@ from .statistics import Array, Estimate, PairedTest, family_p, mean_interval, ra
 from .tables import DONE, clusters_in, per_target, score_columns, table_from_records
 
 # Metrics of the main table besides the headline.
-LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd")
+LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd", control.NAME)
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,11 @@ class Results:
         if self.headline.metric != "psnr" or structure not in keys:
             return []
         return [parse(key) for key in (structure, "brightness_ratio") if key in keys]
+
+    @cached_property
+    def control(self) -> list[Score]:
+        """The score of control, in a list; none where no record has it."""
+        return [score for score in self.scores if score.key == control.NAME]
 
     @cached_property
     def blur_scores(self) -> list[Score]:

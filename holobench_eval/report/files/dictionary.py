@@ -38,6 +38,14 @@ _KEYS = {
     "unexplained_by_ideal_image": ("The same that the ideal image of the hologram leaves", _WHITE),
     "unexplained": ("The same that the method's prediction leaves", _WHITE),
     "unexplained_but_noise": ("The same that the picture without temporal noise would leave", _WHITE),
+    "control": ("Mean of the scores of control of the three changes", ""),
+    "control_half": (
+        "1 - squared error of the model's answer over the display's squared, if half of the picture loses its light",
+        "",
+    ),
+    "control_patch": ("The same, if a patch of the picture becomes white, or black where it was bright", ""),
+    "control_phase": ("The same, if the phase in the middle of the panel moves by 0.5 rad rms", ""),
+    "control_most": ("The mean that noise allows a perfect model, from a second capture", ""),
     "error_of_ideal_image": ("Squared error of the ideal image against the target", _WHITE),
 }
 _VARIANTS = {

@@ -17,7 +17,7 @@ from ..store import Record
 from . import error_budget, focus, picture, prediction
 from .job import Job, Measure, Measured
 from .reference import guarded
-from .scores import kept_capture
+from .scores import is_kept
 
 MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
     "picture": picture.picture,
@@ -39,10 +39,11 @@ def work(job: Job) -> list[Record]:
     """Compute and write the wanted records of a task. A failure of a cell becomes a failed record, never an error.
 
     A cell that waits for a photograph (``Pending``) gets no record. One that lacks a score alone is scored from its
-    kept capture; where none is kept, its phase is photographed again.
+    kept capture; where none is kept, or the score needs more captures, its phase is photographed again.
     """
+    metrics = job.setting.metrics
     with repeatable(job.setting.threads, job.device):
-        kept = {identity for identity in job.unscored if kept_capture(job.store.capture(identity))}
+        kept = {cell.id for cell, _ in job.cells if cell.id in job.unscored and is_kept(cell, job.store, metrics)}
         records = [
             _recorded(job, cell, display, partial(picture.rescored, job))
             for cell, display in job.cells

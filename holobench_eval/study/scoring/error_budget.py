@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from ...core.errors import Pending
 from ...display.api import ideal_image
 from ...metrics import error_budget as budget
-from ..displays import Condition
-from ..plan import Cell
 from .job import Job, Measured
 from .picture import refuse_saturated
-from .prediction import Foreseen, compared, shown
+from .prediction import AGAIN, Foreseen, ask, compared, further, shown
 
 
 def error_budget(job: Job) -> Measured:
     """Predict the capture of a hologram, and compare what leaves how much of it unexplained: the target, the hologram's
     ideal image, the prediction, and a second capture, which has the noise alone; see ``metrics.error_budget``."""
     cell, display = job.task.cells[0], job.task.conditions[0]
-    _ask_for_both(job, cell, display)
+    ask(job, cell, display, dict.fromkeys(("", AGAIN, *further(job))))
 
     def scores(seen: Foreseen) -> dict[str, float]:
-        _, again = shown(job, cell, display, again=True)
+        _, again = shown(job, cell, display, AGAIN)
         refuse_saturated(again)
         ideal, capture = ideal_image(seen.hologram.phase, display.spec), seen.capture.image
         return {
@@ -31,15 +28,3 @@ def error_budget(job: Job) -> Measured:
         }
 
     return compared(job, scores)
-
-
-def _ask_for_both(job: Job, cell: Cell, display: Condition) -> None:
-    """Have both photographs of a bench that other software drives asked for in one round, before any training."""
-    waiting: Pending | None = None
-    for again in (False, True):
-        try:
-            shown(job, cell, display, again)
-        except Pending as error:
-            waiting = error
-    if waiting is not None:
-        raise waiting

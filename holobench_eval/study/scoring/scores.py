@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,23 +15,32 @@ from torch import Tensor
 from ...core import plugins
 from ...core.errors import CellError
 from ...core.io import sealed, unsealed, write_atomically
-from ...metrics import match, score
+from ...metrics import control, match, score
 from ...metrics.psnr import psnr
 from ...metrics.ssim import RADIUS, LocalStatistics
 from .. import identity
 from ..focal_stacks import INFOCUS, SCORES
 from ..plan import Cell
+from ..store import Store
 from .job import Job
 
 
-def scores_of(job: Job, cell: Cell, image: Tensor, wanted: Tensor, metrics: Mapping[str, str]) -> dict[str, Any]:
-    """The scores of an image ``(C, h, w)`` against ``wanted``, by metric. metrics: versions of those to compute."""
+def scores_of(
+    job: Job,
+    cell: Cell,
+    image: Tensor,
+    wanted: Tensor,
+    metrics: Mapping[str, str],
+    answers: Mapping[str, float] = MappingProxyType({}),
+) -> dict[str, Any]:
+    """The scores of an image ``(C, h, w)`` against ``wanted``, by metric. metrics: versions of those to compute;
+    answers: the columns of control, which no image alone has."""
     names = identity.named(metrics)
     columns = score(image, wanted, metrics=names, lpips_weights=job.setting.lpips_weights)
     if INFOCUS in metrics:
         dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
         columns |= in_focus(image, wanted, dataset.mask(cell.target, tuple(wanted.shape[-2:])))
-    return identity.grouped(columns, metrics)
+    return identity.grouped({**columns, **answers}, metrics)
 
 
 def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
@@ -73,3 +83,13 @@ def kept_capture(path: Path) -> list[Tensor]:
         return []
     values = torch.from_numpy(np.load(io.BytesIO(array), allow_pickle=False))
     return list(values) if values.ndim == 4 else [values]
+
+
+def is_kept(cell: Cell, store: Store, metrics: Mapping[str, str]) -> bool:
+    """Whether what is kept of a captured cell has all that the scores need that it lacks: control needs more captures.
+
+    metrics: versions of those that are wanted, by name.
+    """
+    record = store.read(cell.id)
+    lacking = identity.lacking(record.scores, metrics) if record else metrics
+    return not (cell.code and control.NAME in lacking) and bool(kept_capture(store.capture(cell.id)))

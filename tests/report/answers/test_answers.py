@@ -258,6 +258,36 @@ def test_predictions_are_held_against_the_published_order_and_the_ideal_image() 
     assert "the same order (22.05 dB)" in answer(same)
 
 
+def with_control(found: Results, values: dict[str, float]) -> Results:
+    return Results(found.frame.assign(control=found.frame["label"].map(values), control_most=0.95), found.layout)
+
+
+def test_who_leads_by_control_is_held_against_who_predicts_best_else_against_the_next() -> None:
+    values = {"old": 0.4, "new": 0.11, "poor": 0.74, "nothing": -0.2}
+    found = with_control(prediction(), values)
+    assert (
+        "poor leads on bench with 0.740 of 0.950 that noise allows, before new, which predicts best, with 0.110."
+        in answer(found)
+    )
+    header, _, first, *_ = str(kind_of(found).table(found)).splitlines()
+    assert "| control |" in header
+    assert "| 0.110 |" in first
+    best = answer(with_control(prediction(), values | {"new": 0.9}))
+    assert "new leads on bench with 0.900 of 0.950 that noise allows, before poor with 0.740." in best
+    assert "control" not in answer(prediction())
+
+
+def test_an_error_budget_gives_the_control_of_its_models_alone() -> None:
+    found = with_control(budget_of_errors.results(), {"terms": 0.5, "network": 0.1, "field": 0.9})
+    assert "field leads on ideal with 0.900 of 0.950 that noise allows, before " in answer(found)
+    rows = [line.split(" | ") for line in str(kind_of(found).table(found)).splitlines()]
+    control = {row[1]: row[-1] for row in rows if len(row) > 1}
+    assert control["explained by"].startswith("control")
+    assert control["field"].startswith("0.900")
+    assert control["the ideal image"].startswith("–")
+    assert control["temporal noise"].startswith("–")
+
+
 def test_a_learned_display_has_an_answer_of_its_own() -> None:
     found = results_of({"old": 17.0, "new": 19.0}, learned_display="bench")
     assert name_of(found) == "learned_display"
