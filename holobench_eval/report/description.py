@@ -15,6 +15,7 @@ from ..display.simulated.profile import Profile, load_profile, names
 from ..display.simulated.stages import Panel
 from ..study import isolation
 from ..study.calibration import load_calibration
+from ..study.calibration.family import names as families
 from ..study.definition import Study
 from ..study.displays import Condition
 from ..study.displays import displays as conditions
@@ -116,7 +117,7 @@ def simulated(
 def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
     measured = "simulated; the parameters are assumed or from data sheets, and none was measured on a real panel"
-    if profile.name in names(family=True):
+    if profile.name in {*names(family=True), *families()}:
         return f"{measured}; drawn from ranges, and kept since its captures have published figures"
     try:
         calibration = load_calibration(profile)

@@ -129,4 +129,4 @@ def _without(report: Report) -> Iterator[str]:
             if label in subjects(report.results) and label not in same.setdefault(absent, []):
                 same[absent].append(label)
     for absent, labels in same.items():
-        yield f"Weights: {words(labels)} learned without {words(list(absent))}, which this machine has not."
+        yield f"Weights: without {words(list(absent))}, which this machine has not, learned {words(labels)}."

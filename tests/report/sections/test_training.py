@@ -274,5 +274,5 @@ def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_l
     keep(tmp_path, "hil", description=described)
     keep(tmp_path, "unet")
     text = written(records, tmp_path, question="Is HIL better than U-Net?")
-    assert "**Weights.** HIL learned without VGG-19 weights, which this machine has not." in text
+    assert "**Weights.** Without VGG-19 weights, which this machine has not, learned HIL." in text
     assert "**Weights.**" not in written(records, tmp_path, question="Is U-Net better?")
