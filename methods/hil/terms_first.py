@@ -1,8 +1,8 @@
 """HIL with what happens to any intensity in front of its network: haze, blur, shading and tone by a few numbers.
 
 It departs from Chakravarthula et al. 2020 where retrieval needs more than prediction. A network of small convolutions
-learns haze as a tone of the pixel itself: on natural images that predicts well, but the light that one half of a
-picture sends into the other is no part of it, and so no retrieval takes it away. Here a Gaussian over the panel has it.
+learns most of a haze as a tone of the pixel itself, which predicts natural images well and says little of where light
+goes. Here a Gaussian over the panel says it.
 """
 
 from __future__ import annotations
