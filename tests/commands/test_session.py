@@ -242,7 +242,7 @@ methods:
   - name: parametric_model
     params:
       patterns: 2
-      training: {rounds: 2, images: 2, refine_images: 1, steps: 4, refine_steps: 4}
+      training: {rounds: 2, images: 2, refine_images: 1, steps: 200, refine_steps: 100}
       search: {iterations: 4}
       retrieval: {iterations: 8}
 """

@@ -84,7 +84,7 @@ def test_a_display_of_one_laser_is_called_by_no_other_colour(picture: Path, caps
     assert "of one wavelength, so that targets are gray" in Path("out/report.md").read_text()
     (note,) = Path("out/captures").rglob("*.json")
     written = "".join(Path("out", name).read_text() for name in ("details.md", "columns.md", note.relative_to("out")))
-    assert "gamma = [1.1], gain = [0.95]" in written
+    assert "gamma = [1.125], gain = [1.009]" in written
     assert not re.findall(r"\b(?:red|green|R/G/B)\b", written)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from holobench_eval.methods.predictors.terms import spread
+from holobench_eval.methods.calibrated.terms import spread
 
 SHARE, REACH = 0.6, 0.2  # of the light; of the panel's height
 LEVEL = 0.3  # of the veil where the picture is as usual

@@ -41,8 +41,8 @@ def test_every_display_tells_every_quantity_of_every_colour_once_and_in_its_unit
     found = truth(SimulatedBench(load_profile(name).scaled(SMALL)))
     keys = [(one.name, one.colour) for one in found]
     assert len(keys) == len(set(keys))
-    dark = {(quantity, colour) for quantity in ("undiffracted_phase",) for colour in range(3)}
-    assert set(keys) | dark == {(quantity, colour) for quantity in QUANTITIES for colour in range(3)}
+    absent = {(quantity, colour) for quantity in ("undiffracted_phase", "stray_reach") for colour in range(3)}
+    assert set(keys) | absent == {(quantity, colour) for quantity in QUANTITIES for colour in range(3)}
     assert all(one.unit == QUANTITIES[one.name].unit and math.isfinite(one.value) for one in found)
 
 
