@@ -100,10 +100,10 @@ def _form(report: Report) -> Iterator[str]:
                 here.setdefault(effects, []).append(label)
         for effects, labels in here.items():
             same.setdefault((effects, tuple(labels)), {})[display.name] = display.effects
-    for (effects, labels), totals in same.items():
+    for (effects, fitted), totals in same.items():
         ends = dict.fromkeys((min(totals.values()), max(totals.values())))
         yield (
-            f"Inverse crime on {words(list(totals))}: the model of {words(labels)} has the bench's own form for "
+            f"Inverse crime on {words(list(totals))}: the model of {words(list(fitted))} has the bench's own form for "
             f"{len(effects)} of its {' to '.join(map(str, ends))} effects "
             f"({', '.join(name.replace('_', ' ') for name in effects)}), so a real display may suit it less."
         )
