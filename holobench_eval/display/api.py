@@ -331,11 +331,16 @@ def ideal_image(phase: Tensor, spec: DisplaySpec) -> Tensor:
     Tensor
         ``(C, h, w)`` in the region; the mean incident light on the panel is 1.
     """
+    return spec.region.crop(ideal_light(phase, spec))
+
+
+def ideal_light(phase: Tensor, spec: DisplaySpec) -> Tensor:
+    """`ideal_image` in the entire image plane, ``(C, H, W)``, the light beside the region too."""
     fields = [
         spec.propagator(channel, device=panel.device).forward(torch.polar(torch.ones_like(panel), panel))
         for channel, panel in enumerate(phase.float())
     ]
-    return spec.region.crop(torch.stack(fields)).abs().square()
+    return torch.stack(fields).abs().square()
 
 
 Fiducials = Callable[[Display, Tensor], Mapping[tuple[int, int], Tensor]]

@@ -21,6 +21,7 @@ from ..optics.zernike import NAMES, zernike
 
 MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "trefoil_y", "trefoil_x", "spherical")
 """Zernike polynomials of the estimates, see ``optics.zernike``; registration hides piston and tilts."""
+HAZELESS = 0.02  # share of haze below which its reach has no meaning
 DARK = 1e-3  # share of unmodulated light below which its phase has no meaning
 DISC_POINTS = 129  # along the diameter
 
@@ -51,6 +52,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     "undiffracted_fraction": Quantity("share of the light that no phase modulates, dead area included", "", 0.03),
     "undiffracted_phase": Quantity("phase of that light against the light at gray level 0", "rad", 0.15),
     "light": Quantity("light from the panel that the camera counts, share of the nominal", "", 0.05),
+    "stray_share": Quantity("share of the light that arrives as haze", "", 0.05),
+    "stray_reach": Quantity("standard deviation of the haze", "panel heights", 0.03),
     **{
         name: Quantity(f"Zernike {name.replace('_', ' ')}, with the curvature of the beam", "waves rms", 0.015)
         for name in MODES
@@ -105,6 +108,12 @@ def undiffracted(ratio: complex, colour: int) -> list[Estimate]:
     if share > DARK:
         estimates.append(estimate("undiffracted_phase", colour, math.atan2(ratio.imag, ratio.real)))
     return estimates
+
+
+def stray(share: float, reach: float, colour: int) -> list[Estimate]:
+    """Share and reach of the haze; the reach is left out where there is next to no haze."""
+    found = [estimate("stray_share", colour, share)]
+    return [*found, estimate("stray_reach", colour, reach)] if share > HAZELESS else found
 
 
 def disc() -> tuple[Tensor, Tensor]:

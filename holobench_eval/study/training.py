@@ -113,6 +113,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         "threads": setting.threads,
         **({"device": f"{device} ({gpu_name(device)})"} if device != CPU else {}),
         "perceptual": state.get("perceptual"),
+        "left_out": state.get("left_out"),
         "package": __version__,
         "method_sha256": method_version(type(method)),
         "reads": {**read, **ready.reads.covered},

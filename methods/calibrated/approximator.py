@@ -16,53 +16,61 @@ from ..descent import cosine_decay
 from ..learned.retrieval import Image
 from ..learned.samples import Sample
 from ..learned.weights import load_moments, refuse_other_weights
+from .terms import Haze
 
 MODEL_BETAS = (0.9, 0.99)
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Adam's first rate in every round, of the model and of the network that adds to it."""
+    """Adam's first rate in every round, of the model, of the network that adds to it and of the terms between."""
 
     model: float
     network: float = 3e-4
+    terms: float = 3e-2
 
 
 class PredictedCapture(nn.Module):
-    """What a model makes of a phase and, if there is a network, what it adds.
+    """What a model makes of a phase, what becomes of its intensity, and what a network adds in the end.
 
-    model: phase ``(C, H, W)`` [rad] to the field (complex) or the intensity (real) in the region, ``(C, h, w)``, where
-    the light on the panel is 1. network: intensity, real and imaginary part of every colour, ``(1, 3 C, h, w)``, to
-    what is added to the intensity; it needs a model that gives a field.
+    model: phase ``(C, H, W)`` [rad] to the field (complex) or the intensity (real) where the light on the panel is 1:
+    in the region, ``(C, h, w)``, or by ``over_panel``, ``(C, H, W)``, where there are terms, which give the capture of
+    the region. network: what the terms give, the intensity and, of a field, its real and imaginary part,
+    ``(1, inputs C, h, w)``, to what is added to the capture; it needs terms.
     """
 
-    def __init__(self, model: nn.Module, network: nn.Module | None) -> None:
+    def __init__(self, model: nn.Module, network: nn.Module | None, terms: Haze | None = None) -> None:
         super().__init__()
-        self.model, self.network = model, network
+        self.model, self.network, self.terms = model, network, terms
 
     def forward(self, phase: Tensor, light: Tensor) -> Tensor:
         """Phase ``(C, H, W)`` [rad] to the capture ``(C, h, w)`` in the unit of ``light`` ``(C,)``."""
-        output: Tensor = self.model(phase)
-        if not output.is_complex():
-            return output / light[:, None, None]
-        field = output / light.sqrt()[:, None, None]
-        intensity = squared_modulus(field)
+        white = light[:, None, None]
+        output: Tensor = self.model(phase) if self.terms is None else self.model.over_panel(phase)
+        if output.is_complex():
+            output = output / white.sqrt()
+            seen = [squared_modulus(output), output.real, output.imag]
+        else:
+            seen = [output / white]
+        if self.terms is None:
+            return seen[0]
+        capture: Tensor = self.terms(seen[0])
         if self.network is None:
-            return intensity
-        added: Tensor = self.network(torch.cat([intensity, field.real, field.imag])[None])[0]
-        return intensity + added
+            return capture
+        added: Tensor = self.network(torch.cat([capture, *map(self.terms.region.crop, seen)])[None])[0]
+        return capture + added
 
 
 class ModelApproximator:
-    """A model of the display and the network that adds to it, see ``CAPTURE``; both learn from one loss."""
+    """A model of the display, terms and a network, see ``PredictedCapture``; all learn from one loss."""
 
-    CAPTURE: ClassVar[type[PredictedCapture]] = PredictedCapture
     LOSS: ClassVar[str] = "l1"
 
-    def __init__(self, model: nn.Module, network: nn.Module | None, rates: Rates) -> None:
-        self.model, self.network = model, network
-        self._capture = self.CAPTURE(model, network)
-        self._learners = [(model, rates.model), *([] if network is None else [(network, rates.network)])]
+    def __init__(self, model: nn.Module, network: nn.Module | None, rates: Rates, terms: Haze | None = None) -> None:
+        self.model, self.network, self.terms = model, network, terms
+        self._capture = PredictedCapture(model, network, terms)
+        given = ((model, rates.model), (network, rates.network), (terms, rates.terms))
+        self._learners = [(module, rate) for module, rate in given if module is not None]
         self.to(torch.device("cpu"))
 
     def to(self, device: torch.device) -> Self:
@@ -106,12 +114,16 @@ class ModelApproximator:
 
     def learned(self) -> dict[str, Any]:
         """What phase retrieval needs."""
-        network = None if self.network is None else self.network.state_dict()
-        return {"model": self.model.state_dict(), "network": network}
+        return {name: None if module is None else module.state_dict() for name, module in self._parts.items()}
 
     def load_learned(self, weights: Mapping[str, Any]) -> None:
         """UserError for the weights of another network."""
         with refuse_other_weights():
-            self.model.load_state_dict(weights["model"])
-            if self.network is not None:
-                self.network.load_state_dict(weights["network"])
+            for name, module in self._parts.items():
+                if module is not None:
+                    module.load_state_dict(weights[name])
+
+    @property
+    def _parts(self) -> dict[str, nn.Module | None]:
+        terms = {} if self.terms is None else {"terms": self.terms}
+        return {"model": self.model, "network": self.network, **terms}

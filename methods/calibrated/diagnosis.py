@@ -10,20 +10,20 @@ import torch
 from torch import Tensor
 
 from ...display.api import DisplaySpec
-from ...display.estimates import Estimate, disc, estimate, focusing, reach, stroke, undiffracted, zernike_waves
+from ...display.estimates import Estimate, disc, estimate, focusing, reach, stray, stroke, undiffracted, zernike_waves
 from ...optics.phase import TAU
 from ...optics.zernike import NAMES, zernike
 from .display_model import FORM, KNOTS, MODES, DisplayModel, enlarged
 
 
 class Diagnosed:
-    """A trained method whose state ``model`` is that of a ``DisplayModel``."""
+    """A trained method whose state ``model`` is that of a ``DisplayModel``, and ``terms`` that of a ``Haze``."""
 
     form: ClassVar[frozenset[str]] = FORM
 
     def estimates(self, learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
         """What the model that was learned says of the display ``spec``."""
-        return diagnose(learned["model"], spec)
+        return [*diagnose(learned["model"], spec), *haze(learned["terms"])]
 
 
 @torch.no_grad()
@@ -46,6 +46,12 @@ def diagnose(state: Mapping[str, Tensor], spec: DisplaySpec) -> list[Estimate]:
         for colour in range(len(spec.wavelengths))
         for value in (*_panel_estimates(model, colour), *_optics_estimates(model, colour))
     ]
+
+
+def haze(state: Mapping[str, Tensor]) -> list[Estimate]:
+    """Share and reach of the haze in the state of a ``Haze``."""
+    pairs = zip(state["share"].sigmoid().tolist(), state["reach"].exp().tolist(), strict=True)
+    return [value for colour, (share, reach) in enumerate(pairs) for value in stray(share, reach, colour)]
 
 
 def _panel_estimates(model: DisplayModel, colour: int) -> list[Estimate]:

@@ -34,11 +34,15 @@ GAIN_GRID, SOURCE_GRID = 4, 24
 # Zernike polynomials of the aberration, see optics.zernike.
 MODES = ("defocus", "astigmatism_45", "astigmatism_0", "coma_y", "coma_x", "spherical")
 FIRST_CROSSTALK = 0.3
-# Effects (Profile.effects) that the model has a term for. All others of a bench lie outside its form:
-# fringes, of which SOURCE_GRID follows the coarser ones alone, and the light from between the pixels as far as it is
-# not simply unmodulated, are among them.
+# Effects (Profile.effects) that the model, with its haze (terms.py), has a term for. All others of a bench lie outside
+# its form: fringes, of which SOURCE_GRID follows the coarser ones alone, and the light from between the pixels as far
+# as it is not simply unmodulated, are among them.
 FORM = frozenset(
-    {"blaze", "look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift", *MODES}
+    {
+        *("blaze", "look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift"),
+        *MODES,
+        "stray_light",
+    }
 )
 
 
@@ -77,7 +81,7 @@ class DisplayModel(nn.Module):
         self.undiffracted = nn.Parameter(torch.zeros(channels, 2))
         self.aberration = nn.Parameter(torch.zeros(channels, len(MODES)))
         self.brightness = nn.Parameter(torch.zeros(channels))
-        self.register_buffer("modes", pupil_modes(spec.region.shape, spec.pupil), persistent=False)
+        self.register_buffer("modes", pupil_modes(spec.shape, spec.pupil), persistent=False)
         self.register_buffer("ramp", blaze(spec.shape, spec.blaze) if any(spec.blaze) else None, persistent=False)
         self._held: tuple[Tensor, Maps] | None = None
 
@@ -86,14 +90,18 @@ class DisplayModel(nn.Module):
 
     def forward(self, phase: Tensor) -> Tensor:
         """Field ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]; its intensity is in the captures' unit."""
+        return self.spec.region.crop(self.over_panel(phase))
+
+    def over_panel(self, phase: Tensor) -> Tensor:
+        """The same in the entire image plane, ``(C, H, W)``."""
         maps = self._maps()
         shown = phase if self.ramp is None else phase + self.ramp
         panel = lit(self._driven(shown) * maps.gain, maps.taps, self.spec.blaze)
         panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * maps.light
         if self.ramp is not None:  # the optical axis follows the blaze
             panel = panel * phasor(self.ramp.new_ones(()), -self.ramp)
-        region = [self.spec.region.crop(self._propagator(c).forward(field)) for c, field in enumerate(panel)]
-        return torch.fft.ifft2(torch.fft.fft2(torch.stack(region)) * maps.pupil) * maps.amplitude
+        plane = torch.stack([self._propagator(colour).forward(field) for colour, field in enumerate(panel)])
+        return torch.fft.ifft2(torch.fft.fft2(plane) * maps.pupil) * maps.amplitude
 
     def _maps(self) -> Maps:
         """Computed once for parameters that are constants, as in a retrieval; anew after one has changed.

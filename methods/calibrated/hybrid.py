@@ -15,10 +15,11 @@ from ...display.estimates import Estimate
 from ...optics.phasor import phasor
 from ..learned.weights import seeded
 from .approximator import ModelApproximator, Rates
-from .diagnosis import Diagnosed, diagnose
+from .diagnosis import Diagnosed
 from .display_model import FORM, DisplayModel
 from .method import Calibrated
 from .networks import ColourByColour
+from .terms import Haze
 
 
 class FinePanel(DisplayModel):
@@ -37,15 +38,15 @@ class FinePanel(DisplayModel):
 
 
 class Residual(nn.Module):
-    """Intensity, real and imaginary part ``(1, 3 C, h, w)`` to what is added to the intensity, ``(1, C, h, w)``."""
+    """Capture so far, intensity, real and imaginary part ``(1, 4 C, h, w)`` to what is added, ``(1, C, h, w)``."""
 
     def __init__(self, colours: int, width: int) -> None:
         super().__init__()
-        self.network = ColourByColour(colours, 3, 1, width)
+        self.network = ColourByColour(colours, 4, 1, width)
 
     def forward(self, seen: Tensor) -> Tensor:
         """See the class."""
-        added: Tensor = self.network(seen.view(3, -1, *seen.shape[-2:]).transpose(0, 1))
+        added: Tensor = self.network(seen.view(4, -1, *seen.shape[-2:]).transpose(0, 1))
         return added.transpose(0, 1)
 
 
@@ -61,17 +62,20 @@ class HybridModel(Diagnosed, Calibrated):
         Features of the network.
     """
 
+    patterns: Annotated[int, Interval(ge=0, le=1000)] = 9  # and three dark ones
     width: Annotated[int, Interval(ge=2, le=256)] = 16
 
     RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
+    version: ClassVar[int] = 4
     form: ClassVar[frozenset[str]] = FORM | {"fringes", "panel_dust", "roughness"}
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """A display as the nominal model says."""
         with seeded("hybrid_model", self.seed):
             residual = Residual(len(spec.wavelengths), self.width)
-        return ModelApproximator(FinePanel(spec), residual, self.RATES)
+        return ModelApproximator(FinePanel(spec), residual, self.RATES, Haze(spec))
 
     def estimates(self, learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
         """Those of the ``DisplayModel``; what map and network took over is not among them."""
-        return diagnose({name: value for name, value in learned["model"].items() if name != "fine"}, spec)
+        model = {name: value for name, value in learned["model"].items() if name != "fine"}
+        return super().estimates({**learned, "model": model}, spec)

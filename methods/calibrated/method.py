@@ -19,11 +19,11 @@ from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
-from ..learned.retrieval import SquaredErrorRetrieval, check_region, lpips_weights, retrieve
+from ..learned.retrieval import SquaredErrorRetrieval, left_out, lpips_weights, retrieve
 from ..learned.samples import Sample, Schedule, Steps
 from ..wirtinger import Wirtinger
 from .approximator import ModelApproximator
-from .patterns import pattern_samples
+from .patterns import dark_samples, pattern_samples
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ThroughModel(ABC):
     training : Schedule
         How the display is learned: Algorithm 1.
     retrieval : LargeSteps
-        Of every hologram, through what was learned: Eq. 22, of which the squared error alone is used.
+        Of every hologram, through what was learned: Eq. 22, of which by default the squared error alone is used.
     search : SearchRetrieval
         The same while the display is learned, in the rounds after the first.
     start : Wirtinger
@@ -93,25 +93,27 @@ class ThroughModel(ABC):
         Returns
         -------
         mapping
-            What `solve` and `predict` need: the parameters of the model, and whether Wirtinger holography was better.
+            What `solve` and `predict` need: the parameters of the model, and whether Wirtinger holography was better;
+            ``left_out``, what of the retrieval's loss the region is too small for.
 
         Raises
         ------
         BudgetError
             When no capture is left.
         """
-        check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec).to(bench.device)
         start, search = partial(hologram, self.start, bench=bench), partial(retrieve, settings=self.search)
-        train(bench, approximator, start, search, self.training, self._earlier(bench))
+        dark = dark_samples(bench) if approximator.terms else []
+        train(bench, approximator, start, search, self.training, [*self._earlier(bench), *dark])
 
         def solve(image: TrainingImage) -> Tensor:
             return retrieve(approximator.image(bench.light(image)), image.target, start(image), self.retrieval)
 
-        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve)}
+        lacks = left_out(bench.spec.region.shape, self.retrieval)
+        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve), "left_out": lacks}
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
-        """Samples that every round learns from, beside its own."""
+        """Samples that every round learns from, beside its own and, of a model with terms, those of dark patterns."""
         return ()
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:

@@ -1,11 +1,17 @@
-"""Speckle-like patterns: holograms of nothing, whose captures tell what a panel does to a phase.
+"""Patterns: holograms whose captures tell what no natural image tells.
+
+Speckle-like ones are holograms of nothing, and tell what a panel does to a phase.
 
 Natural holograms are smooth and their images mostly follow from the ideal model. A random phase visits every level of
 the look-up table in every neighbourhood, and its speckle carries every spatial frequency, so that a dozen captures
 tell look-up table, phase gain, crosstalk, unmodulated light and aberrations apart.
+
+Dark ones are lit for a part only. Haze lights what no hologram lights, and there alone differs from tone.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -13,6 +19,7 @@ from torch.nn import functional
 
 from ...display.training import TrainingBench, TrainingImage
 from ..learned.samples import Sample, captured
+from ..wirtinger import Wirtinger
 
 # Correlation lengths [px] that the patterns go through in turn: wraps from everywhere to a few long edges.
 LENGTHS = (2.0, 4.0, 8.0, 16.0)
@@ -32,6 +39,25 @@ def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
         for length, draw in zip(lengths, draws, strict=True)
     ]
     return list(captured(bench, [f"pattern {number}" for number in numbers], phases, images, "pattern"))
+
+
+def dark_samples(bench: TrainingBench) -> list[Sample]:
+    """Wirtinger holograms of the `dark_patterns`, one capture each."""
+    white = torch.ones(len(bench.spec.wavelengths), *bench.spec.region.shape, device=bench.device)
+    images = [TrainingImage(name, white * light) for name, light in dark_patterns(white[0]).items()]
+    phases = [bench.solved(Wirtinger(), image) for image in images]
+    grays = [TrainingImage(image.item, white * image.target.mean()) for image in images]  # of the same light
+    shots = captured(bench, [f"dark {image.item}" for image in images], phases, grays, "dark")
+    return [replace(sample, target=image.target) for sample, image in zip(shots, images, strict=True)]
+
+
+def dark_patterns(like: Tensor) -> dict[str, Tensor]:
+    """Linear light ``(h, w)`` of three patterns that are dark for the most part, on the device of ``like``."""
+    height, width = like.shape
+    y, x = torch.meshgrid(torch.arange(height) / height, torch.arange(width) / width, indexing="ij")
+    square = (y - 0.5).abs().maximum((x - 0.5).abs()) < 0.2
+    lit = {"left half": x < 0.5, "upper half": y < 0.5, "square": square}
+    return {name: pattern.to(like) for name, pattern in lit.items()}
 
 
 def random_phase(colours: int, shape: tuple[int, int], length: float, draw: torch.Generator) -> Tensor:

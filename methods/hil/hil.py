@@ -21,7 +21,7 @@ from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
-from ..learned.retrieval import Image, PhaseRetrieval, check_region, lpips_weights, retrieve
+from ..learned.retrieval import Image, PhaseRetrieval, left_out, lpips_weights, retrieve
 from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
@@ -95,16 +95,13 @@ class HIL:
         -------
         mapping
             What `solve` and `predict` need: the weights of D and of the critic, and whether Wirtinger holography was
-            better.
+            better; ``left_out``, the terms of the retrieval's loss that the region is too small for.
 
         Raises
         ------
-        UserError
-            For a region too small for a term of the retrieval's loss.
         BudgetError
             When no capture is left.
         """
-        check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec).to(bench.device)
         start, minimise = partial(hologram, self.start, bench=bench), partial(self._retrieve, approximator)
         train(bench, approximator, start, minimise, self.training)
@@ -112,7 +109,8 @@ class HIL:
         def solve(image: TrainingImage) -> Tensor:
             return minimise(approximator.image(bench.light(image)), image.target, start(image))
 
-        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve)}
+        lacks = left_out(bench.spec.region.shape, self.retrieval)
+        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve), "left_out": lacks}
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phases of least loss (Eq. 22) in the captures that the approximator predicts.

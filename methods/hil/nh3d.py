@@ -22,7 +22,7 @@ from ...display.training import TrainingBench, TrainingImage
 from ..learned.algorithm import train
 from ..learned.fallback import WIRTINGER, fell_back
 from ..learned.method import frozen, hologram, predicted
-from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, lpips_weights, retrieve
+from ..learned.retrieval import Image, SquaredErrorRetrieval, lpips_weights, retrieve
 from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
 from .approximator import NetworkApproximator
@@ -77,7 +77,6 @@ class HILNH3D:
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
         """Train the network on captures of the display; parameters, result and errors as in `HIL.prepare`."""
-        check_region(bench.spec.region.shape, self.retrieval)
         approximator = self.approximator(bench.spec).to(bench.device)
         start = partial(hologram, self.start, bench=bench)
         train(bench, approximator, start, self._retrieve, self.training)

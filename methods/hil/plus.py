@@ -8,8 +8,9 @@ what a look-up table does to a wrap. Captures, rounds and retrieval are those of
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from annotated_types import Interval
 from torch import nn
 
 from ...core.errors import UserError
@@ -18,20 +19,29 @@ from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.diagnosis import Diagnosed
 from ..calibrated.display_model import DisplayModel
 from ..calibrated.method import ThroughModel
+from ..calibrated.terms import Haze
+from ..learned.samples import Schedule
 from ..learned.weights import seeded, start_at_zero
 from .networks import Network
 
 RATES = Rates(model=1e-2, network=3e-4)
 
 
-def residual_network(spec: DisplaySpec, network: Network, seed: int) -> nn.Module:
-    """A generator that adds to the prediction of a display model and starts at zero.
+def residual_network(spec: DisplaySpec, network: Network, inputs: int, seed: int) -> nn.Module:
+    """A generator that adds to the prediction of a model and starts at zero; inputs: images a colour that it sees.
 
     The physics is learned first, and the network learns what it leaves.
     """
     channels = len(spec.wavelengths)
     with seeded("residual network", seed):
-        return start_at_zero(network.generator(3 * channels, channels))
+        return start_at_zero(network.generator(inputs * channels, channels))
+
+
+@dataclass(frozen=True)
+class MostImages(Schedule):
+    """That of `hil`, of whose 48 captures in the first round three are of dark patterns."""
+
+    images: Annotated[int, Interval(ge=1)] | None = 45
 
 
 @dataclass(frozen=True)
@@ -48,16 +58,18 @@ class HILPlus(Diagnosed, ThroughModel):
         images (22.09 dB without, 21.90 dB with it after a first round of 64 captures).
     """
 
+    training: MostImages = MostImages()
     network: Network | None = None
 
-    version: ClassVar[int] = 5
+    version: ClassVar[int] = 6
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """The display model, untrained, with a network if there is one; UserError for a network with dropout."""
         if self.network is None:
-            return ModelApproximator(DisplayModel(spec), None, RATES)
+            return ModelApproximator(DisplayModel(spec), None, RATES, Haze(spec))
         if self.network.dropout or self.network.name == "pix2pix":
             raise UserError(
                 "hil_plus: a residual network has no dropout, whose random numbers a resumed training lacks"
             )
-        return ModelApproximator(DisplayModel(spec), residual_network(spec, self.network, self.seed), RATES)
+        network = residual_network(spec, self.network, 4, self.seed)
+        return ModelApproximator(DisplayModel(spec), network, RATES, Haze(spec))

@@ -15,10 +15,9 @@ from annotated_types import Interval
 from torch import Tensor
 from torch.nn import functional
 
-from ...core.errors import UserError
 from ...metrics.feature_distance import SMALLEST_MOFD, FixedMofd
 from ...metrics.lpips import available, find_weights, lpips
-from ...metrics.ms_ssim import SMALLEST_MS_SSIM, FixedMsSsim
+from ...metrics.ms_ssim import EXPONENTS, FixedMsSsim, fitting_scales
 from ...optics import srgb_encode
 from ..common import matched
 from ..descent import adam, by_autograd
@@ -35,7 +34,8 @@ Verdict = Callable[[Tensor], Tensor]
 class PhaseRetrieval:
     """Adam on the phase for Eq. 22 of Chakravarthula et al. 2020, from a start that the method chooses.
 
-    A term of weight 0 is not computed.
+    A term of weight 0 is not computed. A picture of less than 161 px on its short side has MS-SSIM at as many scales as
+    fit, and one of less than 72 px no perceptual distance.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ class PictureLoss:
     """
 
     def __init__(self, target: Tensor, settings: PhaseRetrieval, verdict: Verdict | None) -> None:
-        check_region((target.shape[-2], target.shape[-1]), settings)
         self.target, self.settings, self.verdict = target, settings, verdict
         wanted = target[None]
         encoded = srgb_encode(wanted)
-        self.structure = FixedMsSsim(wanted) if settings.ms_ssim else None
+        scales = fitting_scales((target.shape[-2], target.shape[-1]))
+        self.structure = FixedMsSsim(wanted, scales) if settings.ms_ssim and scales else None
         self.perceptual: Callable[[Tensor], Tensor] | None = None
-        if settings.perceptual:
+        if settings.perceptual and min(target.shape[-2:]) >= SMALLEST_MOFD:
             self.perceptual = FixedMofd(encoded) if available("alex") else lambda picture: lpips(picture, encoded)
 
     def __call__(self, image: Tensor) -> tuple[Tensor, Tensor]:
@@ -112,12 +112,15 @@ def lpips_weights(*settings: PhaseRetrieval) -> dict[str, Path | None]:
     return {"LPIPS weights (AlexNet)": None if available("alex") else find_weights("alex")}
 
 
-def check_region(shape: tuple[int, int], settings: PhaseRetrieval) -> None:
-    """UserError for a region that is too small for a term of the loss."""
-    for name, smallest in (("perceptual", SMALLEST_MOFD), ("ms_ssim", SMALLEST_MS_SSIM)):
-        if getattr(settings, name) and min(shape) < smallest:
-            size = " x ".join(map(str, shape))
-            raise UserError(f"retrieval: {name} needs a region of {smallest} x {smallest} px, got {size}; set it to 0")
+def left_out(shape: tuple[int, int], settings: PhaseRetrieval) -> str:
+    """What of the loss a picture ``(h, w)`` is too small for, in words; empty where it is computed entirely."""
+    missing = len(EXPONENTS) - fitting_scales(shape)
+    parts = []
+    if settings.ms_ssim and missing:
+        parts.append(f"MS-SSIM at {missing} of its {len(EXPONENTS)} scales")
+    if settings.perceptual and min(shape) < SMALLEST_MOFD:
+        parts.append("the perceptual distance")
+    return " and ".join(parts)
 
 
 def retrieve(

@@ -20,7 +20,7 @@ from ...metrics.base import gaussian_blur
 from ..hil.approximator import NetworkApproximator
 from ..hil.approximator_loss import ApproximatorLoss, vgg_weights
 from ..hil.networks import Network
-from ..learned.retrieval import Image, SquaredErrorRetrieval, check_region, lpips_weights, retrieve
+from ..learned.retrieval import Image, SquaredErrorRetrieval, lpips_weights, retrieve
 from ..learned.samples import Sample
 from .start import LEAST_SHARE, Camera, CameraStart, allowed
 
@@ -106,7 +106,6 @@ class OnlineCameraNetwork:
         CellError
             Without a camera.
         """
-        check_region(bench.spec.region.shape, self.retrieval)
         pairs = enumerate(target)
         return torch.stack([self._optimise(image, bench, len(target), index) for index, image in pairs])
 

@@ -4,80 +4,37 @@ image terms    a few numbers on the ideal intensity: shading, blur, haze and ton
 image network  the same, and a U-Net that sees the ideal intensity and adds to it
 field network  the same on the intensity of a field that interferes (`DisplayModel`), and the U-Net sees the field too
 
-Each begins as the ideal image, learns from captures of the same holograms, and has the squared error as its loss, since
-that is what is divided. So a later one can only fail to explain what an earlier one does by its training.
+Each begins as the ideal image, learns from captures of the same holograms and of dark patterns, and has the squared
+error as its loss, since that is what is divided. So a later one can only fail to explain what an earlier one does by
+its training.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...display.api import DisplaySpec, ideal_image
-from ...optics.phasor import squared_modulus
-from ..calibrated.approximator import ModelApproximator, PredictedCapture, Rates
+from ...display.api import DisplaySpec
+from ...display.training import TrainingBench
+from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.display_model import FORM, DisplayModel
 from ..calibrated.method import SearchRetrieval, ThroughModel
+from ..calibrated.patterns import dark_samples
+from ..calibrated.terms import IdealImage, ImageTerms
 from ..hil.networks import Network
-from ..learned.samples import Schedule, Steps
+from ..learned.samples import Sample, Schedule, Steps
 from ..learned.weights import seeded, start_at_zero
 from ..wirtinger import Wirtinger
-from .terms import ImageTerms
-
-
-class IdealImage(nn.Module):
-    """Phase ``(C, H, W)`` [rad] to the intensity ``(C, h, w)`` of the nominal model; nothing to learn."""
-
-    def __init__(self, spec: DisplaySpec) -> None:
-        super().__init__()
-        self.spec = spec
-
-    def forward(self, phase: Tensor) -> Tensor:
-        """See the class."""
-        return ideal_image(phase, self.spec)
-
-
-class WithTerms(nn.Module):
-    """Light in the region, an intensity (real) or a field (complex), and what then happens to its intensity."""
-
-    def __init__(self, light: nn.Module, spec: DisplaySpec) -> None:
-        super().__init__()
-        self.light = light
-        self.terms = ImageTerms(len(spec.wavelengths), spec.region.shape)
-
-
-class TermsCapture(PredictedCapture):
-    """The terms of a `WithTerms`, and what a network adds; it sees what they see, and the outcome."""
-
-    model: WithTerms
-
-    def forward(self, phase: Tensor, light: Tensor) -> Tensor:
-        """See the base."""
-        white = light[:, None, None]
-        output: Tensor = self.model.light(phase)
-        if output.is_complex():
-            field = output / white.sqrt()
-            intensity = squared_modulus(field)
-            seen = [intensity, field.real, field.imag]
-        else:
-            intensity = output / white
-            seen = [intensity]
-        capture: Tensor = self.model.terms(intensity)
-        if self.network is None:
-            return capture
-        added: Tensor = self.network(torch.cat([capture, *seen])[None])[0]
-        return capture + added
 
 
 class SquaredErrorApproximator(ModelApproximator):
-    """`ModelApproximator` of a `WithTerms` by the squared error."""
+    """`ModelApproximator` by the squared error."""
 
-    CAPTURE: ClassVar[type[PredictedCapture]] = TermsCapture
     LOSS: ClassVar[str] = "l2"
 
     def error(self, predicted: Tensor, capture: Tensor) -> Tensor:
@@ -90,7 +47,7 @@ class OneRound(Schedule):
     """Captures of the start alone: what is learned is asked about holograms of the same kind."""
 
     rounds: Annotated[int, Interval(ge=1, le=1)] = 1
-    steps: Steps = 600
+    steps: Steps = 1000
 
 
 @dataclass(frozen=True)
@@ -106,7 +63,11 @@ class NestedPrediction(ThroughModel):
     start: Wirtinger = Wirtinger(iterations=50)
 
     RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = 2
+
+    def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
+        """Dark patterns are learned from as often as eight images each: natural ones confound haze with tone."""
+        return 7 * dark_samples(bench)
 
     @abstractmethod
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
@@ -124,7 +85,7 @@ class ImageTermsModel(NestedPrediction):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
-        return SquaredErrorApproximator(WithTerms(IdealImage(spec), spec), None, self.RATES)
+        return SquaredErrorApproximator(IdealImage(spec), None, self.RATES, ImageTerms(spec))
 
 
 @dataclass(frozen=True)
@@ -133,7 +94,7 @@ class ImageNetwork(NestedPrediction):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
-        return SquaredErrorApproximator(WithTerms(IdealImage(spec), spec), self._network(spec, 2), self.RATES)
+        return SquaredErrorApproximator(IdealImage(spec), self._network(spec, 2), self.RATES, ImageTerms(spec))
 
 
 @dataclass(frozen=True)
@@ -144,4 +105,4 @@ class FieldNetwork(NestedPrediction):
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
-        return SquaredErrorApproximator(WithTerms(DisplayModel(spec), spec), self._network(spec, 4), self.RATES)
+        return SquaredErrorApproximator(DisplayModel(spec), self._network(spec, 4), self.RATES, ImageTerms(spec))

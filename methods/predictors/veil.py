@@ -15,14 +15,15 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ...display.api import Region
+from ...display.api import Region, ideal_light
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench, TrainingImage
+from ..calibrated.patterns import dark_patterns
+from ..calibrated.terms import spread
 from ..common import TINY, Offset, nominal_model, per_channel, unit_field, with_offset
 from ..descent import adam, by_autograd
 from ..losses import intensity_l2
 from ..wirtinger import Wirtinger
-from .terms import spread
 
 REACHES = tuple(2 ** (step / 8) / 64 for step in range(49))  # panel heights, 1/64 to 1
 SHARES = 200  # from 0 to 1 that are tried
@@ -76,7 +77,7 @@ class WirtingerVeil:
         """
         spec = bench.spec
         gray = torch.full((len(spec.wavelengths), *spec.region.shape), 0.5, device=bench.device)
-        images = [TrainingImage(name, light.expand_as(gray)) for name, light in patterns(gray[0]).items()]
+        images = [TrainingImage(name, light.expand_as(gray)) for name, light in dark_patterns(gray[0]).items()]
         phases = [bench.solved(Wirtinger(), image) for image in images]
         shots = [
             (phase, TrainingImage(image.item, gray), ("veil",)) for phase, image in zip(phases, images, strict=True)
@@ -87,7 +88,7 @@ class WirtingerVeil:
             return {"captures": torch.stack([bench.photograph(phase, image, *names) for phase, image, names in shots])}
 
         captures = bench.kept("captures", photographed)["captures"]
-        ideal = torch.stack([_intensities(phase, bench) for phase in phases])
+        ideal = torch.stack([ideal_light(phase, spec) for phase in phases])
         share, reach = fitted(ideal, captures, spec.region)
         bench.log(round=1, step=1, share=share, reach=reach)
         return {"share": share, "reach": reach}
@@ -127,15 +128,6 @@ class WirtingerVeil:
         return per_channel(target, retrieve)
 
 
-def patterns(like: Tensor) -> dict[str, Tensor]:
-    """Linear light ``(h, w)`` of three patterns that are dark for the most part, on the device of ``like``."""
-    height, width = like.shape
-    y, x = torch.meshgrid(torch.arange(height) / height, torch.arange(width) / width, indexing="ij")
-    square = (y - 0.5).abs().maximum((x - 0.5).abs()) < 0.2
-    found = {"left half": x < 0.5, "upper half": y < 0.5, "square": square}
-    return {name: pattern.to(like) for name, pattern in found.items()}
-
-
 def veiled(intensity: Tensor, share: float, reach: float) -> Tensor:
     """An intensity ``(..., H, W)`` with its veil; it is dark beyond the picture."""
     return (1 - share) * intensity + share * _veil(intensity, reach)
@@ -167,13 +159,3 @@ def _veil(intensity: Tensor, reach: float) -> Tensor:
     height, width = intensity.shape[-2:]
     rows, columns = (spread(side, intensity.new_full((1,), reach * height))[0] for side in (height, width))
     return rows @ intensity @ columns.mT
-
-
-def _intensities(phase: Tensor, bench: TrainingBench) -> Tensor:
-    """Intensity ``(C, H, W)`` of the nominal model, the light beside the region too."""
-    return torch.stack(
-        [
-            bench.spec.propagator(channel, device=phase.device).forward(unit_field(panel)).abs().square()
-            for channel, panel in enumerate(phase)
-        ]
-    )

@@ -165,6 +165,7 @@ TRAINED: dict[str, dict[str, Any]] = {
     "hil": STEPS | {"network": SMALL | {"dropout": True}, "training": SHORT, "fallback": True},
     "hil_tuned": STEPS | {"network": SMALL, "training": SHORT, "offsets": 2},
     "hil_nh3d": STEPS | {"network": {"name": "unet", "levels": 2, "width": 4}, "training": SHORT | {"rounds": 1}},
+    "hil_terms": STEPS | {"network": SMALL | {"name": "unet"}, "training": SHORT, "search": {"iterations": 1}},
     "hil_plus": STEPS | {"network": SMALL, "training": SHORT, "search": {"iterations": 1}},
     "parametric_model": STEPS | {"training": SHORT, "patterns": 1, "search": {"iterations": 1}},
     "learned_kernel": STEPS | {"training": SHORT, "search": {"iterations": 1}},

@@ -57,6 +57,7 @@ QUICK: dict[str, dict[str, Any]] = {
         "start": _EARLY,
     },
     "hil_plus": {"network": _SMALL, **_CALIBRATED},
+    "hil_terms": {"network": {**_SMALL, "name": "unet"}, **_CALIBRATED},
     **{key: {**_CALIBRATED, "patterns": 2} for key in ("parametric_model", "learned_kernel")},
     **{key: {**_CALIBRATED, "patterns": 2, "width": 4} for key in ("cnn_prop_cnn", "hybrid_model")},
     **{

@@ -8,7 +8,7 @@ import torch
 
 from ...optics.angular_spectrum import angular_spectrum_phase
 from ...optics.convolution import iris
-from ..estimates import MODES, Estimate, disc, estimate, focusing, reach, stroke, undiffracted, zernike_waves
+from ..estimates import MODES, Estimate, disc, estimate, focusing, reach, stray, stroke, undiffracted, zernike_waves
 from .pipeline import SimulatedBench
 
 LEVELS = 17  # gray levels at which the stroke is read, the two at the wrap left out
@@ -21,6 +21,7 @@ def truth(bench: SimulatedBench) -> list[Estimate]:
     undiffracted: zero order and dead area together, as far as the iris lets them pass.
     light: power from the panel, modulated and unmodulated, after dust and laser drift, times the mean response of the
     sensor's pixels.
+    stray: share and reach of the stage.
     Zernikes: aberration, and errors of distance and wavelength, over the iris, and the second order of the beam's
     phase as ``estimates.focusing`` has it.
     """
@@ -42,6 +43,7 @@ def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
         estimate("crosstalk", colour, profile.crosstalk.width * math.sqrt(profile.crosstalk.ratio)),
         *undiffracted(unmodulated / modulated * _passed(bench), colour),
         estimate("light", colour, light * float(bench.response.mean())),
+        *stray(profile.stray_light.share, profile.stray_light.reach, colour),
     ]
 
 

@@ -92,6 +92,8 @@ def _doubts(trainings: Sequence[Training]) -> list[str]:
             lines.append(f"Nothing is known of the training of {name}: it failed, or its log is not in this folder.")
         elif used and training.text("sha256") not in used:
             lines.append(f"The figures for {name} here and its scores come from different trainings.")
+        if lacks := training.text("left_out"):
+            lines.append(f"The region is too small for all of the retrieval's loss: {name} has it without {lacks}.")
         if outdated := training.text("in_the_place_of"):
             lines.append(f"{name} was trained anew: {outdated}.")
         if len(used) > 1:

@@ -19,6 +19,7 @@ from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.hil.terms_first import HILTerms
 from holobench_eval.methods.hil.tuned import HILTuned
 from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval
@@ -45,6 +46,7 @@ METHODS: dict[str, Any] = {
     "hil": HIL(SMALL, ApproximatorLoss(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), **SHORT),
     "hil_tuned": HILTuned(SMALL, ApproximatorLoss(l1=1.0, perceptual=0.0), retrieval=PLAIN, offsets=2, **SHORT),
     "hil_nh3d": HILNH3D(Network("unet", levels=2, width=4), retrieval=PLAIN, **SHORT),
+    "hil_terms": HILTerms(retrieval=PLAIN, network=Network("unet", levels=2, width=4), **SHORT),
     "hil_plus": HILPlus(network=SMALL, retrieval=PLAIN, **SHORT),
 }
 names = pytest.mark.parametrize("name", METHODS)
@@ -224,3 +226,19 @@ def test_the_fallback_is_taken_where_wirtinger_holograms_are_captured_closer_and
     assert torch.equal(phase, Wirtinger().solve(target[None], solving_bench(worse, target, SPEC, on)))
     monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=1))
     assert not method.prepare(training_bench(SPEC, Memory(), images=2))["fell_back"]
+
+
+@pytest.mark.parametrize(
+    ("panel", "region", "lacks"),
+    [(64, 52, "MS-SSIM at 2 of its 5 scales and the perceptual distance"), (96, 78, "MS-SSIM at 2 of its 5 scales")],
+)
+def test_hil_trains_and_solves_on_a_small_panel_and_says_what_its_loss_lacks(
+    panel: int, region: int, lacks: str
+) -> None:
+    spec = small_spec(panel, region, colours=3)
+    method = replace(METHODS["hil"], retrieval=PhaseRetrieval(iterations=2, step=0.06))
+    learned = method.prepare(training_bench(spec, Memory(), images=2))
+    assert learned["left_out"] == lacks
+    target = pictures(spec, first=20)
+    phase = method.solve(target, solving_bench(method, target[0], spec, learned))
+    assert not torch.equal(phase, method.start.solve(target, solving_bench(method, target[0], spec, learned)))

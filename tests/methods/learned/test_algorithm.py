@@ -18,6 +18,7 @@ from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
 from holobench_eval.methods.hil.plus import HILPlus
 from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.hil.terms_first import HILTerms
 from holobench_eval.methods.hil.tuned import HILTuned
 from holobench_eval.methods.learned import checkpoint
 from holobench_eval.methods.learned.algorithm import train
@@ -344,6 +345,7 @@ METHODS: dict[str, Any] = {
     "hil_tuned": HILTuned(**SHORT, offsets=2),
     "hil_nh3d": HILNH3D(**{**SHORT, "network": Network("unet", levels=2, width=4)}),
     "hil_plus": HILPlus(**SHORT),
+    "hil_terms": HILTerms(**{**SHORT, "network": Network("unet", levels=2, width=4)}),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,11 +10,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from holobench_eval.core.errors import UserError
 from holobench_eval.methods.hil.critic import Critic
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.learned import retrieval
-from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval, PictureLoss, check_region, matched, retrieve
+from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval, PictureLoss, left_out, matched, retrieve
 from holobench_eval.metrics.feature_distance import mofd
 from holobench_eval.metrics.ms_ssim import ms_ssim
 from holobench_eval.optics import srgb_encode
@@ -159,15 +159,22 @@ def test_lpips_is_the_perceptual_term_where_its_weights_are_found(monkeypatch: p
     assert torch.equal(picture, srgb_encode(matched(image, target).clamp(0, 1))[None])
 
 
-@pytest.mark.parametrize(("term", "smallest"), [("perceptual", 72), ("ms_ssim", 161)])
-def test_a_region_too_small_for_a_term_is_refused_in_one_line_that_names_it(term: str, smallest: int) -> None:
-    check_region((smallest, smallest), only(term))
-    with pytest.raises(UserError) as caught:
-        retrieve(lambda phase: phase, torch.ones(1, smallest, smallest - 1), torch.zeros(1, 9, 9), only(term))
-    message = str(caught.value)
-    assert "\n" not in message
-    for words in (term, f"{smallest} x {smallest}", f"{smallest} x {smallest - 1}"):
-        assert words in message
+@pytest.mark.parametrize(
+    ("side", "lacks"),
+    [
+        (161, ""),
+        (160, "MS-SSIM at 1 of its 5 scales"),
+        (78, "MS-SSIM at 2 of its 5 scales"),
+        (52, "MS-SSIM at 2 of its 5 scales and the perceptual distance"),
+    ],
+)
+def test_a_small_picture_has_what_fits_of_the_loss_and_the_rest_is_named(side: int, lacks: str) -> None:
+    settings, target = PhaseRetrieval(), pictures(small_spec(side, side))[0]
+    assert left_out((side, side), settings) == lacks
+    assert left_out((side, side), replace(settings, perceptual=0, ms_ssim=0)) == ""
+    loss = PictureLoss(target, settings, None)
+    assert float(loss(target)[0]) == pytest.approx(0, abs=1e-4)
+    assert float(loss(target.flip(1))[0]) > 0.01
 
 
 class Bowl:

@@ -11,7 +11,8 @@ from holobench_eval.display import Profile, load_profile
 from holobench_eval.display.api import Region
 from holobench_eval.display.simulated.stages import StrayLight
 from holobench_eval.display.training import TrainingBench, TrainingImage
-from holobench_eval.methods.predictors.veil import REACHES, WirtingerVeil, fitted, patterns, veiled
+from holobench_eval.methods.calibrated.patterns import dark_patterns
+from holobench_eval.methods.predictors.veil import REACHES, WirtingerVeil, fitted, veiled
 from holobench_eval.study.opening import open_bench
 from tests.support.small_training import Memory
 
@@ -31,7 +32,7 @@ def test_a_veil_is_found_at_any_brightness_and_black_level(share: float, reach: 
 
 
 def test_most_of_every_pattern_is_dark() -> None:
-    for pattern in patterns(torch.zeros(104, 96)).values():
+    for pattern in dark_patterns(torch.zeros(104, 96)).values():
         assert set(pattern.unique().tolist()) == {0.0, 1.0}
         assert float(pattern.mean()) <= 0.5
 

@@ -42,6 +42,7 @@ REGISTRY = {
     "hil_tuned": (MAGENTA, "X"),
     "hil_nh3d": (MAGENTA, "p"),
     "hil_plus": (ORANGE, "*"),
+    "hil_terms": (MAGENTA, "*"),
     "parametric_model": (GREEN, "s"),
     "hybrid_model": (GREEN, "D"),
     "learned_kernel": (GREEN, "^"),

@@ -8,12 +8,12 @@ from torch import Tensor
 
 from holobench_eval.display.simulated.stages.stray_light import gaussian
 from holobench_eval.methods.calibrated.approximator import MODEL_BETAS
+from holobench_eval.methods.calibrated.terms import ImageTerms, spread
 from holobench_eval.methods.descent import cosine_decay
-from holobench_eval.methods.predictors.terms import ImageTerms, spread
 from holobench_eval.metrics.error_budget import unexplained
 from tests.support.small_training import pictures, small_spec
 
-SPEC = small_spec(colours=1)
+SPEC = small_spec(48, 48)
 STEPS = 600
 
 
@@ -28,12 +28,12 @@ def changed(intensity: Tensor) -> Tensor:
 
 def test_they_begin_as_the_ideal_image() -> None:
     for picture in pictures(SPEC, 3):
-        held = ImageTerms(1, SPEC.region.shape)(picture).detach()
+        held = ImageTerms(SPEC)(picture).detach()
         assert unexplained(held, picture, picture) < 0.02 * float(picture.var())
 
 
 def test_shading_haze_and_tone_are_learned_and_hold_for_a_picture_that_was_not_seen() -> None:
-    terms = ImageTerms(1, SPEC.region.shape)
+    terms = ImageTerms(SPEC)
     optimiser = torch.optim.Adam(terms.parameters(), lr=3e-2, betas=MODEL_BETAS)
     seen, unseen = pictures(SPEC, 6), pictures(SPEC, 1, first=50)[0]
     for step in range(STEPS):
@@ -57,6 +57,6 @@ def test_a_gaussian_keeps_its_light_inside_or_loses_what_is_spread_beyond_the_en
 
 
 def test_a_dark_picture_has_finite_gradients() -> None:
-    terms = ImageTerms(2, (16, 16))
+    terms = ImageTerms(small_spec(16, 16, colours=2))
     terms(torch.zeros(2, 16, 16)).sum().backward()
     assert all(bool(parameter.grad.isfinite().all()) for parameter in terms.parameters() if parameter.grad is not None)
