@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import count, islice
 from typing import Annotated, ClassVar, NamedTuple
 
 import torch
@@ -12,16 +14,16 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..core.errors import UserError
-from . import still_life
+from . import renderings, still_life
 from .base import chosen, known, named_digest, with_channels
 from .shipped import FILES, content_digest, decoded
 
-VERSION = 1  # part of every digest: raise it when another rule chooses the crops
+VERSION = 1  # part of every digest of a crop: raise it when another rule places the crops
 
 # without those that have no crop of 208 pixels: text is smaller, and at its own resolution retina is flat but for its
 # black corners
 NAMES = tuple(name for name in FILES if name not in ("text", "retina"))
-RENDERING = "still-life"
+STILL_LIFE, STILL_LIVES = "still-life", 2  # the renderings that come first, as they did before there were others
 
 # Smallest contrast of a crop, linear light (rms difference from its mean colour): a constant image would score
 # 26 dB on a flatter one, more than most captures score on anything.
@@ -43,8 +45,13 @@ class Crops:
     A centred grid of as many disjoint squares of ``size`` pixels as fit is laid over each photograph. Its crops are
     those nearest to its middle, as many as ``each`` says and the upper or left one of two equally near ones, without
     those whose contrast (rms difference from the mean colour, in linear light) is below 0.05. A crop is named by its
-    place in the grid: ``astronaut-2`` is the second square, row by row. Crops of one photograph are one cluster; so are
-    the renderings, still lifes of one generator. The photographs are decoded as sRGB.
+    place in the grid: ``astronaut-2`` is the second square, row by row. Crops of one photograph are one cluster. The
+    photographs are decoded as sRGB.
+
+    Renderings are two still lifes, then a landscape, a street, things on a table, stones, and so on in turn. Each is a
+    cluster: its numbers are drawn independently of all others', so that a mean over renderings is one over what these
+    generators draw. Those of a kind share its generator, and may be alike in what no interval counts: a report says
+    beside its mean what photographs alone give.
 
     size: pixels a side; 208 is the region that is scored on a panel of 256 x 256. A smaller region shows the middle
     of a crop, a larger one is refused: nothing is resized. each: crops of a photograph, at most. names: the
@@ -52,9 +59,9 @@ class Crops:
     """
 
     size: Annotated[int, Interval(ge=32, le=4096)] = 208
-    each: Annotated[int, Interval(ge=1, le=100)] = 2
+    each: Annotated[int, Interval(ge=1, le=100)] = 1
     names: tuple[str, ...] = NAMES
-    renderings: Annotated[int, Interval(ge=0, le=100)] = 2
+    renderings: Annotated[int, Interval(ge=0, le=100)] = 26
 
     training: ClassVar[bool] = False
 
@@ -64,15 +71,14 @@ class Crops:
 
     def items(self) -> list[str]:
         """``photograph-place``, photograph by photograph, then the renderings. UserError for one without a crop."""
-        return [*self._places(), *(f"{RENDERING}-{number}" for number in range(1, self.renderings + 1))]
+        return [*self._places(), *islice(_names(), self.renderings)]
 
     def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
         """The middle of a crop as ``(channels, *shape)`` linear light in [0, 1]. UserError for a larger shape."""
         rows, columns = shape
         place = self._place(item)
         if place is None:
-            picture = torch.from_numpy(still_life.still_life(item, shape)[0]).permute(2, 0, 1).float().contiguous()
-            return with_channels(picture, channels)
+            return with_channels(_rendered(item, shape), channels)
         if max(shape) > self.size:
             raise UserError(
                 f"a crop of {self.size} x {self.size} pixels has no room for a target of {rows} x {columns}; "
@@ -85,14 +91,14 @@ class Crops:
         """SHA-256 of the photograph's file and of the place, or of the rendering's name."""
         place = self._place(item)
         if place is None:
-            return named_digest(item, still_life.VERSION)
+            return named_digest(item, (still_life if _kind(item) == STILL_LIFE else renderings).VERSION)
         photograph = content_digest(place.photograph)
         return named_digest("crop", VERSION, photograph, place.top, place.left, self.size)
 
     def cluster(self, item: str) -> str:
-        """The photograph of a crop; one name for all renderings."""
+        """The photograph of a crop; a rendering is a cluster of its own."""
         place = self._place(item)
-        return RENDERING if place is None else place.photograph
+        return item if place is None else place.photograph
 
     def _place(self, item: str) -> Crop | None:
         return self._places().get(known("crop", item, self.items()))
@@ -100,6 +106,23 @@ class Crops:
     def _places(self) -> dict[str, Crop]:
         """Where the crop of every item lies."""
         return {item: crop for name in self.names for item, crop in _best(name, self.size, self.each)}
+
+
+def _names() -> Iterator[str]:
+    """The renderings' names, without end."""
+    yield from (f"{STILL_LIFE}-{number}" for number in range(1, STILL_LIVES + 1))
+    yield from (f"{kind}-{number}" for number in count(1) for kind in renderings.SCENES)
+
+
+def _kind(rendering: str) -> str:
+    return rendering.rsplit("-", 1)[0]
+
+
+def _rendered(item: str, shape: tuple[int, int]) -> Tensor:
+    """``(3, *shape)``, in memory of its own."""
+    if _kind(item) == STILL_LIFE:
+        return torch.from_numpy(still_life.still_life(item, shape)[0]).permute(2, 0, 1).float().contiguous()
+    return renderings.rendering(item, shape).clone()
 
 
 @lru_cache(maxsize=256)

@@ -1,6 +1,7 @@
 """Crops at native resolution."""
 
 import itertools
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -11,21 +12,24 @@ from PIL import Image
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.datasets import crops, shipped
-from holobench_eval.datasets.base import clusters_of, from_srgb
+from holobench_eval.datasets.base import clusters_of, from_srgb, named_digest
 from holobench_eval.datasets.crops import FLAT, NAMES, Crops
+from holobench_eval.datasets.still_life import still_life
 from holobench_eval.display import load_profile
 
 
-def test_the_default_is_at_least_24_targets_in_15_clusters_for_a_panel_of_256():
+def test_the_default_is_40_targets_in_40_clusters_for_a_panel_of_256():
     dataset = Crops()
     assert load_profile("leto-aged").spec((256, 256)).region.shape == (dataset.size, dataset.size)
-    assert len(dataset.items()) == 28
-    assert len(set(clusters_of(dataset).values())) == 15
+    assert len(dataset.items()) == 40
+    assert len(set(clusters_of(dataset).values())) == 40
+    kinds = Counter(item.rsplit("-", 1)[0] for item in dataset.items()[14:])
+    assert kinds == {"still-life": 2, "landscape": 6, "street": 6, "table": 6, "stones": 6}
 
 
 def test_what_the_default_scores_does_not_change_unnoticed():
     """A change here needs a new VERSION of the dataset, since committed studies score these crops."""
-    places = Crops()._places()
+    places = Crops(each=2)._places()
     assert places["astronaut-1"] == ("astronaut", 48, 48)
     chosen = {name: [int(item[-1]) for item in places if places[item].photograph == name] for name in NAMES}
     assert {name: numbers for name, numbers in chosen.items() if numbers != [1, 2]} == {
@@ -42,7 +46,7 @@ def test_a_crop_has_the_pixels_of_its_photograph():
         picture = from_srgb(np.asarray(image))
     top, left = (600 - 2 * 208) // 2, (512 - 2 * 208) // 2
     wanted = picture[:, top : top + 208, left + 208 : left + 416]
-    assert torch.equal(Crops().load("grace_hopper-2", (208, 208)), wanted)
+    assert torch.equal(Crops(each=2).load("grace_hopper-2", (208, 208)), wanted)
 
 
 def test_a_smaller_region_shows_the_middle_of_a_crop():
@@ -71,11 +75,26 @@ def test_the_middle_of_a_photograph_comes_first():
     assert Crops(names=("motorcycle",), each=1).items()[0] == "motorcycle-2"  # of two rows of three
 
 
-def test_renderings_are_drawn_in_the_shape_asked_for_and_are_one_cluster():
-    dataset = Crops(names=("coins",), renderings=2)
-    assert dataset.items() == ["coins-1", "still-life-1", "still-life-2"]
+def test_renderings_are_drawn_in_the_shape_asked_for_and_each_is_a_cluster():
+    dataset = Crops(names=("coins",), renderings=3)
+    assert dataset.items() == ["coins-1", "still-life-1", "still-life-2", "landscape-1"]
     assert dataset.load("still-life-1", (300, 250)).shape == (3, 300, 250)
-    assert [dataset.cluster(item) for item in dataset.items()] == ["coins", "still-life", "still-life"]
+    assert dataset.load("landscape-1", (30, 25)).shape == (3, 30, 25)
+    assert [dataset.cluster(item) for item in dataset.items()] == [
+        "coins",
+        "still-life-1",
+        "still-life-2",
+        "landscape-1",
+    ]
+
+
+def test_still_lifes_are_those_of_studies_before_there_were_other_renderings():
+    dataset = Crops(names=("coins",), renderings=1)
+    assert dataset.digest("still-life-1") == named_digest("still-life-1", 1)
+    assert torch.equal(
+        dataset.load("still-life-1", (40, 40)).permute(1, 2, 0),
+        torch.from_numpy(still_life("still-life-1", (40, 40))[0]).float(),
+    )
 
 
 @pytest.mark.parametrize(

@@ -81,9 +81,11 @@ def test_a_layout_knows_how_every_cell_of_the_plan_is_made(study):
 
 def test_the_clusters_of_targets_are_those_of_the_dataset(study):
     assert layout_of(study).clusters == {}
-    study.file.write_text(re.sub("targets: .*", "targets: {dataset: crops, params: {names: [coins]}}", CONFIG))
+    study.file.write_text(
+        re.sub("targets: .*", "targets: {dataset: crops, params: {names: [astronaut], each: 2, renderings: 1}}", CONFIG)
+    )
     clusters = layout_of(load_study(study.file)).clusters
-    assert clusters == {"coins-1": "coins", "still-life-1": "still-life", "still-life-2": "still-life"}
+    assert clusters == {"astronaut-1": "astronaut", "astronaut-2": "astronaut", "still-life-1": "still-life-1"}
 
 
 def test_rows_whose_network_is_the_ideal_image_are_known(tmp_path):

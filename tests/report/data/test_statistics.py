@@ -20,7 +20,7 @@ from tests.support.coverage import (
     two_way_coverage,
 )
 
-IN_USE = DESIGNS["28 in 15 clusters"]
+IN_USE, IN_PAIRS = DESIGNS["40 alone"], DESIGNS["28 in 15 clusters"]
 PAIRS = list("aabbccddee")
 
 
@@ -29,9 +29,10 @@ def test_the_simulated_design_is_that_of_the_targets_in_use():
     assert sorted(map(clusters.count, set(clusters))) == sorted(IN_USE)
 
 
+@pytest.mark.parametrize("sizes", [IN_USE, IN_PAIRS])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_intervals_hold_the_true_mean_as_often_as_they_say(shape):
-    assert 0.93 <= coverage(shape, IN_USE, 4000) <= 0.97
+def test_intervals_hold_the_true_mean_as_often_as_they_say(shape, sizes):
+    assert 0.93 <= coverage(shape, sizes, 4000) <= 0.97
 
 
 @pytest.mark.parametrize("sizes", [DESIGNS["8 alone"], DESIGNS["4 alone"]])
@@ -40,7 +41,7 @@ def test_few_targets_widen_the_interval_and_leave_its_coverage(sizes):
 
 
 def test_targets_that_are_taken_for_independent_have_intervals_that_are_too_narrow():
-    assert coverage("normal", IN_USE, 2000, by_cluster=False) < 0.91
+    assert coverage("normal", IN_PAIRS, 2000, by_cluster=False) < 0.91
 
 
 @pytest.mark.parametrize("shape", SHAPES)
