@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, cast
 
 import torch
 from torch import Tensor, nn
@@ -46,7 +46,8 @@ class PredictedCapture(nn.Module):
     def forward(self, phase: Tensor, light: Tensor) -> Tensor:
         """Phase ``(C, H, W)`` [rad] to the capture ``(C, h, w)`` in the unit of ``light`` ``(C,)``."""
         white = light[:, None, None]
-        output: Tensor = self.model(phase) if self.terms is None else self.model.over_panel(phase)
+        show = self.model if self.terms is None else cast(Callable[[Tensor], Tensor], self.model.over_panel)
+        output: Tensor = show(phase)
         if output.is_complex():
             output = output / white.sqrt()
             seen = [squared_modulus(output), output.real, output.imag]

@@ -7,16 +7,20 @@ picture sends into the other is no part of it, and so no retrieval takes it away
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from annotated_types import Interval
 
 from ...display.api import DisplaySpec
+from ...display.training import TrainingBench
 from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.method import SearchRetrieval, ThroughModel
+from ..calibrated.patterns import dark_samples
 from ..calibrated.terms import IdealImage, ImageTerms
 from ..learned.retrieval import Weight
+from ..learned.samples import Sample
 from ..wirtinger import Wirtinger
 from .networks import Network
 from .plus import MostImages, residual_network
@@ -57,6 +61,10 @@ class HILTerms(ThroughModel):
 
     version: ClassVar[int] = 1
     form: ClassVar[frozenset[str]] = frozenset({"stray_light"})
+
+    def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
+        """Dark patterns are learned from as often as eight images each: natural ones confound haze with tone."""
+        return 7 * dark_samples(bench)
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """The ideal image, next to nothing added."""

@@ -242,9 +242,9 @@ def test_an_aberration_inside_the_iris_keeps_the_light() -> None:
     spec = spec_of(pupil=0.7)
     model, phase = sharp(spec), smooth_phase(spec)
     with torch.no_grad():
-        power = intensity_of(model, phase).sum((1, 2))
+        power = squared_modulus(model.over_panel(phase)).sum((1, 2))
         model.aberration.normal_(generator=torch.Generator().manual_seed(0))
-        assert torch.allclose(intensity_of(model, phase).sum((1, 2)), power, rtol=1e-4)
+        assert torch.allclose(squared_modulus(model.over_panel(phase)).sum((1, 2)), power, rtol=1e-4)
 
 
 def test_brightness_scales_the_intensity() -> None:
@@ -332,7 +332,7 @@ def test_a_fit_finds_the_gamma_the_gain_and_the_unmodulated_light_of_a_display()
         error = (found[colour] - gain * TAU * level**gamma)[1:-1]
         # a constant is not seen in an image, and unmodulated light turns with it
         constant = error.mean()
-        assert (error - constant).abs().max() < 0.01 * TAU
+        assert (error - constant).abs().max() < 0.015 * TAU  # the haze, which is none, is learned too
         turned = unmodulated[colour] * torch.polar(torch.tensor(1.0), -constant)
         assert abs(complex(turned) - complex(math.cos(1), math.sin(1))) < 0.08
         with torch.no_grad():

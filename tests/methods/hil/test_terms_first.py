@@ -21,7 +21,7 @@ from tests.support.small_training import Memory, pictures
 
 PANEL = (120, 120)
 SHORT = HILTerms(
-    training=Schedule(rounds=1, steps=300),
+    training=Schedule(rounds=1, steps=400),
     retrieval=WithoutCritic(iterations=2),
     start=Wirtinger(iterations=50),
     network=Network("unet", levels=2, width=4),
