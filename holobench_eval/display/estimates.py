@@ -52,8 +52,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     "undiffracted_fraction": Quantity("share of the light that no phase modulates, dead area included", "", 0.03),
     "undiffracted_phase": Quantity("phase of that light against the light at gray level 0", "rad", 0.15),
     "light": Quantity("light from the panel that the camera counts, share of the nominal", "", 0.05),
-    "stray_share": Quantity("share of the light that arrives as haze", "", 0.05),
-    "stray_reach": Quantity("standard deviation of the haze", "panel heights", 0.03),
+    "stray_share": Quantity("share of the light that arrives as haze", "", 0.15),
+    "stray_reach": Quantity("standard deviation of the haze", "panel heights", 0.1),
     **{
         name: Quantity(f"Zernike {name.replace('_', ' ')}, with the curvature of the beam", "waves rms", 0.015)
         for name in MODES

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from operator import attrgetter
-from typing import Any
 
 import numpy as np
 from scipy import stats
 
+from ...study.calibration import value_of
 from ...study.calibration.family import load_family, names
 from .results import Results
 from .statistics import Array, Estimate, two_way
@@ -52,7 +51,7 @@ class Cause:
 
 
 def applies(results: Results) -> bool:
-    """Whether a study is about displays: it has many, simulated, without a change, and a baseline."""
+    """Whether a study is about displays: it has many, those that are a change of another aside, and a baseline."""
     layout = results.layout
     return len(results.conditions) >= FEWEST_DISPLAYS and not layout.predicts and layout.baseline is not None
 
@@ -84,8 +83,8 @@ def margins(results: Results) -> list[Margin]:
 
 def published(results: Results, label: str) -> float | None:
     """The margin of two published figures, where a method and the baseline have one."""
-    figures, metric = results.layout.reported, results.headline.metric
-    own, other = (figures.get(name, {}).get(metric) for name in (label, str(results.layout.baseline)))
+    names, metric = (label, str(results.layout.baseline)), results.headline.metric
+    own, other = (results.layout.published(name, results.conditions[0]).get(metric) for name in names)
     return None if own is None or other is None else own - other
 
 
@@ -97,7 +96,7 @@ def parameters(results: Results) -> dict[str, Array]:
         return {}
     loaded = load_family(family)
     values = {
-        given.words: np.array([_number(profile, given.name) for profile in profiles])
+        given.words: np.array([np.mean(value_of(profile, given.name)) for profile in profiles])
         for given in (*loaded.parameters, *loaded.outside.parameters)
     }
     return {words: column for words, column in values.items() if np.ptp(column) > 0}
@@ -125,14 +124,6 @@ def _strongest(columns: Array, values: Array) -> int:
     products = (columns - columns.mean(1, keepdims=True)) @ (values - values.mean())
     scales = columns.std(1) * values.std()
     return int(np.argmax(np.abs(np.divide(products, scales, out=np.zeros_like(products), where=scales > 0))))
-
-
-def _number(profile: Any, name: str) -> float:
-    first, second, *rest = name.split(".")
-    value = attrgetter(f"{first}.{second}")(profile)
-    for key in rest:
-        value = value.get(key, 0.0)
-    return float(np.mean(value))
 
 
 def _over_both(differences: Array) -> Estimate:

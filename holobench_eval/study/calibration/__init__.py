@@ -86,6 +86,14 @@ def _right() -> str:
     )
 
 
+def value_of(profile: Profile, name: str) -> Any:
+    """A profile's value of a parameter, by ``stage.key``; 0 for a key of a mapping that it does not give."""
+    value: Any = profile
+    for key in name.split("."):
+        value = value.get(key, 0.0) if isinstance(value, Mapping) else getattr(value, key)
+    return value
+
+
 def with_values(profile: Profile, values: Mapping[str, Any]) -> Profile:
     """A profile with other values of some parameters, by ``stage.key``; a number stands for all colours."""
     for name, value in values.items():

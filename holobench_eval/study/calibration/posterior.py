@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from ...core.errors import CellError, UserError
 from ...core.io import write_atomically
 from ...core.seeds import generator
 from ...display import Profile
+from . import value_of
 from .family import DOMAINS, METRICS, Draw, Family, Range, Row, drawn, figures_of, missed, profile_of, solved
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -136,7 +136,8 @@ def write_member(path: Path, family: Family, member: Member, draws: int) -> None
     }
     for name in (*family.geometries[member.draw.geometry], *member.draw.values):
         *holders, key = name.split(".")
-        value = _value(member.profile, name)
+        value = value_of(member.profile, name)
+        value = list(value) if isinstance(value, tuple) else value
         reduce(lambda inner, part: inner.setdefault(part, {}), holders, document)[key] = value
     reached = ", ".join(
         "{} {:.2f} dB and SSIM {:.3f}".format(method, *(member.scores[f"{method}.{name}_linear"] for name in METRICS))
@@ -146,11 +147,3 @@ def write_member(path: Path, family: Family, member: Member, draws: int) -> None
     head += f"# Captures of its images have {reached}.\n"
     text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
     write_atomically(path, (head + text).encode())
-
-
-def _value(profile: Profile, name: str) -> Any:
-    first, second, *rest = name.split(".")
-    value = attrgetter(f"{first}.{second}")(profile)
-    for key in rest:
-        value = value[key]
-    return list(value) if isinstance(value, tuple) else value
