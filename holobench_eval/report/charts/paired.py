@@ -1,10 +1,11 @@
-"""Differences to the baseline, target by target: a dot a target, the mean with its interval, a line at zero."""
+"""Differences to the baseline: a dot a target or a display, the mean with its interval, a line at zero."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from ..data import over_displays
 from ..data.results import Results
 from .look.medium import medium
 from .look.methods import looks
@@ -25,27 +26,53 @@ def draw(results: Results, condition: str, path: Path) -> None:
     constant image, at its mean difference to the baseline.
     """
     baseline, score = results.layout.baseline, results.headline
-    rows = best_first(_rows(results, condition), score.higher_is_better)
     assert baseline is not None
     above = results.above_floor(baseline, condition)
+    lines = {} if above is None else {"floor: a constant image": -above.mean}
+    rows = best_first(_rows(results, condition), score.higher_is_better)
+    _draw(results, path, condition, rows, lines)
+
+
+def draw_over_displays(results: Results, path: Path) -> None:
+    """Draw the mean differences of each display, best method first; dashed: differences that were published."""
+    score, looked, found = results.headline, looks(results.names), over_displays.margins(results)
+    rows = [
+        Row(each.label, each.values, each.over_both, looked[each.label], score.estimate(each.over_both, signed=True))
+        for each in found
+    ]
+    known = {f"published for {each.label}": over_displays.published(results, each.label) for each in found}
+    lines = {label: value for label, value in known.items() if value is not None}
+    _draw(results, path, f"{len(over_displays.shown_on(results))} displays", rows, lines)
+
+
+def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
+    """Rows of differences to the baseline, which is a line at zero; further lines are dashed."""
+    baseline, score = results.layout.baseline, results.headline
     better = "right" if score.higher_is_better else "left"
     axis = f"difference to {baseline} in {score.axis}{results.layout.text.axis}; better: to the {better}"
     axis = medium().wrap(axis, 0.6 * medium().width)
     labels = [f"baseline: {baseline}"]
-    if above is not None:
-        labels.append(f"floor: a constant image, {score.with_unit(-above.mean, signed=True)}")
+    labels += [f"{label}, {score.with_unit(value, signed=True)}" for label, value in lines.items()]
     labels = [medium().wrap(label, 0.8 * medium().width) for label in labels]
     with style():
-        figure, (axes,) = stacked([condition], [height_of(rows)], footer_of(axis, labels))
+        figure, (axes,) = stacked([title], [height_of(rows)], footer_of(axis, labels))
         draw_rows_of_dots(axes, rows)
         axes.axvline(0, color="black", linewidth=1, zorder=1, label=labels[0])
-        if above is not None:
-            axes.axvline(-above.mean, color=GREY, linewidth=1.1, linestyle="--", zorder=1, label=labels[1])
+        for value, label in zip(lines.values(), labels[1:], strict=True):
+            axes.axvline(value, color=GREY, linewidth=1.1, linestyle="--", zorder=1, label=label)
         axes.set_xlabel(axis, parse_math=False)
         legend = figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False)
         for text in legend.get_texts():
             text.set_parse_math(False)
         save(figure, path)
+
+
+def caption_over_displays(results: Results) -> str:
+    """What the chart over displays shows."""
+    return (
+        f"Differences to {results.layout.baseline} in {results.headline.axis}. Small dots: displays, at the same "
+        "height in every row; marks and bars: means and their 95 % intervals over displays and clusters of targets."
+    )
 
 
 def caption(results: Results, condition: str) -> str:

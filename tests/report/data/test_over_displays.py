@@ -8,7 +8,7 @@ import numpy as np
 
 from holobench_eval.display import load_profile
 from holobench_eval.report.answers import kind_of, over_displays
-from holobench_eval.report.charts.over_displays import draw
+from holobench_eval.report.charts.paired import draw_over_displays
 from holobench_eval.report.data.over_displays import FEWEST_DISPLAYS, cause, margins, parameters, shown_on
 from tests.report.answers.test_answers import NOISE, results_of
 
@@ -75,5 +75,5 @@ def test_displays_of_no_family_have_no_parameters():
 
 
 def test_the_chart_has_a_row_for_every_method(tmp_path: Path):
-    draw(study(reported={"new": {"psnr": 20.5}, "old": {"psnr": 17.6}}), tmp_path / "chart.png")
+    draw_over_displays(study(reported={"new": {"psnr": 20.5}, "old": {"psnr": 17.6}}), tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 5000

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...answers import kind_of
 from ...answers.kind import subjects
-from ...charts import over_displays, paired
+from ...charts import paired
 from ...charts.rows import Row, draw_rows
-from ...data import over_displays as displays
+from ...data import over_displays
 from ...data.categories import OFFLINE, ONLINE
 from ...data.results import Results
 from ...markdown import heading
@@ -28,10 +28,10 @@ def _table(report: Report, _: Figures) -> Blocks:
 
 def _plot(report: Report) -> Iterator[tuple[Path, str]]:
     """Differences to the baseline over many displays, or else on the first display that has any."""
-    if displays.applies(report.results) and displays.shown_on(report.results):
+    if over_displays.applies(report.results) and over_displays.shown_on(report.results):
         path = report.figures / "quality-displays.png"
-        over_displays.draw(report.results, path)
-        yield path, over_displays.caption(report.results)
+        paired.draw_over_displays(report.results, path)
+        yield path, paired.caption_over_displays(report.results)
         return
     for condition, stem in paired.displays(report.results)[:1]:
         path = report.figures / f"quality-paired-{stem}.png"
