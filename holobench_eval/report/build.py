@@ -12,7 +12,7 @@ from ..core.io import write_atomically
 from ..study.definition import Study
 from .data.layout import Layout, layout_of
 from .data.results import Results
-from .data.tables import of_study, read_records, records_frame
+from .data.tables import of_study, read_records, records_frame, records_text
 from .description import Description, describe
 from .files import texts, write_files
 from .markdown import FIGURE, Markdown, blocks
@@ -52,7 +52,7 @@ def write_report(
     keep_pictures: bool = False,
 ) -> tuple[Path, Results]:
     """``build_report`` for a study that is given by its layout and description."""
-    results = Results(records_frame(records, layout), layout)
+    results = Results(records_frame(records, layout), layout, related(layout, output.parent))
     report = Report(results, records, output, provenance, description, _kept(output) if keep_pictures else None)
     write_files(results, output)
     for pattern in OF_NUMBERS if keep_pictures else (*OF_PICTURES, *OF_NUMBERS):
@@ -91,6 +91,16 @@ def _texts(report: Report) -> dict[str, Markdown]:
 def _figure(number: int, path: Path, caption: str) -> Markdown:
     image = Markdown("![Figure {}]({}/{})").format(number, path.parent.name, path.name)
     return blocks([image, Markdown("**Figure {}.** {}").format(number, caption)])
+
+
+def related(layout: Layout, folder: Path) -> dict[str, Results]:
+    """Results of the related studies that have a report of their name in a folder."""
+    known = {name: folder / name / "records.csv" for name in layout.related}
+    return {
+        name: Results(of_study(read_records(records_text(path)), layout.related[name]), layout.related[name])
+        for name, path in known.items()
+        if path.is_file()
+    }
 
 
 def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from ..core.io import write_atomically
 from ..study.calibration.family import DOMAINS, METRICS, Family, Row, missed
 from ..study.calibration.posterior import READINGS, Marginal, Member, accepted, marginals
-from .charts.corner import draw_corner
+from .charts.family import draw_corner
 from .markdown import Markdown, blocks, bullets, code, heading, table
 
 SHOWN = 6  # parameters of the picture

@@ -22,7 +22,7 @@ from ..metrics import catalogue, control
 from ..metrics.lpips import find_weights
 from . import isolation
 from .changes import Changes, changed, chosen
-from .definition import DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
+from .definition import PREDICTIONS, DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
 from .displays import condition, displays, real_condition
 from .focal_stacks import SCORES, planes_of
 from .identity import SPECKLE
@@ -60,6 +60,7 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     study = typed(document, Study, _long_form(document.data))
     study = _with_grids(replace(study, file=Path(path), text=document.text, changes=changes), document)
     study = _with_chosen_methods(study)
+    _check_related(study, document)
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
@@ -286,6 +287,18 @@ def _sweeps(study: Study, document: Document) -> Iterator[Sweep]:
                 raise document.error(place, f"{kind} {given} is listed twice")
             seen |= shown
         yield replace(sweep, values=tuple(values), count=None, profiles=profiles)
+
+
+def _check_related(study: Study, document: Document) -> None:
+    """Refuse names of no config in the folder and of studies that score pictures, and any in a related study."""
+    for index, name in enumerate(study.related):
+        where: Keys = ("related", index)
+        if study.predicts:
+            raise document.error(where, "predictions have no related studies; the study of pictures names them")
+        with placed(document, where, where):
+            measure = load(study.folder / f"{name}.yaml").data.get("measure")
+        if measure not in PREDICTIONS:
+            raise document.error(where, f"'{name}' measures no predictions; name an error budget or predictions")
 
 
 def _subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:

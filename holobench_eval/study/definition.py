@@ -225,7 +225,8 @@ class Study:
     leads with, a metric and a domain; save: what else is written beside the scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
-    published figures to print beside the measured ones.
+    published figures to print beside the measured ones; related: names of error budgets and predictions of the same
+    displays, whose configs and reports lie beside this one's: a study over many displays holds margins against them.
     file, text: the config file as the user named it, and what is in it; changes: those of the command line.
     """
 
@@ -251,6 +252,7 @@ class Study:
     isolation: Isolation = "files"
     limits: Limits = Limits()
     reported: Reported | None = None
+    related: tuple[Text, ...] = ()
     file: Path = field(default=Path(), metadata={"key": False})
     text: str = field(default="", metadata={"key": False})
     changes: Changes = field(default=Changes(), metadata={"key": False})

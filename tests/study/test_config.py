@@ -149,6 +149,9 @@ CHANGES = [
     ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),
     ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
     ("headline: ssim_srgb", "headline: ms_ssim_linear", "13:11: 'ideal' scores 104 x 208 pixels; ms_ssim needs 161"),
+    ("repeats: 2", "related: [absent]", "11:11: "),
+    ("repeats: 2", "related: [study]", "11:11: 'study' measures no predictions; name an error budget or"),
+    ("repeats: 2", "measure: prediction\nrelated: [study]", "12:11: predictions have no related studies"),
     ("repeats: 2", "protocol: {metrics: [psnr]}", "11:21: the headline is 'ssim_srgb'; add ssim to the metrics, or "),
 ]
 

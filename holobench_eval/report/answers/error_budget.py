@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..data.error_budget import Budget, Part, budgets
+from ..data.over_displays import is_many
 from ..data.results import Results
 from ..data.scores import Score
-from ..data.statistics import Estimate
+from ..data.statistics import Array, Estimate
 from ..data.text import percent, words
 from ..markdown import Markdown, table
 from .kind import Kind
@@ -16,16 +19,28 @@ from .prediction import controlled
 
 def sentences(results: Results) -> Iterator[str]:
     """What explains most, and who leads by control; then a sentence a display: what the image-domain predictions, then
-    all of them, explain, and what remains."""
+    all of them, explain, and what remains. Over many displays, a sentence for all."""
     found = budgets(results)
     if not found:
         yield "No display has the scores of all methods for all targets, so none has a budget."
+        return
+    if is_many(results):
+        shares = [
+            f"{label} {means.mean():.0f} % ({means.min():.0f} to {means.max():.0f})" for label, means in _over(found)
+        ]
+        yield f"Over {len(found)} displays, means and ranges of the shares of the squared error: {words(shares)}."
         return
     largest = [f"on {budget.condition} {_most(budget)}" for budget in found]
     yield f"What explains most of the squared error: {'; '.join(largest)}."
     yield from controlled(results)
     for budget in found:
         yield _reading(budget)
+
+
+def _over(found: list[Budget]) -> Iterator[tuple[str, Array]]:
+    """The shares of each part on all displays [%]."""
+    for parts in zip(*(budget.parts for budget in found), strict=True):
+        yield parts[0].label, np.array([100 * part.share.mean for part in parts])
 
 
 def _most(budget: Budget) -> str:
@@ -62,7 +77,12 @@ def _interval(found: Estimate) -> str:
 
 def rows(results: Results) -> Markdown | None:
     """A row a display and part: its share, what removing it and all above it would gain, what it leaves by itself, and
-    the control of its model."""
+    the control of its model. Over many displays a row a part: the mean and the range of its share."""
+    if found := budgets(results) if is_many(results) else []:
+        shares = [
+            [label, f"{part.mean():.0f}", f"{part.min():.0f} to {part.max():.0f}"] for label, part in _over(found)
+        ]
+        return table(["explained by", "share of the squared error [%]", "least to most of displays"], shares)
     lines = [
         [
             budget.condition,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..data.display_map import display_map, judged
 from ..data.over_displays import Margin, applies, cause, margins, parameters, published, shown_on
 from ..data.results import Results
 from ..data.text import words
@@ -15,7 +16,8 @@ CLEAR = 0.3  # share of the variance over displays that a parameter has to predi
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """The methods of the question, then the best; what decides their margins; where no score could be had."""
+    """The methods of the question; which is best, and what tells it; the best ones; what decides their margins; what
+    judges their models; where no score could be had."""
     found, asked = margins(results), subjects(results)
     if not found:
         yield "No display has a score of every method for every target."
@@ -24,8 +26,10 @@ def sentences(results: Results) -> Iterator[str]:
     about = [each for label in asked for each in found if each.label == label]
     for each in about:
         yield f"{_told(results, each, count)}{_published(results, each)}."
+    yield from _map(results)
     for each in [each for each in found if each not in about][:MOST]:
         yield f"{_told(results, each, count)}."
+    yield from _judged(results)
     yield from _decides(results, about or found[:1])
     if count < len(results.conditions):
         left = [name for name in results.conditions if name not in shown_on(results)]
@@ -36,10 +40,9 @@ def _told(results: Results, each: Margin, count: int) -> str:
     score, (low, high) = results.headline, each.spread
     worse = f" and worse on {each.worse}" if each.worse else ""
     return (
-        f"{each.label} is shown better than {results.layout.baseline} on {each.better} of {count} displays{worse}; "
+        f"{each.label} is shown better than {results.layout.baseline} on {each.better} of {count} displays{worse}: "
         f"median {score.with_unit(each.median, signed=True)}, {score.number(low, signed=True)} to "
-        f"{score.number(high, signed=True)} on nine in ten, mean over displays and pictures "
-        f"{score.estimate(each.over_both, signed=True)}"
+        f"{score.number(high, signed=True)} on nine in ten"
     )
 
 
@@ -49,7 +52,31 @@ def _published(results: Results, each: Margin) -> str:
     if margin is None:
         return ""
     above = int((each.values >= margin).sum())
-    return f"; {above} of the displays have the published {score.with_unit(margin, signed=True)} or more"
+    return f"; {above or 'none'} {'has' if above < 2 else 'have'} the published {score.with_unit(margin, signed=True)}"
+
+
+def _map(results: Results) -> Iterator[str]:
+    """The method that is best on most displays, and whether an error budget of a display tells where another is."""
+    found, score = display_map(results), results.headline
+    if found is None:
+        return
+    count = len(found.best)
+    yield (
+        f"{found.usual} is best on {found.best.count(found.usual)} of {count}. To choose, measure what part of the "
+        f"error is explained by {found.axes[0]}, and by {found.axes[1]}: of displays left out these name the best of "
+        f"{len(found.labels)} methods on {found.hits} of {count}, {score.with_unit(found.cost)} behind the best on "
+        f"average ({found.usual} always: {score.number(found.usual_cost)})."
+    )
+    asked = [label for label in dict.fromkeys([*subjects(results), found.usual]) if label != found.labels[0]]
+    if shares := [f"{max(found.explained(label), 0):.2f} of {label}" for label in asked]:
+        yield f"R2 of margins that these parts predict on displays left out: {words(shares)}."
+
+
+def _judged(results: Results) -> Iterator[str]:
+    """How well two scores of the models rank the methods that optimise through them."""
+    parts = [f"{each.score} names the better one in {each.right} of {each.pairs}" for each in judged(results)]
+    if parts:
+        yield f"Of two methods on a display, by their models: {words(parts)}."
 
 
 def _decides(results: Results, about: list[Margin]) -> Iterator[str]:

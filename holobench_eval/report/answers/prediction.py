@@ -7,25 +7,62 @@ method needs that optimises through a network.
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator
 
+import numpy as np
+
 from ...metrics.control import MOST
+from ..data.over_displays import is_many
 from ..data.phrases import short, tested, value, verdict
 from ..data.results import Results
 from ..data.text import words
+from ..markdown import Markdown, table
 from .comparison import best, floor, rows
 from .kind import Kind, subjects
 
 
 def sentences(results: Results) -> Iterator[str]:
     """The best, the named ones against the baseline, control, the published order, and who predicts worse than no
-    network."""
+    network; over many displays, who leads on how many."""
+    if is_many(results):
+        yield from _leads(results)
+        return
     yield from _against(results)
     yield best(results)
     yield from controlled(results)
     yield from reported(results)
     yield from _untrained(results)
     yield from floor(results)
+
+
+def _leads(results: Results) -> Iterator[str]:
+    """Who is first on how many displays, by prediction and by control, and its mean over them."""
+    for score in (results.headline, *results.control):
+        firsts = [ranking[0] for name in results.conditions if (ranking := results.ranking(name, score.key))]
+        for first, count in Counter(firsts).most_common(1):
+            where = [name for name in results.conditions if results.is_complete(first, name, score.key)]
+            mean = float(np.mean([results.values(first, name, score.key).mean() for name in where]))
+            yield (
+                f"By {score.title} {first} leads on {count} of {len(results.conditions)} displays; its mean over "
+                f"{len(where)} is {score.with_unit(mean)}."
+            )
+
+
+def over_many(results: Results) -> Markdown:
+    """A row a method: every score's mean over the displays, and its range over them."""
+    scores = [results.headline, *results.control]
+    lines = []
+    for label in results.layout.methods:
+        cells = [label]
+        for score in scores:
+            means = [results.values(label, name, score.key).mean() for name in results.conditions]
+            known = [mean for mean in means if np.isfinite(mean)]
+            ends = f"{score.number(min(known))} to {score.number(max(known))}" if known else "–"
+            cells += [score.number(float(np.mean(known))) if known else "–", ends]
+        lines.append(cells)
+    columns = [[score.heading, "least to most of displays"] for score in scores]
+    return table(["method", *itertools.chain(*columns)], lines)
 
 
 def _against(results: Results) -> Iterator[str]:
@@ -92,6 +129,6 @@ KIND = Kind(
     question="Which network predicts the captures of the display best?",
     applies=lambda results: results.layout.measure == "prediction",
     sentences=sentences,
-    table=rows,
+    table=lambda results: over_many(results) if is_many(results) else rows(results),
     limits=("Training: one short training of each network; the order after longer ones may be another.",),
 )

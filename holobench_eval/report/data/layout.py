@@ -15,6 +15,7 @@ from ...display.simulated.changes import KINDS, draws
 from ...display.simulated.profile import Profile, load_profile
 from ...display.traits import traits_of
 from ...study import isolation
+from ...study.config import load_study
 from ...study.definition import PREDICTIONS, Study
 from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
@@ -97,7 +98,7 @@ class Layout:
     each target is its own). metrics: names of those the study wants (None: all). study: its name, the config's file
     without the ending; params: every parameter of a method, by label; capture_limits: the most captures that a display
     allows a method for a target, by label; panels: rows and columns of the panel of each display [px];
-    profiles: of simulated displays.
+    profiles: of simulated displays; related: layouts of related studies, by their names.
     """
 
     title: str
@@ -135,6 +136,7 @@ class Layout:
     capture_limits: Mapping[str, int] = field(default_factory=dict)
     panels: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     profiles: Mapping[str, Profile] = field(default_factory=dict)
+    related: Mapping[str, Layout] = field(default_factory=dict)
 
     def category(self, label: str) -> str:
         """The category that a method competes in."""
@@ -251,6 +253,7 @@ def layout_of(study: Study) -> Layout:
         capture_limits={entry.label: entry.captures for entry in study.methods if entry.captures is not None},
         panels={condition.name: condition.spec.shape for condition in conditions.values()},
         profiles=profiles,
+        related={name: layout_of(load_study(study.folder / f"{name}.yaml")) for name in study.related},
     )
 
 

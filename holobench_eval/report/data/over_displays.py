@@ -50,10 +50,14 @@ class Cause:
     explained: float
 
 
+def is_many(results: Results) -> bool:
+    """Whether a study is about displays: it has many, those that are a change of another aside."""
+    return len(results.conditions) >= FEWEST_DISPLAYS
+
+
 def applies(results: Results) -> bool:
-    """Whether a study is about displays: it has many, those that are a change of another aside, and a baseline."""
-    layout = results.layout
-    return len(results.conditions) >= FEWEST_DISPLAYS and not layout.predicts and layout.baseline is not None
+    """Whether a study compares methods with a baseline over many displays."""
+    return is_many(results) and not results.layout.predicts and results.layout.baseline is not None
 
 
 def shown_on(results: Results) -> list[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -25,10 +25,11 @@ LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd", control
 
 @dataclass(frozen=True)
 class Results:
-    """A records frame with the layout of its study; see ``tables.records_frame``."""
+    """A records frame with the layout of its study, see ``tables.records_frame``, and results of related studies."""
 
     frame: pd.DataFrame
     layout: Layout
+    related: Mapping[str, Results] = field(default_factory=dict)
 
     @cached_property
     def table(self) -> pd.DataFrame:

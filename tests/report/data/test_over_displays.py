@@ -38,9 +38,9 @@ def test_the_answer_says_on_how_many_displays_by_how_much_and_where_the_publishe
     assert kind_of(results) is over_displays.KIND
     first, *_ = kind_of(results).answer(results)
     assert first.startswith(
-        "new is shown better than old on 10 of 10 displays; median +1.05 dB, +1.05 to +2.15 on nine"
+        "new is shown better than old on 10 of 10 displays: median +1.05 dB, +1.05 to +2.15 on nine"
     )
-    assert first.endswith("; 1 of the displays have the published +2.90 dB or more.")
+    assert first.endswith("; 1 has the published +2.90 dB.")
 
 
 def test_few_displays_are_answered_each_by_itself():

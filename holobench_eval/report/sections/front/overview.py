@@ -10,14 +10,18 @@ import numpy as np
 from ...answers import kind_of
 from ...answers.kind import subjects
 from ...charts import paired
+from ...charts.family import draw_map
+from ...charts.look.methods import looks
 from ...charts.rows import Row, draw_rows
 from ...data import over_displays
 from ...data.categories import OFFLINE, ONLINE
+from ...data.display_map import display_map
 from ...data.results import Results
 from ...markdown import heading
 from ...section import Blocks, Figures, Report, Section
 
 PICTURES = "answer-pictures.jpg"
+MOST_METHODS = 5  # in the map
 
 
 def _table(report: Report, _: Figures) -> Blocks:
@@ -32,11 +36,27 @@ def _plot(report: Report) -> Iterator[tuple[Path, str]]:
         path = report.figures / "quality-displays.png"
         paired.draw_over_displays(report.results, path)
         yield path, paired.caption_over_displays(report.results)
+        yield from _map(report)
         return
     for condition, stem in paired.displays(report.results)[:1]:
         path = report.figures / f"quality-paired-{stem}.png"
         paired.draw(report.results, condition, path)
         yield path, paired.caption(report.results, condition)
+
+
+def _map(report: Report) -> Iterator[tuple[Path, str]]:
+    """Margins against what an error budget of the displays found, of the best methods and those of the question."""
+    results = report.results
+    if found := display_map(results):
+        wanted = [*subjects(results), *(label for label in found.labels[1:] if label not in subjects(results))]
+        looked, path = looks(results.names), report.figures / "quality-map.png"
+        axis = f"difference to {results.layout.baseline} in {results.headline.axis}"
+        draw_map(path, found, axis, {label: looked[label] for label in wanted[:MOST_METHODS]})
+        yield (
+            path,
+            f"Differences to {results.layout.baseline}, a mark a display, against two parts of its error, as error "
+            "budgets of the displays found them. Lines: least squares, for the eye.",
+        )
 
 
 def _row(report: Report) -> Iterable[tuple[Path, str]]:

@@ -1,13 +1,17 @@
-"""Which displays have published figures: values of pairs of parameters, of all draws and of those that fit."""
+"""A family of displays: which of them have published figures, and what methods gain on those that do."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ...study.calibration.family import Range, Row
+from ..data.display_map import Map
 from .look.medium import medium
-from .style import PALE, new_figure, save, style
+from .look.methods import Look
+from .style import PALE, grid, new_figure, save, style
 
 SIDE, FRAME = 150, 90  # pixels: of a panel, around all
 BINS = 12
@@ -54,3 +58,30 @@ def draw_corner(path: Path, parameters: Sequence[Range], rows: Sequence[Row], fi
 def _named(given: Range) -> str:
     words = medium().wrap(given.words, SIDE)
     return f"{words}\n[{given.unit}]" if given.unit else words
+
+
+def draw_map(path: Path, found: Map, axis: str, looked: Mapping[str, Look]) -> None:
+    """Draw the margins of some methods against each share of a map, a mark a display, with a line for the eye.
+
+    axis: name of the margins; looked: the look of the methods by label.
+    """
+    with style():
+        width = medium().width
+        figure = new_figure(width, round(0.55 * width))
+        figure.set_layout_engine("constrained")
+        panels = figure.subplots(1, 2, sharey=True)
+        for axes, shares, name in zip(panels, 100 * found.shares.T, found.axes, strict=True):
+            for label, look in looked.items():
+                values = found.margins[found.labels.index(label)]
+                given = {"marker": look.marker, "color": look.face, "edgecolor": look.colour, "s": 30}
+                axes.scatter(shares, values, label=label, **given)
+                ends = np.array([shares.min(), shares.max()])
+                axes.plot(ends, np.polyval(np.polyfit(shares, values, 1), ends), color=look.colour, linewidth=1)
+            axes.axhline(0, color="black", linewidth=1)
+            axes.set_xlabel(medium().wrap(f"error explained by {name} [%]", 0.42 * width), parse_math=False)
+            grid(axes)
+        panels[0].set_ylabel(medium().wrap(axis, 0.4 * width), parse_math=False)
+        handles = panels[0].get_legend_handles_labels()
+        for text in figure.legend(*handles, loc="outside lower center", ncols=4, frameon=False).get_texts():
+            text.set_parse_math(False)
+        save(figure, path)
