@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from functools import cache, cached_property
@@ -21,7 +21,7 @@ from ..core.files import read_regular
 from ..core.hashing import canonical, digest
 from ..core.io import TEMPORARY, file_name, write_atomically
 from . import identity, isolation
-from .plan import REFERENCE, Cell, Plan
+from .plan import Cell, Plan
 
 # No file holds the last three: ``missing`` is a planned cell without a record, ``untimed`` one that is done and has to
 # be timed alone, ``unscored`` one whose record lacks a metric, or has it of another version.
@@ -129,9 +129,9 @@ class Store:
         with the picture that it is compared with."""
         return self.folder / f"{identity}.npy"
 
-    def target_thumbnail(self, target: str, reference: str = REFERENCE) -> Path:
-        """The target as a small sRGB picture. reference: the condition of the floor of the displays that show it so."""
-        return self.folder / f"target-{file_name(target if reference == REFERENCE else f'{reference}, {target}')}.png"
+    def target_thumbnail(self, target: str, shape: Sequence[int] = ()) -> Path:
+        """The target as a small sRGB picture. shape: ``(C, h, w)`` as displays show it; none: as it is."""
+        return self.folder / f"target-{file_name(' '.join(['x'.join(map(str, shape)), target]).strip())}.png"
 
     def write(self, record: Record, lasting: bool = True) -> None:
         """Write a record atomically. A failure never replaces a score: that cell was only to be timed again.

@@ -179,7 +179,9 @@ def test_a_missing_config_is_named(tmp_path: Path) -> None:
 
 def test_every_config_of_the_repository_asks_its_question_and_says_what_would_change_the_answer() -> None:
     for path in sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")):
-        study = load_study(path) if path.stem not in ("hil-paper", "peers", "photographs") else None  # these need what is not here
+        study = (
+            load_study(path) if path.stem not in ("hil-paper", "peers", "photographs") else None
+        )  # these need what is not here
         text = path.read_text()
         assert study is None or "?" in study.question, path
         assert "\nquestion: " in text, path

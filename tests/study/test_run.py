@@ -11,6 +11,7 @@ from holobench_eval.commands.plan import preview
 from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.core.io import file_name
 from holobench_eval.core.pictures import open_picture
+from holobench_eval.report import Results, layout_of, records_frame
 from holobench_eval.study import provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
@@ -171,8 +172,19 @@ def add_one_laser(folder: Path) -> None:
 def test_a_display_of_one_laser_has_gray_pictures_of_the_targets(tmp_path: Path) -> None:
     add_one_laser(tmp_path)
     compute(write_config(tmp_path, profiles="ideal, one.yaml", count=1), tmp_path / "out")
-    paths = [Store(tmp_path / "out").target_thumbnail("gray 0", name) for name in ("reference", "reference for one")]
-    assert [open_picture(path.read_bytes()).channels for path in paths] == [3, 1]
+    paths = [*(tmp_path / "out/records").glob("target-*gray_0*.png")]
+    assert sorted(open_picture(path.read_bytes()).channels for path in paths) == [1, 3]
+
+
+def test_targets_keep_their_pictures_when_displays_change_places(tmp_path: Path) -> None:
+    add_one_laser(tmp_path)
+    for order in ("ideal, one.yaml", "one.yaml, ideal", "ideal, one.yaml"):
+        config = write_config(tmp_path, profiles=order, count=1)
+        layout = layout_of(load_study(config))
+        results = Results(records_frame(compute(config, tmp_path / "out").records, layout), layout)
+        shapes = [results.shape(results.reference(name)) for name in ("ideal", "one")]
+        paths = [Store(tmp_path / "out").target_thumbnail("gray 0", shape) for shape in shapes]
+        assert [open_picture(path.read_bytes()).channels for path in paths] == [3, 1], order
 
 
 def test_captures_and_phases_are_saved_on_request(tmp_path: Path) -> None:

@@ -27,8 +27,9 @@ class Thumbnails:
     def targets(self, condition: str) -> dict[str, Picture]:
         """The targets that have a picture, as a display is to show them, in their order."""
         reference = self.results.reference(condition)
+        shape = self.results.shape(reference)
         if reference not in self._targets:
-            paths = {target: self.store.target_thumbnail(target, reference) for target in self.results.targets}
+            paths = {target: self.store.target_thumbnail(target, shape) for target in self.results.targets}
             pictures = ((target, self._load(path)) for target, path in paths.items())
             self._targets[reference] = {target: picture for target, picture in pictures if picture is not None}
         return self._targets[reference]

@@ -169,17 +169,30 @@ def _score(a: Run, b: Run, metric: str | None) -> Score:
 
 
 def _displays(a: Run, b: Run, displays: Mapping[str, str] | None) -> dict[str, str]:
-    """Display of A: display of B; the reference rows, which no display shows, always belong together."""
+    """Display of A: display of B; reference rows, which no display shows, go with the display of their targets."""
     of_a, of_b = ({str(name) for name in run.records["condition"]} for run in (a, b))
     if displays is None:
-        return {name: name for name in sorted(of_a | of_b)}
+        names = {name: name for name in sorted(of_a | of_b) if not is_reference(name)}
+        return names | _references(a, b, names)
     for name, known, run in [*((n, of_a, a) for n in displays), *((n, of_b, b) for n in displays.values())]:
         if name not in known:
             shown = [other for other in known if not is_reference(other)]
             raise UserError(f"--displays: {run.folder} has no display '{name}'; {suggest(name, shown)}")
     if len(set(displays.values())) < len(displays):
         raise UserError("--displays: two displays of A are paired with one of B; expected a display of B for each")
-    return {**displays, REFERENCE: REFERENCE}
+    return {**displays, **_references(a, b, displays)}
+
+
+def _references(a: Run, b: Run, names: Mapping[str, str]) -> dict[str, str]:
+    """Reference rows of A: those of B for the display that is paired with theirs, else for the first displays."""
+    of_a, of_b = (
+        {row.display: row.condition for row in run.records.itertuples() if is_reference(row.condition)}
+        for run in (a, b)
+    )
+    paired = {mine: of_b[names[display]] for display, mine in of_a.items() if names.get(display) in of_b}
+    if REFERENCE not in paired and REFERENCE not in paired.values():
+        paired[REFERENCE] = REFERENCE
+    return paired
 
 
 def _cells(run: Run, score: Score, names: Mapping[str, str]) -> pd.DataFrame:

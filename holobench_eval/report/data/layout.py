@@ -97,8 +97,9 @@ class Layout:
     of others. real: whether the display exists. clusters: of every target, such as the photograph of a crop (empty:
     each target is its own). metrics: names of those the study wants (None: all). study: its name, the config's file
     without the ending; params: every parameter of a method, by label; capture_limits: the most captures that a display
-    allows a method for a target, by label; panels: rows and columns of the panel of each display [px];
-    profiles: of simulated displays; related: layouts of related studies, by their names.
+    allows a method for a target, by label; panels: rows and columns of the panel of each display [px]; shapes: of the
+    targets as each display is to show them, ``(C, h, w)``; profiles: of simulated displays; related: layouts of related
+    studies, by their names.
     """
 
     title: str
@@ -135,6 +136,7 @@ class Layout:
     params: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     capture_limits: Mapping[str, int] = field(default_factory=dict)
     panels: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    shapes: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
     profiles: Mapping[str, Profile] = field(default_factory=dict)
     related: Mapping[str, Layout] = field(default_factory=dict)
 
@@ -252,6 +254,7 @@ def layout_of(study: Study) -> Layout:
         params={entry.label: entry.params for entry in study.methods},
         capture_limits={entry.label: entry.captures for entry in study.methods if entry.captures is not None},
         panels={condition.name: condition.spec.shape for condition in conditions.values()},
+        shapes={each.name: (len(each.spec.wavelengths), *each.spec.region.shape) for each in conditions.values()},
         profiles=profiles,
         related={name: layout_of(load_study(study.folder / f"{name}.yaml")) for name in study.related},
     )

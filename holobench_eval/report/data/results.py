@@ -200,6 +200,10 @@ class Results:
         own = reference_of(self.display_of.get(condition, condition))
         return own if own in self.display_of else REFERENCE
 
+    def shape(self, reference: str) -> tuple[int, ...]:
+        """Of the targets of some reference rows, as displays are to show them; none for pictures from files."""
+        return self.layout.shapes.get(self.display_of.get(reference, reference), ())
+
     @property
     def by_reference(self) -> dict[str, list[str]]:
         """The displays that have pictures of the reference rows, by the condition of those rows."""

@@ -145,5 +145,6 @@ def _files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
     captures = dict(zip(names, done["cell"], strict=True))
     paths = {cell: store.thumbnail(captures[cell]) for cell in cells if cell in captures}
     truths = (cell for target in report.results.targets for cell in _truths(report, target))
-    targets = {cell: store.target_thumbnail(target, reference) for cell in truths for _, reference, target in [cell]}
+    shape = report.results.shape
+    targets = {cell: store.target_thumbnail(cell[2], shape(cell[1])) for cell in truths}
     return {cell: path for cell, path in (targets | paths).items() if path.is_file()}

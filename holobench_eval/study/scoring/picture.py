@@ -80,7 +80,7 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor]) -> Measure
     others = [replace(cell, **cell.params, holograms=cell.holograms.get("wrong", {})) for cell in cells if cell.params]
     target, *wrong = (wanted(cell, display) for cell in (cells[0], *others))
     captures = floor_captures(target, wrong, cells[0].seed, cells[0].target)
-    write_thumbnail(job.store.target_thumbnail(cells[0].target, cells[0].condition), target)
+    write_thumbnail(job.store.target_thumbnail(cells[0].target, target.shape), target)
 
     def reference(cell: Cell, _: Condition) -> Record:
         image = captures[cell.method]()

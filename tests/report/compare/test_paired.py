@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report.compare.paired import Comparison, Unpaired, compare
 from holobench_eval.report.compare.runs import read_run
 from holobench_eval.report.data.statistics import mean_interval
+from holobench_eval.report.data.tables import csv_text
 from tests.support.records_on_disk import Scores, write_report
 
 BASE = [20.0, 21.0, 22.0, 23.0]
@@ -74,6 +77,22 @@ def test_displays_of_other_names_are_paired_where_they_are_stated(tmp_path: Path
     stated = compared(tmp_path, a, b, displays={"old": "new"})
     assert {row.display for row in stated.rows} == {"old = new", "reference"}
     assert stated.unpaired == ()
+
+
+def test_reference_rows_go_with_the_display_of_their_targets(tmp_path: Path) -> None:
+    """Displays of other sizes have rows of their own, and the first of a study has those without a name."""
+    names = ("reference", "reference for y"), ("reference for x", "reference")
+    runs = []
+    for name, (of_x, of_y), gain in zip("ab", names, (0, 1), strict=True):
+        scores = {("f", of_x): shifted(gain), ("f", of_y): shifted(10 + gain), ("m", "x"): BASE, ("m", "y"): BASE}
+        file = write_report(tmp_path / name, scores) / "records.csv"
+        rows = pd.read_csv(io.StringIO(file.read_text()))
+        rows["display"] = rows["condition"].replace({of_x: "x", of_y: "y"})
+        file.write_text(csv_text(rows))
+        runs.append(read_run(file.parent))
+    found = [row for row in compare(*runs).rows if row.method == "f"]
+    assert [row.change.mean for row in found] == pytest.approx([1, 1])
+    assert {row.displays for row in found} == {*zip(*names, strict=True)}
 
 
 def test_two_displays_of_one_report_can_be_compared(tmp_path: Path) -> None:
