@@ -1,4 +1,4 @@
-"""The files of a report for programs and papers: CSV, Parquet, LaTeX, and the dictionary of their columns."""
+"""The files of a report for programs and papers: CSV, LaTeX, and the dictionary of their columns."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from ..data.results import Results
 from ..data.tables import csv_text
 from .dictionary import File, dictionary
 from .latex import latex_tables
-from .parquet import is_available, write_parquet
 
 
 def texts(results: Results) -> dict[str, str]:
-    """The text of every file but the Parquet twin, by its name."""
+    """The text of every file, by its name."""
     frames: dict[File, pd.DataFrame] = {
         "records.csv": results.frame,
         "table.csv": results.table,
@@ -27,11 +26,6 @@ def texts(results: Results) -> dict[str, str]:
 
 
 def write_files(results: Results, output: Path) -> None:
-    """Write records.csv, table.csv, tests.csv, columns.md, table.tex and, with pyarrow, records.parquet."""
+    """Write records.csv, table.csv, tests.csv, columns.md and table.tex."""
     for name, text in texts(results).items():
         write_atomically(output / name, text.encode())
-    parquet = output / "records.parquet"
-    if is_available():
-        write_parquet(parquet, results.frame)
-    else:
-        parquet.unlink(missing_ok=True)  # of other records

@@ -100,8 +100,7 @@ def dictionary(files: Mapping[File, pd.DataFrame]) -> Markdown:
     parts: list[object] = [
         heading("Columns", 1),
         "Where a column has a unit, the unit is the last part of its name. Numbers have six significant digits, and an "
-        "empty cell is an unknown number. Text that a spreadsheet would run as a formula has an apostrophe before it. "
-        "records.parquet, where it was written, holds the same as records.csv without these apostrophes.",
+        "empty cell is an unknown number. Text that a spreadsheet would run as a formula has an apostrophe before it.",
     ]
     for file, frame in files.items():
         parts += [
