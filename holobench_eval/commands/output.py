@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,6 +17,7 @@ from ..core.errors import listed, printable
 
 if TYPE_CHECKING:
     from ..report import Results
+    from ..report.data.board import Board, Display
     from ..study.definition import Study
 
 MOST_REASONS = 10  # that a terminal shows; details.md has all
@@ -65,48 +65,44 @@ def write_report(
 
 
 def print_headline(console: Console, results: Results) -> None:
-    """Print the headline score, rank and captures of every method, a table a condition unless there are many displays,
-    in 80 columns; and what is odd about phases."""
+    """Print the board of every display unless there are many, in 80 columns; and what is odd about phases."""
     from ..report.data import over_displays
+    from ..report.data.board import board
     from ..report.data.phrases import remarks
 
-    for condition in [] if over_displays.applies(results) else results.conditions:
-        console.print(headline_table(results, condition))
+    drawn = board(results)
+    for display in [] if over_displays.applies(results) else drawn.displays:
+        console.print(board_of(drawn, display))
     for remark in remarks(results):
         console.print(remark, style="yellow", markup=False, highlight=False, soft_wrap=True)
 
 
-def headline_table(results: Results, condition: str) -> Table:
-    """A condition's table for a terminal, best first; the report has the other columns. Only names are broken into
-    lines.
-
-    Behind the ranked methods come those without a score for every target, and oracles. A rank is that among methods
-    which were given as much of the camera, and named by them where there are several such categories.
-    """
-    from ..report.data.categories import CATEGORIES, ORACLE
-    from ..report.data.phrases import counted
+def board_of(drawn: Board, display: Display) -> Table:
+    """A display's board for a terminal; the report has the other columns. Only names are broken into lines."""
+    from ..report.data.board import GROUPS
     from ..report.data.text import FILES, number
 
-    score, layout = results.headline, results.layout
-    ranked = results.ranking(condition, categories=[name for name in CATEGORIES if name != ORACLE])
-    oracles = results.ranking(condition, categories=(ORACLE,))
-    holed = [name for name in results.methods(condition) if name not in (*ranked, *oracles)]
-    methods = [*ranked, *holed, *oracles]
-    several = len({layout.category(name) for name in methods} - {ORACLE}) > 1
-    table = Table(title=escape(f"{condition}: {score.heading}"), title_justify="left")
+    results, score = drawn.results, drawn.results.headline
+    table = Table(title=escape(f"{display.name}: {score.heading}"), title_justify="left")
+    table.add_column("", no_wrap=True)
     table.add_column("method", overflow="fold")
     table.add_column(escape(f"{score.title} [{score.unit}]" if score.unit else score.title), no_wrap=True)
-    table.add_column("rank", no_wrap=True)
-    spends = layout.measure != FILES and "total_captures" in results.table
+    if results.layout.baseline:
+        table.add_column(escape(f"against {results.layout.baseline}"), overflow="fold")
+    spends = results.layout.measure != FILES and results.layout.spends_captures
     if spends:
-        table.add_column("captures", justify="right", no_wrap=True)
-    for name in methods:
-        row, category = results.row(name, condition), layout.category(name)
-        lacks = row["n"] < len(results.targets)
-        rank = number(row.get("rank", math.nan))
-        place = f"{rank} {category}" if several and rank != "–" else "not ranked" if lacks else rank
-        captures = [number(row["total_captures"])] if spends else []
-        table.add_row(*map(escape, (counted(results, name, condition), score.in_row(row), place, *captures)))
+        table.add_column("photos", justify="right", no_wrap=True)
+    for group, rows in display.groups:
+        if len(display.groups) > 1:
+            table.add_row("", f"[bold]{GROUPS[group]}[/]")
+        for row in rows:
+            named = ", ".join([row.label, *row.marks])
+            lacks = f", {row.scored} of {len(results.targets)} targets" * (row.scored < len(results.targets))
+            cells = [row.tier, f"{named}{lacks}", score.number(row.score.mean)]
+            if results.layout.baseline:
+                cells.append(score.estimate(row.test.estimate, signed=True) if row.test else "")
+            cells += [number(row.photographs or 0)] if spends else []
+            table.add_row(*map(escape, cells))
     return table
 
 

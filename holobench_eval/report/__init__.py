@@ -13,7 +13,6 @@ from .data.tables import (
     table_from_records,
 )
 from .description import Description
-from .sections.results import headline_rows
 
 __all__ = [
     "Description",
@@ -23,7 +22,6 @@ __all__ = [
     "committed_records",
     "csv_text",
     "difference",
-    "headline_rows",
     "layout_of",
     "read_records",
     "recompute_files",

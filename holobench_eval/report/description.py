@@ -116,7 +116,7 @@ def simulated(
 
 def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
-    measured = "simulated; the parameters are assumed or from data sheets, and none was measured on a real panel"
+    measured = "simulated, with parameters that are assumed or from data sheets and measured on no panel"
     if profile.name in {*names(family=True), *families()}:
         return f"{measured}; drawn from ranges, and kept since its captures have published figures"
     try:

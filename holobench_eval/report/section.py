@@ -9,41 +9,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from .charts.thumbnails import Thumbnails
 from .data.layout import Layout
-from .data.phrases import marked
 from .data.ranks import Ranks, ranks
 from .data.results import Results
 from .data.sweeps import Sweep, sweeps
-from .data.text import number
 from .data.trainings import Training, trainings
 from .description import Description
-from .markdown import Markdown, blocks, heading, table
+from .markdown import Markdown
 
 Blocks = Iterable[object]  # what `markdown.blocks` takes
 Figures = Sequence[Markdown]
-Column = tuple[str, Callable[[pd.Series], str]]  # a heading, and the cell of a row of the table
-
-
-def column(heading: str, key: str) -> Column:
-    """A column of plain numbers."""
-    return heading, lambda row: number(row[key])
-
-
-def method_rows(results: Results, condition: str, columns: Sequence[Column]) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of a display's table, a row for every method."""
-    rows = [
-        [marked(results, name, condition), *(cell(results.row(name, condition)) for _, cell in columns)]
-        for name in results.methods(condition)
-    ]
-    return ["method", *(heading for heading, _ in columns)], rows
-
-
-def by_method(results: Results, condition: str, columns: Sequence[Column]) -> Markdown:
-    """A display's table, a row for every method."""
-    return table(*method_rows(results, condition, columns))
 
 
 @dataclass(frozen=True)
@@ -97,14 +73,6 @@ class Report:
     def ranks(self) -> list[Ranks]:
         """Rankings over draws of the displays."""
         return ranks(self.results)
-
-    def by_display(self, rows: Callable[[Results, str], object], instead: str = "") -> Markdown:
-        """A table for every display that has one, under its name; ``instead`` where none has."""
-        parts: list[object] = []
-        for condition in self.results.conditions:
-            if contents := rows(self.results, condition):
-                parts += [heading(condition, 3), contents]
-        return blocks(parts or [instead])
 
 
 @dataclass(frozen=True)

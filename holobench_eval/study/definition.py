@@ -108,17 +108,30 @@ class Probe:
 
 
 @dataclass(frozen=True)
+class Claim:
+    """What was published of a change of the display, which the report judges for the first method of the question.
+
+    says: in words; until: for values up to this, in size (None: for all).
+    """
+
+    says: Text
+    until: float | None = None
+
+
+@dataclass(frozen=True)
 class Sweep:
     """A change of the displays at test time, with a list of values; methods were prepared without it.
 
     condition: its kind (``holoeval list conditions``); values: numbers or names; count: how many siblings or draws
-    to take instead of values; profiles: the displays that are changed, a subset of the study's.
+    to take instead of values; profiles: the displays that are changed, a subset of the study's; claim: what was
+    published of such a change.
     """
 
     condition: Text
     values: tuple[float | Text, ...] = ()
     count: Annotated[int, Interval(ge=1, le=10_000)] | None = None
     profiles: tuple[str, ...] = ()
+    claim: Claim | None = None
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ def test_every_chart_of_numbers_is_written_for_one_and_two_columns_as_pdf_and_sv
     names = {
         "quality-paired-leto-aged",
         "quality-paired-ideal",
-        "quality-by-target",
         "quality-captures",
         "quality-time",
     }

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..data.board import Board
 from ..data.error_budget import Budget, Part, budgets
 from ..data.over_displays import is_many
 from ..data.results import Results
@@ -14,27 +15,27 @@ from ..data.statistics import Array, Estimate
 from ..data.text import percent, words
 from ..markdown import Markdown, table
 from .kind import Kind
-from .prediction import controlled
 
 
-def sentences(results: Results) -> Iterator[str]:
-    """What explains most, and who leads by control; then a sentence a display: what the image-domain predictions, then
-    all of them, explain, and what remains. Over many displays, a sentence for all."""
+def verdicts(results: Results) -> Iterator[str]:
+    """One a display: the parts of the error, and what its removal is worth. Over many displays, one for all."""
     found = budgets(results)
     if not found:
         yield "No display has the scores of all methods for all targets, so none has a budget."
-        return
-    if is_many(results):
-        shares = [
-            f"{label} {means.mean():.0f} % ({means.min():.0f} to {means.max():.0f})" for label, means in _over(found)
-        ]
-        yield f"Over {len(found)} displays, means and ranges of the shares of the squared error: {words(shares)}."
-        return
-    largest = [f"on {budget.condition} {_most(budget)}" for budget in found]
-    yield f"What explains most of the squared error: {'; '.join(largest)}."
-    yield from controlled(results)
-    for budget in found:
-        yield _reading(budget)
+    elif is_many(results):
+        over = [(label, means.mean(), means.min(), means.max()) for label, means in _over(found)]
+        shares = [f"{label} {mean:.0f} % ({low:.0f} to {high:.0f})" for label, mean, low, high in over]
+        yield f"Over {len(found)} displays, the squared error is explained by {words(shares)}."
+    else:
+        for budget in found:
+            yield f"{f'{budget.condition}: ' * (len(found) > 1)}{_reading(budget)}"
+
+
+def _reading(budget: Budget) -> str:
+    """The shares, and the decibels of the last two links of the chain: of the image, and of the field."""
+    shares = ", ".join(f"{part.label} {100 * part.share.mean:z.0f} %" for part in budget.parts)
+    gains = [f"{part.gain.mean:+.1f} dB with {part.label}" for part in budget.explained[-2:] if part.gain]
+    return f"the error is explained by {shares}; at most {words(gains)}."
 
 
 def _over(found: list[Budget]) -> Iterator[tuple[str, Array]]:
@@ -43,31 +44,8 @@ def _over(found: list[Budget]) -> Iterator[tuple[str, Array]]:
         yield parts[0].label, np.array([100 * part.share.mean for part in parts])
 
 
-def _most(budget: Budget) -> str:
-    part = max(budget.parts, key=lambda part: part.share.mean)
-    return f"{part.label}, {_percent(part)} %"
-
-
-def _reading(budget: Budget) -> str:
-    shares = [f"{part.label} {_percent(part)} %" for part in budget.parts]
-    gains = [f"{_gain(part)} with {part.label}" for part in budget.explained]
-    return (
-        f"On {budget.condition} the captures have a PSNR of {_decibel(budget.psnr)}, and their squared error splits "
-        f"into {words(shares)}; taking off what is predicted, part after part in this order, would raise the PSNR by "
-        f"{words(gains)}, which no hologram reaches (means over images, which do not follow from the mean shares)."
-    )
-
-
 def _percent(part: Part) -> str:
     return percent(part.share)
-
-
-def _gain(part: Part) -> str:
-    return _decibel(part.gain) if part.gain else "–"
-
-
-def _decibel(found: Estimate) -> str:
-    return f"{_interval(found)} dB"
 
 
 def _interval(found: Estimate) -> str:
@@ -75,9 +53,10 @@ def _interval(found: Estimate) -> str:
     return mean if low == "nan" else f"{mean} [{low}, {high}]"
 
 
-def rows(results: Results) -> Markdown | None:
+def rows(board: Board) -> Markdown | None:
     """A row a display and part: its share, what removing it and all above it would gain, what it leaves by itself, and
     the control of its model. Over many displays a row a part: the mean and the range of its share."""
+    results = board.results
     if found := budgets(results) if is_many(results) else []:
         shares = [
             [label, f"{part.mean():.0f}", f"{part.min():.0f} to {part.max():.0f}"] for label, part in _over(found)
@@ -108,7 +87,7 @@ def _control(results: Results, score: Score, part: Part, condition: str) -> str:
 KIND = Kind(
     question="Where does the error of the captures come from, and who can remove it?",
     applies=lambda results: results.layout.measure == "error_budget",
-    sentences=sentences,
+    verdicts=verdicts,
     table=rows,
     limits=(
         "Bounds: a part is what one prediction explains and none before it did, if it is known which prediction to "

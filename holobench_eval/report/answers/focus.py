@@ -4,29 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.phrases import marked, relation, tested
+from ..data.board import Board
+from ..data.phrases import difference, marked, tested, verdict
 from ..data.results import Results
 from ..data.text import number
 from ..markdown import Markdown, table
-from .comparison import best, floor
 from .kind import Kind, subjects
 
 
-def sentences(results: Results) -> Iterator[str]:
-    """The methods that make one hologram of all planes, or that the question names, against the baseline; the best."""
+def verdicts(results: Results) -> Iterator[str]:
+    """One a display: the methods that make one hologram of all planes, or that the question names."""
     layout, score = results.layout, results.headline
     chosen = dict.fromkeys([*(label for label in layout.methods if label in layout.stacked), *subjects(results)])
-    for label in list(chosen)[:2]:
-        parts = [
-            f"on {condition} {relation(score, test)}, taking {_times(results, label, condition)}"
-            for condition in results.conditions
-            if (test := tested(results, label, condition))
-        ]
-        what = "one hologram of all planes" if label in layout.stacked else "one hologram a plane, moved by a lens"
+    for condition in results.conditions:
+        parts = []
+        for label in chosen:
+            if test := tested(results, label, condition):
+                what = ", one hologram of all planes," if label in layout.stacked else ""
+                shown = {"better": "", "worse": ""}.get(verdict(score, test), ", not shown")
+                parts.append(
+                    f"{label}{what} {difference(score, test.estimate)} against {test.first}{shown}, "
+                    f"{_times(results, label, condition)}"
+                )
         if parts:
-            yield f"{label}, {what}: {'; '.join(parts)}."
-    yield best(results)
-    yield from floor(results)
+            yield f"{condition}: {'; '.join(parts)}."
 
 
 def _planes(results: Results) -> int:
@@ -41,7 +42,7 @@ def _seconds(results: Results, label: str, condition: str) -> float:
 
 def _times(results: Results, label: str, condition: str) -> str:
     own, other = (_seconds(results, name, condition) for name in (label, str(results.layout.baseline)))
-    return f"{own / other:.2g} times its computing time per scene"
+    return f"{own / other:.2g} times its seconds a scene"
 
 
 def _against(results: Results, label: str, condition: str) -> str:
@@ -49,8 +50,9 @@ def _against(results: Results, label: str, condition: str) -> str:
     return results.headline.estimate(test.estimate, signed=True) if test else "–"
 
 
-def rows(results: Results) -> Markdown | None:
+def rows(board: Board) -> Markdown | None:
     """A row a method and display: score over all planes, difference to the baseline, seconds a scene."""
+    results = board.results
     score, baseline = results.headline, results.layout.baseline
     lines = [
         [
@@ -72,7 +74,7 @@ def rows(results: Results) -> Markdown | None:
 KIND = Kind(
     question="What does one hologram of all planes gain over one hologram a plane, and what does it cost?",
     applies=lambda results: bool(results.layout.planes),
-    sentences=sentences,
+    verdicts=verdicts,
     table=rows,
     limits=(
         "Scenes: the planes of a scene are not independent, so intervals and tests are over scenes, which are few.",

@@ -14,70 +14,48 @@ from ..markdown import Markdown
 from ..section import Report
 from .kind import Kind, subjects
 
+WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
+FIRST = 5  # that stand in report.md; the others are in details.md
 
-def limits(report: Report, kind: Kind) -> Iterator[Markdown]:
-    """The items of the list, each with its name in bold."""
-    for text in (*_all(report), *kind.limits):
+
+def limits(report: Report, kind: Kind) -> list[Markdown]:
+    """The items of the list, each with its name in bold, what matters most first."""
+    texts = [*remarks(report.results), *_sample(report), *_form(report), *kind.limits, *_displays(report)]
+    texts += [f"Measured: {report.layout.text.caution}"] * bool(report.layout.text.caution)
+    texts += [f"Published: {report.layout.reported_source}."] * bool(report.layout.reported_source)
+    texts += [f"Note: {report.layout.note}"] * bool(report.layout.note)
+    texts += [*_weights(report), *_tuned(report), *_seconds(report), *_lpips(report)]
+    found = []
+    for text in texts:
         name, _, rest = text.partition(": ")
-        yield Markdown("**{}.** {}").format(name, f"{rest[:1].upper()}{rest[1:]}")
+        found.append(Markdown("**{}:** {}").format(name, rest))
+    return found
 
 
-def _all(report: Report) -> Iterator[str]:
-    yield f"Sample: {_sample(report)}"
-    if report.layout.text.caution:
-        yield f"Measured: {report.layout.text.caution}"
-    yield from remarks(report.results)
-    yield from _displays(report)
-    yield from _form(report)
-    yield from _tuned(report)
-    yield from _without(report)
-    if report.layout.note:
-        yield f"Note: {report.layout.note}"
-    if report.layout.privileged:
-        yield (
-            f"Oracle: the method {words(sorted(report.layout.privileged))} may differentiate through the simulated "
-            "bench, which no real method can; it starts from the best phase of all others, so that no method is above "
-            "it, but a better phase than its descent finds may exist. It is not ranked."
-        )
-
-
-def _sample(report: Report) -> str:
+def _sample(report: Report) -> Iterator[str]:
     results = report.results
     targets, clusters = len(results.targets), len(set(results.clusters))
-    among = (
-        f" in {clusters} cluster{'s' * (clusters > 1)} (parts of one picture form a cluster, which counts as one)"
-        if clusters < targets
-        else ""
-    )
-    trained = ", nor with another training of a method" if report.trainings else ""
+    among = f" in {clusters} cluster{'s' * (clusters > 1)}" if clusters < targets else ""
+    trained = ", nor with another training" * bool(report.trainings)
     parts = [
-        f"{targets} target{'s' * (targets != 1)}{among}{_dataset(report)}; brackets hold 95 % intervals of how a mean "
-        f"varies with other images of the kind, not with other displays{trained}."
+        f"{targets} target{'s' * (targets != 1)}{among}; brackets are of how a mean varies with other pictures of the "
+        f"kind, not with other displays{trained}."
     ]
     tests = sum(np.isfinite(test.p) for test in results.against_baseline)
-    if tests:
-        smallest = 2.0 ** (1 - clusters)
+    smallest = 2.0 ** (1 - clusters)
+    if tests and smallest >= SIGNIFICANCE:
+        parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")
+    elif tests:
         parts.append(
-            f"p comes from sign flips of the {'clusters' if clusters < targets else 'targets'}, adjusted for "
-            f"{tests} comparison{'s' * int(tests > 1)} with {results.layout.baseline} (min-p); brackets are not "
-            f"adjusted. A difference is shown at p < {SIGNIFICANCE}; not shown does not mean that there is none."
+            f"Shown: p < {SIGNIFICANCE} by sign flips, adjusted for {tests} comparison{'s' * int(tests > 1)} with "
+            f"{results.layout.baseline}; not shown does not mean that there is none."
         )
-        if smallest >= SIGNIFICANCE:
-            parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")
     elif clusters < FEWEST:
         parts.append(f"Fewer than {FEWEST} clusters give no interval and no test.")
     holes = int((results.holes["category"] != FLOOR).sum())
     if holes:
-        parts.append(
-            f"{holes} planned cells have no score (details.md says why); a method that lacks one is not ranked."
-        )
-    return " ".join(parts)
-
-
-def _dataset(report: Report) -> str:
-    """Of which dataset the targets are, where they come from one."""
-    names = {record["cell"].get("dataset", "") for record in report.records} - {""}
-    return f", of the dataset {words(sorted(names))}" if names else ""
+        parts.append(f"{holes} planned cells have no score (details.md says why).")
+    yield f"Sample: {' '.join(parts)}"
 
 
 def _displays(report: Report) -> Iterator[str]:
@@ -85,28 +63,25 @@ def _displays(report: Report) -> Iterator[str]:
     for display in report.description.displays:
         same.setdefault(display.basis or display.heading, []).append(display.name)
     for basis, names in same.items():
-        yield f"Display{'s' * (len(names) > 1)} {words(names)}: {basis.rstrip('.')}."
+        yield f"{words(names)}: {basis.rstrip('.')}."
     if report.layout.measure == FILES:
         yield "Display: real, and known from its photographs alone."
 
 
 def _form(report: Report) -> Iterator[str]:
     """Which methods fit a model that has the bench's own equations for some of its effects."""
-    same: dict[tuple[tuple[str, ...], tuple[str, ...]], dict[str, int]] = {}
+    shares: dict[str, list[tuple[int, int]]] = {}
     for display in report.description.displays:
-        here: dict[tuple[str, ...], list[str]] = {}
         for label, effects in display.modelled.items():
             if effects and label in report.results.methods(display.name):
-                here.setdefault(effects, []).append(label)
-        for effects, labels in here.items():
-            same.setdefault((effects, tuple(labels)), {})[display.name] = display.effects
-    for (effects, fitted), totals in same.items():
-        ends = dict.fromkeys((min(totals.values()), max(totals.values())))
-        yield (
-            f"Inverse crime on {words(list(totals))}: the model of {words(list(fitted))} has the bench's own form for "
-            f"{len(effects)} of its {' to '.join(map(str, ends))} effects "
-            f"({', '.join(name.replace('_', ' ') for name in effects)}), so a real display may suit it less."
-        )
+                shares.setdefault(label, []).append((len(effects), display.effects))
+    known: dict[str, list[str]] = {}
+    for label, counts in shares.items():
+        ends = dict.fromkeys(f"{own} of {of}" for own, of in (min(counts), max(counts)))
+        known.setdefault(" to ".join(ends), []).append(label)
+    parts = [f"{words(labels)} for {count}" for count, labels in known.items()]
+    if parts:
+        yield f"Inverse crime: effects modelled by the simulation's own equations: {'; '.join(parts)}; expect less."
 
 
 def _tuned(report: Report) -> Iterator[str]:
@@ -119,7 +94,7 @@ def _tuned(report: Report) -> Iterator[str]:
         yield f"Tuned: {'; '.join(parts)}. {others}"
 
 
-def _without(report: Report) -> Iterator[str]:
+def _weights(report: Report) -> Iterator[str]:
     """Weights of others that the trained methods of the question take where a machine has them, and that it had not."""
     same: dict[tuple[str, ...], list[str]] = {}
     for training in report.trainings:
@@ -130,3 +105,24 @@ def _without(report: Report) -> Iterator[str]:
                 same[absent].append(label)
     for absent, labels in same.items():
         yield f"Weights: without {words(list(absent))}, which this machine has not, learned {words(labels)}."
+
+
+def _seconds(report: Report) -> Iterator[str]:
+    """Whether solutions were timed beside other work."""
+    done, workers = report.results.done, int(report.provenance.get("workers") or 1)
+    alone = done["timed_alone"] == 1 if "timed_alone" in done else np.zeros(len(done), dtype=bool)
+    if workers > 1 and not alone.any():
+        yield f"Seconds: of {workers} workers side by side, so longer than alone."
+    elif alone.any():
+        yield "Seconds: of holograms that were solved with nothing beside them."
+
+
+def _lpips(report: Report) -> Iterator[str]:
+    """Why LPIPS is missing where it was wanted, and how to have it."""
+    metrics, wanted = {score.metric for score in report.results.scores}, report.layout.metrics
+    has = any(name.startswith("lpips") for name in metrics)
+    if not has and (wanted is None or any(name.startswith("lpips") for name in wanted)):
+        yield (
+            f"LPIPS: left out, since no package contains the weights of its trunk. Put {WEIGHTS} into the folder "
+            "checkpoints of torch's hub cache and run again."
+        )

@@ -11,11 +11,11 @@ from ..data.text import words
 from ..markdown import Markdown, table
 from .kind import Kind, subjects
 
-MOST = 3  # methods that the answer names beside those of the question
+MOST = 2  # methods that the answer names beside those of the question
 CLEAR = 0.3  # share of the variance over displays that a parameter has to predict to be named as what decides
 
 
-def sentences(results: Results) -> Iterator[str]:
+def verdicts(results: Results) -> Iterator[str]:
     """The methods of the question; which is best, and what tells it; the best ones; what decides their margins; what
     judges their models; where no score could be had."""
     found, asked = margins(results), subjects(results)
@@ -27,8 +27,8 @@ def sentences(results: Results) -> Iterator[str]:
     for each in about:
         yield f"{_told(results, each, count)}{_published(results, each)}."
     yield from _map(results)
-    for each in [each for each in found if each not in about][:MOST]:
-        yield f"{_told(results, each, count)}."
+    if others := [each for each in found if each not in about][:MOST]:
+        yield f"{'; '.join(_told(results, each, count) for each in others)}."
     yield from _judged(results)
     yield from _decides(results, about or found[:1])
     if count < len(results.conditions):
@@ -38,9 +38,9 @@ def sentences(results: Results) -> Iterator[str]:
 
 def _told(results: Results, each: Margin, count: int) -> str:
     score, (low, high) = results.headline, each.spread
-    worse = f" and worse on {each.worse}" if each.worse else ""
+    worse = f" and loses on {each.worse}" if each.worse else ""
     return (
-        f"{each.label} is shown better than {results.layout.baseline} on {each.better} of {count} displays{worse}: "
+        f"{each.label} beats {results.layout.baseline} on {each.better} of {count} displays{worse}: "
         f"median {score.with_unit(each.median, signed=True)}, {score.number(low, signed=True)} to "
         f"{score.number(high, signed=True)} on nine in ten"
     )
@@ -113,8 +113,8 @@ def summary(results: Results) -> Markdown:
 KIND = Kind(
     question="On how many of the displays is a method better than the baseline, and by how much over all of them?",
     applies=applies,
-    sentences=sentences,
-    table=lambda results: summary(results) if margins(results) else None,
+    verdicts=verdicts,
+    table=lambda board: summary(board.results) if margins(board.results) else None,
     limits=(
         "Displays: drawn from assumed ranges, so that an interval over them speaks for displays of these ranges. "
         "Better and worse are shown by one family of tests over all methods and displays.",

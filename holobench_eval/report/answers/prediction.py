@@ -13,27 +13,55 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...metrics.control import MOST
+from ..data.board import Board
 from ..data.over_displays import is_many
-from ..data.phrases import short, tested, value, verdict
+from ..data.phrases import tested, value, verdict
 from ..data.results import Results
 from ..data.text import words
 from ..markdown import Markdown, table
-from .comparison import best, floor, rows
+from .board import board_table
 from .kind import Kind, subjects
 
 
-def sentences(results: Results) -> Iterator[str]:
-    """The best, the named ones against the baseline, control, the published order, and who predicts worse than no
-    network; over many displays, who leads on how many."""
+def verdicts(results: Results) -> Iterator[str]:
+    """One a display; over many displays, who leads on how many."""
     if is_many(results):
         yield from _leads(results)
         return
-    yield from _against(results)
-    yield best(results)
-    yield from controlled(results)
-    yield from reported(results)
-    yield from _untrained(results)
-    yield from floor(results)
+    many = len(results.conditions) > 1
+    for condition in results.conditions:
+        if ranking := results.ranking(condition):
+            parts = [f"{ranking[0]} predicts best ({value(results, ranking[0], condition)})"]
+            parts += [*_controls(results, condition), *_named(results, condition), *_reported(results, condition)]
+            yield f"{f'{condition}: ' * many}{'; '.join(parts)}."
+
+
+def _controls(results: Results, condition: str) -> Iterator[str]:
+    """Who leads by control."""
+    for score in results.control:
+        for first in results.ranking(condition, score.key)[:1]:
+            own, most = (results.values(first, condition, key).mean() for key in (score.key, MOST))
+            yield f"{first} answers changes best (control {score.number(own)} of {score.number(most)})"
+
+
+def _named(results: Results, condition: str) -> Iterator[str]:
+    """Which networks of the question beat the baseline."""
+    baseline, groups = results.layout.baseline, dict[str, list[str]]()
+    for label in subjects(results):
+        if test := tested(results, label, condition):
+            groups.setdefault(verdict(results.headline, test), []).append(label)
+    parts = [f"{name}: {words(labels)}" for name, labels in groups.items()]
+    if parts:
+        yield f"than {baseline}, {', '.join(parts)}"
+
+
+def _reported(results: Results, condition: str) -> Iterator[str]:
+    """The place of the row that was published as the first."""
+    published = {label: row["psnr"] for label, row in results.layout.reported.items() if "psnr" in row}
+    ranked = [label for label in results.ranking(condition) if label in published]
+    if len(ranked) > 1 and condition == (results.layout.reported_beside or condition):
+        first = max(ranked, key=lambda label: published[label])
+        yield f"{first}, published as first of {len(ranked)}, is number {ranked.index(first) + 1}"
 
 
 def _leads(results: Results) -> Iterator[str]:
@@ -49,7 +77,7 @@ def _leads(results: Results) -> Iterator[str]:
             )
 
 
-def over_many(results: Results) -> Markdown:
+def _over_many(results: Results) -> Markdown:
     """A row a method: every score's mean over the displays, and its range over them."""
     scores = [results.headline, *results.control]
     lines = []
@@ -65,70 +93,15 @@ def over_many(results: Results) -> Markdown:
     return table(["method", *itertools.chain(*columns)], lines)
 
 
-def _against(results: Results) -> Iterator[str]:
-    """The networks that the question names against the baseline, by verdict."""
-    condition, parts = results.conditions[0], dict[str, list[str]]()
-    for label in subjects(results):
-        if test := tested(results, label, condition):
-            parts.setdefault(verdict(results.headline, test), []).append(f"{label} ({short(results.headline, test)})")
-    if parts:
-        baseline = str(results.layout.baseline)
-        found = "; ".join(f"{name}: {words(labels)}" for name, labels in parts.items())
-        yield f"Compared with {baseline}, which has {value(results, baseline, condition)} on {condition}: {found}."
-
-
-def controlled(results: Results) -> Iterator[str]:
-    """Who leads by control on each display, before the one that predicts best, else before the next."""
-    parts = []
-    for score, condition in itertools.product(results.control, results.conditions):
-        ranking, predicting = results.ranking(condition, score.key), results.ranking(condition)[:1]
-        own = {label: score.number(float(results.values(label, condition, score.key).mean())) for label in ranking}
-        others = [f", before {label}, which predicts best, with {own[label]}" for label in predicting if label in own]
-        if predicting == ranking[:1]:
-            others = [f", before {label} with {own[label]}" for label in ranking[1:2]]
-        for first in ranking[:1]:
-            most = score.number(float(results.values(first, condition, MOST).mean()))
-            parts.append(f"{first} leads on {condition} with {own[first]} of {most} that noise allows{''.join(others)}")
-    if parts:
-        yield f"By control, what a model answers of a change on the display (1: all of it), {'; '.join(parts)}."
-
-
-def reported(results: Results) -> Iterator[str]:
-    """The published order of the rows, and the one that was measured."""
-    published = {label: row["psnr"] for label, row in results.layout.reported.items() if "psnr" in row}
-    condition = results.layout.reported_beside or results.conditions[0]
-    ranked = [label for label in results.ranking(condition) if label in published]
-    if len(ranked) < 2 or not results.headline.key.startswith("psnr"):
-        return
-    order = sorted(ranked, key=lambda label: -published[label])
-    first = f"{order[0]} first ({published[order[0]]:g} dB)"
-    here = ranked.index(order[0]) + 1
-    verdict = "the same order" if order == ranked else f"another order here, where it is number {here} of {len(ranked)}"
-    yield (
-        f"The paper reports {first} of the rows that it has, on other hardware and images: {verdict} "
-        f"({value(results, order[0], condition)})."
-    )
-
-
-def _untrained(results: Results) -> Iterator[str]:
-    """Trained rows that predict captures worse than the ideal image, which is a prediction without training."""
-    condition, layout = results.conditions[0], results.layout
-    for identity in [label for label in layout.identities if results.is_complete(label, condition)][:1]:
-        own, better = results.values(identity, condition).mean(), results.headline.better
-        trained = [label for label in results.ranking(condition) if label in layout.trained - layout.identities]
-        below = [label for label in trained if better(own, float(results.values(label, condition).mean()))]
-        if below:
-            yield (
-                f"{words(below)} predict{'s' * (len(below) == 1)} worse than the ideal image, what "
-                f"ideal optics would make of the hologram; it takes no training and scores "
-                f"{value(results, identity, condition)}."
-            )
+def rows(board: Board) -> Markdown | None:
+    """The board, or means over many displays."""
+    return _over_many(board.results) if is_many(board.results) else board_table(board)
 
 
 KIND = Kind(
     question="Which network predicts the captures of the display best?",
     applies=lambda results: results.layout.measure == "prediction",
-    sentences=sentences,
-    table=lambda results: over_many(results) if is_many(results) else rows(results),
+    verdicts=verdicts,
+    table=rows,
     limits=("Training: one short training of each network; the order after longer ones may be another.",),
 )

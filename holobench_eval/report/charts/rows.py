@@ -9,11 +9,18 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from .comparison import CAPTION, CHARACTER, GAP, HEADER, SIDE, Page, tile_size
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
 from .gallery import Crop, Picture, Tile, most_detailed
-from .style import style
+from .style import new_figure, save_picture, style
 
+SMALLEST_TILE = 160  # captures narrower than this many pixels are enlarged by a whole factor
+GAP, CAPTION, HEADER, SIDE = 8, 20, 52, 30  # pixels
+CHARACTER = 6.6  # width in pixels of an average character of the captions
 LARGEST_TILE = 224  # pixels; of wider pictures a window is drawn, half as wide and high
 
 
@@ -49,3 +56,47 @@ def draw_rows(path: Path, title: str, target: tuple[str, Picture], rows: Sequenc
                 shown = tile if tile.picture is None else replace(tile, picture=window.of(tile.picture))
                 page.tile(left, top, (tall, wide), shown)
         page.save(path)
+
+
+def tile_size(shape: tuple[int, ...]) -> tuple[int, int]:
+    """(height, width) in figure pixels of a capture of ``shape`` (h, w, ...): a whole multiple of it."""
+    factor = max(1, -(-SMALLEST_TILE // shape[1]))
+    return shape[0] * factor, shape[1] * factor
+
+
+class Page:
+    """A page addressed in pixels from its top left corner: a picture for the tiles, a figure for the words."""
+
+    def __init__(self, width: int, height: int) -> None:
+        """width, height in pixels."""
+        self.pixels: Picture = np.ones((height, width, 3))
+        self.figure: Figure = new_figure(width, height)
+
+    def paste(self, left: int, top: int, size: tuple[int, int], picture: Picture) -> None:
+        """Copy ``picture`` into a box of ``size`` (height, width) by nearest neighbour."""
+        rows, columns = (np.arange(n) * have // n for n, have in zip(size, picture.shape[:2], strict=True))
+        self.pixels[top : top + size[0], left : left + size[1]] = picture[rows[:, None], columns]
+
+    def tile(self, left: int, top: int, size: tuple[int, int], tile: Tile) -> None:
+        """A capture with its caption below, or why there is none."""
+        tall, wide = size
+        if tile.picture is None:
+            self.paste(left, top, size, np.full((1, 1, 3), 0.93))
+            words = textwrap.fill(tile.note, int(wide / CHARACTER) - 2, max_lines=6, placeholder="...")
+            self.text(left + wide / 2, top + tall / 2, words, fontsize=8, ha="center", va="center")
+            return
+        self.paste(left, top, size, tile.picture)
+        self.text(left + wide / 2, top + tall + CAPTION / 2, tile.note, fontsize=8, ha="center", va="center")
+
+    def text(self, x: float, y: float, words: str, **kwargs: Any) -> None:
+        """Words at a point."""
+        height, width = self.pixels.shape[:2]
+        self.figure.text(x / width, 1 - y / height, words, parse_math=False, **kwargs)
+
+    def save(self, path: Path) -> None:
+        """Write the page: where there are words on the figure, or lines, they darken the picture."""
+        canvas = FigureCanvasAgg(self.figure)
+        canvas.draw()  # type: ignore[no-untyped-call]
+        words = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
+        pixels = self.pixels[: words.shape[0], : words.shape[1]]  # the figure's size is rounded down
+        save_picture((pixels * words).round().astype(np.uint8), path)

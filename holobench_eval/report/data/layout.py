@@ -16,7 +16,7 @@ from ...display.simulated.profile import Profile, load_profile
 from ...display.traits import traits_of
 from ...study import isolation
 from ...study.config import load_study
-from ...study.definition import PREDICTIONS, Study
+from ...study.definition import PREDICTIONS, Claim, Study
 from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
 from ...study.plan import is_reference
@@ -55,13 +55,14 @@ class Swept:
 
     kind: of ``display.simulated.changes``; before: the condition without the change; points: (value, condition) of
     every other one, in the order of the config; drawn: of random draws, the value of each parameter that the display
-    has, by its name in ``display.simulated.changes.draws``, a mapping per point.
+    has, by its name in ``display.simulated.changes.draws``, a mapping per point; claim: what was published of it.
     """
 
     kind: str
     before: str
     points: tuple[tuple[float | str, str], ...]
     drawn: tuple[Mapping[str, float], ...] = ()
+    claim: Claim | None = None
 
     def change(self, value: float | str) -> Change:
         """What was changed at a point."""
@@ -287,7 +288,8 @@ def _sweeps(study: Study, conditions: Mapping[str, Condition]) -> Iterator[Swept
             points = tuple((condition.change[1], condition.title) for condition in after if condition.change)
             if points:
                 drawn = _drawn(before, points) if kind == "draw" else ()
-                yield Swept(kind, before.name, points, drawn)
+                claim = next((sweep.claim for sweep in same if sweep.claim), None)
+                yield Swept(kind, before.name, points, drawn, claim)
 
 
 def _drawn(before: Condition, points: tuple[tuple[float | str, str], ...]) -> tuple[dict[str, float], ...]:

@@ -16,7 +16,7 @@ from ...study.plan import FLOORS, REFERENCE, is_reference, reference_of
 from .categories import CATEGORIES, FLOOR, OFFLINE, ORACLE
 from .layout import Layout
 from .scores import Score, parse
-from .statistics import Array, Estimate, PairedTest, family_p, mean_interval, ratio_interval
+from .statistics import Array, Estimate, PairedTest, family_p, mean_interval
 from .tables import DONE, clusters_in, per_target, score_columns, table_from_records
 
 # Metrics of the main table besides the headline.
@@ -76,13 +76,6 @@ class Results:
     def control(self) -> list[Score]:
         """The score of control, in a list; none where no record has it."""
         return [score for score in self.scores if score.key == control.NAME]
-
-    @cached_property
-    def blur_scores(self) -> list[Score]:
-        """The headline metric, of whole pictures, at each blur width, sharpest first; plain counts as width zero."""
-        same = [s for s in self.scores if (s.metric, s.domain) == (self.headline.metric, self.headline.domain)]
-        blurred = sorted((s for s in same if s.blur is not None), key=lambda s: s.blur or 0.0)
-        return [next(s for s in same if not s.variant), *blurred] if blurred else []
 
     @cached_property
     def done(self) -> pd.DataFrame:
@@ -175,19 +168,6 @@ class Results:
         if baseline is None or not (self.is_complete(label, condition) and self.is_complete(baseline, condition)):
             return None
         return self.estimate(self.values(label, condition) - self.values(baseline, condition))
-
-    def gap_closed(self, label: str, condition: str) -> Estimate | None:
-        """The share of the gap between baseline and oracle that a method closes; None where there is no gap.
-
-        For PSNR, in dB: (method - baseline) / (oracle - baseline). 0 is the baseline, 1 the oracle.
-        """
-        oracle = self.oracle(condition)
-        most = self.gain(oracle, condition) if oracle else None
-        if self.gain(label, condition) is None or most is None or self.headline.sign * most.mean <= 0:
-            return None
-        names = (label, str(oracle), str(self.layout.baseline))
-        method, best, baseline = (self.values(name, condition) for name in names)
-        return ratio_interval(method - baseline, best - baseline, self.clusters)
 
     @cached_property
     def floors(self) -> list[str]:

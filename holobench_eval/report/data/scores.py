@@ -123,10 +123,6 @@ class Score:
         low, high = (self.number(value, signed) for value in (estimate.low, estimate.high))
         return mean if np.isnan(estimate.low) else f"{mean} [{low}, {high}]"
 
-    def mean_in(self, row: pd.Series) -> str:
-        """Mean of the score in a row of the table."""
-        return self.number(row[self.column])
-
     def in_row(self, row: pd.Series) -> str:
         """Mean and interval of the score in a row of the table."""
         return self.estimate(self.of(row))

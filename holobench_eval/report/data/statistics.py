@@ -171,6 +171,32 @@ def family_p(differences: Array, clusters: Clusters | None = None) -> Array:
     return np.where(tested, p, np.nan)
 
 
+def tiers(values: Array, clusters: Clusters | None = None) -> list[str]:
+    """A letter for each of some rows, from best to worst: those that no test tells from the best of their letter.
+
+    All pairs are one family of tests (``family_p``). Going down, the first row that is shown to be below the best of a
+    letter begins the next one. Without a test, for too few clusters, no row has a letter.
+
+    values: ``(rows, targets)``, best row first, without holes.
+    """
+    rows = len(values)
+    pairs = [(first, second) for first in range(rows) for second in range(first + 1, rows)]
+    if not pairs:
+        return ["A"] * rows
+    adjusted = family_p(np.stack([values[i] - values[k] for i, k in pairs]), clusters)
+    if np.isnan(adjusted).any():
+        return [""] * rows
+    p = dict(zip(pairs, adjusted, strict=True))
+    best, found = 0, ["A"]
+    for row in range(1, rows):
+        if p[best, row] < SIGNIFICANCE:
+            best, letter = row, chr(ord(found[-1]) + 1)
+            found.append(letter if letter <= "Z" else "Z")
+        else:
+            found.append(found[-1])
+    return found
+
+
 @lru_cache(maxsize=8)
 def _signs(clusters: int) -> Array:
     """``(signs, clusters)`` of 1 and -1, the observed ones first. Turning all signs changes no |t|: the first stays."""

@@ -65,22 +65,15 @@ class Text:
     """The words of one kind of study.
 
     scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
-    figures; each: what a method makes for one target. best, only: what the first of several, or the only, ranked method
-    does; other: the same by another metric. procedure: what is done; caution: what the figures do not say;
-    displays: what the displays are; floor, instead: the reference images and the heading of their column.
-    picture: what a tile of the comparison is. registered: what was done before any refinement
-    of the geometry; drifted: what a large difference to the refined geometry means. blur, cost: first sentences of
-    these sections. seeds: what is random. compared: in which values pictures are matched and blurred; domains: what the
-    domains of metrics mean.
+    figures; each: what a method makes for one target; procedure: what is done; caution: what the figures do not say;
+    displays: what the displays are; compared: in which values pictures are matched; domains: what the domains of
+    metrics mean; picture: what a tile of a picture is; seeds: what is random.
     """
 
     scored: str = "capture"
     truth: str = "target"
     axis: str = ""
     each: str = "hologram"
-    best: str = "ranks first of {count} methods"
-    only: str = "is the only ranked method"
-    other: str = "{label} ranks first by {metrics}, ahead of {best}."
     procedure: str = (
         "A method turns a target image into a phase pattern. The pattern is shown on a display, the display's image is "
         "captured, the capture is registered to the target, matched in intensity and scored."
@@ -90,20 +83,12 @@ class Text:
         "The displays are simulated benches. Listed are the nominal optics, which methods know, and the parameters of "
         "each stage that differs from an ideal bench, which methods do not know."
     )
-    floor: str = (
-        "Images that no method made, scored against the same targets with the same intensity match and metrics."
-    )
-    instead: str = "shown instead of a capture"
     compared: str = "in linear light"
     domains: str = (
         "Linear: light intensity in [0, 1], as the sensor measures it. Amplitude: its square root. sRGB: encoded "
         "for a monitor; perceptual metrics are defined on it."
     )
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
-    registered: str = "Registration is frozen before any method's image is captured. "
-    drifted: str = "the geometry drifted"
-    blur: str = "The ranking can change between methods that trade speckle for sharpness."
-    cost: str = "Captures are those that a method took to solve one target."
     seeds: str = (
         "The noise of a capture depends on target, display and repeat, not on the method: all methods meet the same "
         "noise, and differences are paired."
@@ -133,11 +118,7 @@ ON_A_NETWORK = Text(
         "Whether a bench shows the same is a question for another study."
     ),
     displays="The display is a trained, frozen network; there is no bench, no camera and no noise.",
-    instead="in the place of a predicted capture",
     picture="Each predicted capture is matched in intensity and sRGB-encoded",
-    registered="The network predicts in the frame of the target. ",
-    drifted="the picture is displaced",
-    cost="There is no camera, so no method captures anything while it solves.",
     seeds="A learned display has no noise: repeats differ only by the methods' own random numbers.",
 )
 
@@ -146,8 +127,6 @@ PREDICTION = Text(
     truth="capture",
     axis=", of predictions against captures",
     each="prediction",
-    best="predicts the captures most closely of {count} methods",
-    other="{label} predicts most closely by {metrics}, ahead of {best}.",
     procedure=(
         "Trained methods predict the capture of a phase pattern. The patterns are holograms of the targets by "
         "{holograms}, the same for all methods. Each pattern is shown on the display, captured, and registered to its "
@@ -158,16 +137,10 @@ PREDICTION = Text(
         "A high score means that the capture was predicted, flaws included. It does not measure picture quality: no "
         "method's own holograms are shown."
     ),
-    floor="Images that no method predicted, scored against the same captures with the same match and metrics.",
-    instead="in the place of a prediction",
     picture=(
         'The column "capture" shows the capture of the hologram by {holograms}, registered and matched to the target; '
         "each prediction is matched to it in intensity; all are sRGB-encoded"
     ),
-    registered="Captures are registered before anything is predicted. ",
-    drifted="predictions are displaced",
-    blur="The ranking can change between predictions with and without speckle.",
-    cost="A prediction takes no captures.",
     seeds=(
         "The noise of a capture depends on target, display and repeat, not on the method: all methods predict the "
         "same captures, and differences are paired."
@@ -186,10 +159,6 @@ FOCUS = Text(
     ),
     caution="Targets of one scene are not independent: intervals and tests are over scenes.",
     picture="Each capture is taken at the plane of its target, registered, matched in intensity and sRGB-encoded",
-    cost=(
-        "Captures and seconds are those of one hologram: of one plane, or of all planes of a scene for a method that "
-        "makes one hologram of them."
-    ),
 )
 
 
@@ -200,18 +169,12 @@ COMPARED = {
 }
 
 GIVEN = Text(
-    best="ranks first of {count} methods with a capture of every target",
-    only="is the only method with a capture of every target",
     procedure=(
         "Photographs of a display and their target pictures were given as files; how the photographs were taken and "
         'processed is unknown. No fiducials were photographed; "Alignment" says how each target was located in its '
         "capture. A capture is matched in intensity and scored on the pixels of its target."
     ),
-    floor="Images that nobody photographed, scored against the same targets with the same match and metrics.",
     picture="Each capture is aligned with its target and matched in intensity",
-    registered="",
-    drifted="the shared alignment does not fit the capture",
-    cost="The cost of the captures is unknown.",
     seeds="Only the speckle of the floor is random; it depends on the target's name alone.",
 )
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pandas as pd
 
 from ...core.io import write_atomically
+from ..data.board import board
 from ..data.comparisons import comparison_frame
 from ..data.results import Results
 from ..data.tables import csv_text
@@ -22,10 +24,15 @@ def texts(results: Results) -> dict[str, str]:
         "tests.csv": comparison_frame(results),
     }
     written = {str(name): csv_text(frame) for name, frame in frames.items()}
-    return written | {"columns.md": f"{dictionary(frames)}\n", "table.tex": latex_tables(results)}
+    drawn = json.dumps(board(results).as_json(), indent=1, ensure_ascii=False, allow_nan=False)
+    return written | {
+        "board.json": f"{drawn}\n",
+        "columns.md": f"{dictionary(frames)}\n",
+        "table.tex": latex_tables(results),
+    }
 
 
 def write_files(results: Results, output: Path) -> None:
-    """Write records.csv, table.csv, tests.csv, columns.md and table.tex."""
+    """Write records.csv, table.csv, tests.csv, board.json, columns.md and table.tex."""
     for name, text in texts(results).items():
         write_atomically(output / name, text.encode())

@@ -23,14 +23,14 @@ from ...core.io import write_atomically
 from ..markdown import blocks
 from ..section import Report
 from ..sections import sections
+from ..sections.answer import counts
 from ..sections.appendix import environment
-from ..sections.setup import counts
 from .data import page_data
 from .pictures import pictures
 
 MOST_BYTES = 24_000_000  # of the whole page
 OWN = 200_000  # bytes that the template, the policy and the provenance may take beside scripts, data and pictures
-TOP = ("answer",)  # the sections of report.md that the page begins with
+TOP = ("answer", "limits")  # the sections of report.md that the page begins with
 VENDORED = ("d3.min.js", "plot.umd.min.js")
 SCRIPTS = (
     "dom.js",

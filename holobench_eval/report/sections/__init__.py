@@ -7,23 +7,18 @@ from importlib import import_module
 from ..section import Section
 
 NAMES = (
-    "front.answer",
-    "front.overview",
-    "display.error_budget",
+    "answer",
+    "overview",
+    "error_budget",
     "setup",
-    "display.findings",
-    "results",
-    "leaderboard",
+    "cost",
     "sweeps",
     "ranks",
     "focus",
-    "comparison",
     "training",
-    "display.diagnosis",
-    "targets",
-    "metrics",
+    "diagnosis",
+    "tests",
     "alignment",
-    "cost",
     "appendix",
 )
 

@@ -11,11 +11,6 @@ from ..markdown import Markdown, bullets, code, code_block, heading, properties
 from ..section import Blocks, Figures, Report, Section
 from .alignment import agreement
 
-PAPER = Markdown(
-    "The setting follows P. Chakravarthula, E. Tseng, T. Srivastava, H. Fuchs and F. Heide, "
-    '"Learned hardware-in-the-loop phase retrieval for holographic near-eye displays", ACM Transactions on Graphics '
-    "39(6), article 186 (2020), <https://doi.org/10.1145/3414685.3417846>."
-)
 EXPOSURES_PREDICTED = {
     "equal": "Equal light: the exposure of a capture follows from the target alone.",
     "matched": "Matched brightness: after a metering capture the laser power is set so that the region has the "
@@ -120,18 +115,6 @@ def _saturation(results: Results) -> str:
     return f"At most {100 * most:.3g} % of a capture's samples{refused}."
 
 
-def _reproduce(report: Report, _: Figures) -> Blocks:
-    description = report.description
-    yield heading("Reproduce")
-    yield code_block(description.command or f"holoeval run {description.config_file or 'CONFIG.yaml'}")
-    yield Markdown(
-        "[details.md](details.md) has the displays with every parameter, the methods, every metric, target and test, "
-        "captures and seconds, the config, and the environment of the run."
-    )
-    if report.layout.measure != FILES:
-        yield PAPER
-
-
 def _environment(report: Report, _: Figures) -> Blocks:
     description = report.description
     yield heading("Config and environment")
@@ -151,7 +134,6 @@ def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 SECTIONS = (
-    Section("reading", 200, _reading),
-    Section("reproduce", 210, _reproduce),
+    Section("reading", 200, _reading, details=True),
     Section("environment", 220, _environment, details=True),
 )

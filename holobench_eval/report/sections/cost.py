@@ -1,108 +1,156 @@
-"""Captures, computing time and light."""
+"""Charts of quality against what it cost: captures, and seconds."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
-import pandas as pd
+import numpy as np
 
+from ..charts.frontier import Frontier, Line, Mark, draw_frontiers
+from ..charts.look.methods import looks
+from ..data.categories import ONLINE, ORACLE
+from ..data.phrases import CONSTANT
 from ..data.results import Results
-from ..data.tables import DONE
-from ..data.text import FILES, number, words
-from ..markdown import Markdown, heading
-from ..section import Blocks, Figures, Report, Section, by_method, column
-from .results import cost_columns
+from ..data.text import words
+from ..section import Section
 
-ELSEWHERE = ("refine_", "second_", "share_")  # how keys of figures begin that stand where the geometry is
+FEWEST_TIMED = 4  # computing time gets a chart from so many timed methods on
 
 
-def _render(report: Report, _: Figures) -> Blocks:
-    results, text = report.results, report.layout.text
-    yield heading("Light" if report.layout.measure == FILES else "Captures, time and light")
-    if report.layout.measure == FILES:
-        yield f"{text.cost} Match factors and brightness ratios are computed {text.compared}."
-    else:
-        memory, timed = "memory_mib" in results.table, results.done["solving_s"].notna().any()
-        sentences = [
-            text.cost,
-            *(
-                [_measured(report.provenance, memory), timing(results, report.provenance.get("workers", 1))]
-                if timed
-                else []
-            ),
-        ]
-        if timed:
-            sentences.append("A phase is solved once for all displays and studies; its seconds are of that solving.")
-        if memory:
-            sentences.append(
-                f"Memory is the peak of a {text.each} above what the process held before it, the median over targets; "
-                "training is not included."
-            )
-        if report.trainings:
-            sentences.append(
-                "Captures and seconds of training were spent once, before any target was seen; those per target do not "
-                "include them."
-            )
-        yield " ".join(filter(None, sentences))
-    yield report.by_display(_light_and_time)
+Spent = Callable[[Results, str, str], float]  # what a method spent under a condition
 
 
-def _measured(provenance: Mapping[str, Any], memory: bool) -> str:
-    """When the seconds were measured, a sentence; without a noted load they may be of an earlier study."""
-    what = f"Seconds {'and memory ' * memory}"
-    runs = [*provenance.get("earlier", ()), provenance]
-    loads = [run["load"] for run in runs if "load" in run]
-    if len(loads) < len(runs):
-        return f"{what}are the first measurement on that machine, which may be of an earlier study."
-    if len(runs) > 1:
-        spread = f"from {min(loads):g} to {max(loads):g}"
-        return (
-            f"{what}were measured in the {len(runs)} runs of this study; the machine's load before them was {spread}."
+@dataclass(frozen=True)
+class Cost:
+    """What quality is drawn against: the figure's file, the axis with its unit, and the words of the caption."""
+
+    file: str
+    spent: Spent
+    axis: str
+    words: str
+
+
+def draw(results: Results, folder: Path) -> Iterator[tuple[Path, str]]:
+    """Draw quality against captures and seconds, where the study has enough of them; (file, caption) of each."""
+    each = f"computing time per {results.layout.text.each}"
+    captures = Cost(
+        "quality-captures.png",
+        _captures,
+        "captures in total, of training and of all targets (logarithmic; zero left of the break)",
+        "all captures of a row: those of its training once, and those of every target",
+    )
+    seconds = Cost("quality-time.png", _seconds, f"{each} [s] (logarithmic)", each)
+    for cost, wanted in ((captures, _spends_captures), (seconds, _times_enough)):
+        panels = [panel for condition in results.conditions if (panel := _frontier(results, condition, cost)).marks]
+        if panels and wanted(results, [mark for panel in panels for mark in panel.marks]):
+            path = folder / cost.file
+            axis = f"{results.headline.axis}{results.layout.text.axis}"
+            draw_frontiers(path, panels, axis, cost.axis, looks(results.names))
+            yield path, _caption(results, panels, cost)
+
+
+def _captures(results: Results, name: str, condition: str) -> float:
+    return float(results.row(name, condition)["total_captures"])
+
+
+def _seconds(results: Results, name: str, condition: str) -> float:
+    """NaN without any, since there is no logarithm of zero."""
+    return float(results.row(name, condition)["solving_s"]) or float("nan")
+
+
+def _spends_captures(results: Results, marks: list[Mark]) -> bool:
+    return results.layout.spends_captures and any(mark.cost > 0 for mark in marks)
+
+
+def _times_enough(_: Results, marks: list[Mark]) -> bool:
+    return len({mark.label for mark in marks}) >= FEWEST_TIMED
+
+
+def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
+    """A display's panel; a method that lacks a target has no mean to compare, and is not in it."""
+    marks = tuple(
+        Mark(
+            label=name,
+            group=results.names[name],
+            category=results.layout.category(name),
+            cost=spent,
+            quality=float(results.values(name, condition).mean()),
+            captures=_captures(results, name, condition),
+            **_ends(results, name, condition),
         )
-    return f"{what}were measured in this study; the machine's load before it was {loads[0]:g}."
+        for name in results.methods(condition)
+        if results.layout.category(name) != ORACLE and results.is_complete(name, condition)
+        if np.isfinite(spent := cost.spent(results, name, condition))
+    )
+    baseline, oracle = results.layout.baseline, results.oracle(condition)
+    known = baseline in results.methods(condition) and results.is_complete(str(baseline), condition)
+    has_constant = CONSTANT in results.floors and results.has_pictures(condition)
+    return Frontier(
+        condition,
+        marks,
+        higher=results.headline.higher_is_better,
+        baseline=_line(results, str(baseline), condition, "baseline", band=False) if known else None,
+        oracle=_line(results, oracle, condition, "ceiling", band=True) if oracle else None,
+        constant=_constant(results, condition) if has_constant else None,
+    )
 
 
-def _light_and_time(results: Results, condition: str) -> Markdown:
-    """Captures, computing time and the figures that describe a capture and are no image metric."""
+def _ends(results: Results, name: str, condition: str) -> dict[str, float]:
+    """Ends of the bar of a method: of its mean difference to the baseline, moved to its mean; else of the mean."""
+    gained = results.gain(name, condition)
+    if gained is None:
+        own = results.headline.of(results.row(name, condition))
+        return {"low": own.low, "high": own.high}
+    mean = float(results.values(name, condition).mean())
+    if name == results.layout.baseline:
+        return {"low": float("nan"), "high": float("nan")}
+    return {"low": mean + gained.low - gained.mean, "high": mean + gained.high - gained.mean}
 
-    def saturated(row: pd.Series) -> str:
-        cells = results.cells(row["label"], condition)
-        return number(cells.loc[cells["state"] == DONE, "saturated"].max() * 100)
 
-    costs = cost_columns(results, " per target")
-    measured = {"cpu_s": "processor seconds per target", "memory_mib": "memory [MiB]"}
-    costs |= {key: title for key, title in measured.items() if key in results.table}
-    sensor = results.layout.learned_display is None
-    figures = [score for score in results.scores if not score.domain and not score.key.startswith(ELSEWHERE)]
-    columns = [
-        *(column(title, key) for key, title in costs.items()),
-        *([("most saturated samples [%]", saturated)] if sensor else []),
-        *(column(score.title, score.column) for score in figures),
+def _line(results: Results, name: str, condition: str, role: str, band: bool) -> Line:
+    mean = float(results.values(name, condition).mean())
+    ends = _ends(results, name, condition) if band else {}
+    return Line(f"{role}: {name}, {results.headline.with_unit(mean)}", mean, **ends)
+
+
+def _constant(results: Results, condition: str) -> Line:
+    """The floor: the mean of a constant image."""
+    mean = float(results.row(CONSTANT, results.reference(condition))[results.headline.column])
+    return Line(f"constant image, {results.headline.with_unit(mean)}", mean)
+
+
+def _caption(results: Results, panels: list[Frontier], cost: Cost) -> str:
+    """What is drawn, what the bars are, and who is missing."""
+    online = ", separately for methods with and without the camera for the scored image"
+    sentences = [
+        f"{results.headline.axis}{results.layout.text.axis}, against {cost.words}.",
+        "Lines join rows of one method that differ in their captures.",
+        f"Pale steps: the best quality for a cost{online * (ONLINE in results.categories)}.",
     ]
-    return by_method(results, condition, columns)
+    if any(panel.baseline for panel in panels):
+        sentences.append(
+            "Bars: 95 % interval of the paired mean difference to the baseline; a bar clear of the baseline's line is "
+            "a difference. The tables hold the intervals of the means themselves."
+        )
+    else:
+        sentences.append("Bars: 95 % interval of the mean over targets.")
+    if any(panel.oracle for panel in panels):
+        sentences.append("The upper line is the oracle, with its interval as a band.")
+    rows = [(name, condition) for condition in results.conditions for name in results.methods(condition)]
+    lacking = sorted({name for name, condition in rows if not results.is_complete(name, condition)})
+    if lacking:
+        sentences.append(f"Omitted where a target is missing: {words(lacking)}.")
+    return " ".join(sentences)
 
 
-def timing(results: Results, workers: int) -> str:
-    """What was at work beside the solutions that were timed, a sentence; workers: of the run.
-
-    Empty where a single worker left no note of it.
-    """
-    each, done, row = results.layout.text.each, results.done, ["label", "condition"]
-    inflated = f"timed with {f'{workers} ' * (workers > 1)}concurrent workers and are inflated"
-    if "timed_alone" not in done:
-        return f"Seconds were {inflated}." if workers > 1 else ""
-    alone = done[done["timed_alone"] == 1]
-    if alone.empty:
-        return f"Seconds were {inflated}."
-    if len(alone) == len(done):
-        return f"Each {each} was timed alone."
-    single = alone.groupby(row)["solving_s"].nunique().max() == 1  # cells of one solution have one time
-    chosen = f"one {each} per row," if single else f"the {each}s"
-    timed = set(alone[row].itertuples(index=False, name=None))
-    others = [pair for pair in done[row].drop_duplicates().itertuples(index=False, name=None) if pair not in timed]
-    rest = f"; those of {words([' on '.join(pair) for pair in others])} were {inflated}" if others else ""
-    return f"Seconds are those of {chosen} timed alone{rest}."
-
-
-SECTIONS = (Section("cost", 170, _render, details=True),)
+SECTIONS = (
+    Section(
+        "cost",
+        40,
+        lambda _, figures: figures,
+        figures=lambda report: draw(report.results, report.figures),
+        details=True,
+    ),
+)

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
-from ..answers.ranks import table as methods
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
-from ..data.ranks import CIRCULAR, Cause, Pair, Ranks, share
-from ..data.statistics import SIGNIFICANCE, mean_interval
+from ..data.ranks import CIRCULAR, Cause, Pair, Ranks
+from ..data.statistics import mean_interval
 from ..data.text import p_value, percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
@@ -22,7 +19,7 @@ COUNTED = frozenset({"crosstalk", "flicker", "fringes", "astigmatism", "coma", "
 NOTHING = "none of the parameters"
 
 
-def _render(report: Report, figures: Figures) -> Blocks:
+def _render(report: Report, _: Figures) -> Blocks:
     yield heading("Rank stability")
     yield (
         f"A draw is another bench of the same kind: {MODEL}. Methods know the nominal optics alone, or were trained on "
@@ -31,16 +28,13 @@ def _render(report: Report, figures: Figures) -> Blocks:
     )
     for ranks in report.ranks:
         yield heading(f"{ranks.swept.before}, {len(ranks.swept.points)} draws", 3)
-        yield bullets(sentences(ranks))
-        if ranks.exists:
-            yield methods(ranks)
+        yield bullets(left_out(ranks))
         if ranks.exists and (pairs := flips(ranks)):
             yield Markdown("Pairs of methods whose order changes, {}:").format(report.results.headline.axis)
             yield pairs
         if drawn := _ranges(ranks):
             yield "Parameters that were drawn:"
             yield drawn
-    yield from figures
 
 
 def flips(ranks: Ranks) -> Markdown | None:
@@ -83,13 +77,6 @@ def more(cause: Cause) -> str:
     return f"{'more' if counted else 'a more' if signed else 'a larger'}{signed} {parameter.words}"
 
 
-def sentences(ranks: Ranks) -> list[str]:
-    """What the draws say, from their numbers alone."""
-    if not ranks.exists:
-        return [*left_out(ranks), "No ranking: no draw has two methods with a score for every target."]
-    return [*left_out(ranks), *_agreement(ranks), _winner(ranks), *_pairs(ranks)]
-
-
 def left_out(ranks: Ranks) -> list[str]:
     """Methods and draws that are in no number, and why."""
     lines = []
@@ -115,54 +102,6 @@ def _draws(ranks: Ranks, indices: Sequence[int]) -> str:
     numbers = [str(ranks.swept.points[index][0]) for index in indices]
     which = f"Draws {words(numbers)} are" if len(numbers) > 1 else f"Draw {numbers[0]} is"
     return f"{which} left out ({len(numbers)} of {len(ranks.swept.points)})"
-
-
-def _agreement(ranks: Ranks) -> list[str]:
-    taus, count = ranks.taus, len(ranks.used)
-    what = "Kendall's tau-b of a draw's ranking against the nominal one (1: the same order, 0: unrelated)"
-    if not len(taus):
-        return [f"{what} is not defined: all methods score the same."]
-    mean = ranks.tau
-    interval = f" [{mean.low:.2f}, {mean.high:.2f}]" if np.isfinite(mean.low) else ""
-    return [
-        f"{what}: median {np.median(taus):.2f}, mean {mean.mean:.2f}{interval}, lowest {taus.min():.2f}, over "
-        f"{len(taus)} draws. The {len(ranks.methods)} methods keep their nominal order in {ranks.unchanged} of "
-        f"{count} draws."
-    ]
-
-
-def _winner(ranks: Ranks) -> str:
-    counts = {label: int((ranks.positions[:, index] == 1).sum()) for index, label in enumerate(ranks.methods)}
-    winners = [label for label, rank in zip(ranks.methods, ranks.nominal_positions, strict=True) if rank == 1]
-    firsts = [f"{counts[label]} of {len(ranks.used)} draws ({percent(ranks.first(label))} %)" for label in winners]
-    pairs = zip(winners, firsts, strict=True)
-    sentence = f"First on the nominal display: {words([f'{label}, also first in {share}' for label, share in pairs])}"
-    others = sorted((label for label in counts if label not in winners and counts[label]), key=lambda x: -counts[x])
-    if not others:
-        return f"{sentence}. No other method is first in any draw."
-    return f"{sentence}. Also first in some draws: {words([f'{label} in {counts[label]}' for label in others])}."
-
-
-def _pairs(ranks: Ranks) -> list[str]:
-    flipping = [pair for pair in ranks.pairs if pair.flips]
-    pairs = len(ranks.pairs)
-    still = pairs - len(flipping)
-    most = 100 * share(0, len(ranks.used)).high
-    lines = [
-        f"{still} of {pairs} pairs of methods keep their nominal order in every draw; such a pair may still be "
-        f"reversed on up to {most:.0f} % of benches (upper end of the interval)."
-        if still
-        else f"None of the {pairs} pairs of methods keeps its nominal order in every draw."
-    ]
-    if flipping and ranks.tests:
-        known = sum(pair.cause is not None for pair in flipping)
-        lines.append(
-            f"Of the {len(flipping)} pairs that are reversed in some draw, {known} correlate with a parameter "
-            "(Spearman's correlation over draws between its value and the difference of the two means, "
-            f"p < {SIGNIFICANCE} after Bonferroni over all {ranks.tests} tests); the table names the strongest. The "
-            "others depend on several parameters at once, on the random patterns, or on chance."
-        )
-    return lines
 
 
 def _ranges(ranks: Ranks) -> Markdown | None:
@@ -201,12 +140,17 @@ def _caption(ranks: Ranks) -> str:
     )
 
 
+def _any(report: Report) -> bool:
+    return bool(report.ranks)
+
+
 SECTIONS = (
     Section(
-        "rank stability",
-        60,
-        _render,
-        applies=lambda report: bool(report.ranks),
+        "ranks, drawn",
+        47,
+        lambda _, figures: figures,
+        applies=_any,
         figures=lambda report: draw(report.ranks, report.figures),
     ),
+    Section("rank stability", 60, _render, applies=_any, details=True),
 )

@@ -10,17 +10,12 @@ from ...study.plan import is_reference
 from ..data.categories import FLOOR
 from ..data.layout import Layout, TrainingSet
 from ..data.results import Results
-from ..data.tables import DONE
 from ..data.text import FILES, plain, words
 from ..data.trainings import DISPLAY, Training
 from ..markdown import Markdown, blocks, bullets, code, heading, properties, table
 from ..section import Blocks, Figures, Report, Section
 
 TARGETS_NAMED = 40
-
-
-def _title(report: Report, _: Figures) -> Blocks:
-    return [heading(report.layout.title, 1), counts(report.results)]
 
 
 def _setup(report: Report, _: Figures) -> Blocks:
@@ -50,22 +45,6 @@ def _details_of(report: Report) -> Markdown:
             Markdown("What [report.md](report.md) rests on, number by number."),
         ]
     )
-
-
-def counts(results: Results) -> str:
-    """How large the study is, in one sentence."""
-    cells = results.frame[results.frame["category"] != FLOOR]
-    done = int((cells["state"] == DONE).sum())
-    parts = (
-        (len(results.targets), "target"),
-        (cells["label"].nunique(), "method"),
-        (len(results.conditions), "display"),
-        (cells["repeat"].nunique(), "repeat"),
-    )
-    size = ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in parts)
-    partly = len(cells[["label", "condition"]].drop_duplicates()) < cells["label"].nunique() * len(results.conditions)
-    some = " (not every method on every display)" if partly else ""
-    return f"{size}{some}: {len(cells)} cells, {done} with a score, {len(cells) - done} without."
 
 
 def _on_displays(report: Report) -> list[tuple[str, str]]:
@@ -170,8 +149,7 @@ def _captures_taken(trainings: Sequence[Training]) -> str:
 
 
 SECTIONS = (
-    Section("title", 0, _title),
     Section("details", 1, lambda report, _: [_details_of(report)], details=True),
-    Section("setup", 75, _setup),
+    Section("setup", 10, _setup, details=True),
     Section("displays and methods", 20, _described, lambda report: report.layout.measure != FILES, details=True),
 )

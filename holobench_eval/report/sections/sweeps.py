@@ -1,8 +1,8 @@
-"""What changes of the displays cost, in tables and sentences, and what the paper claims of three of them."""
+"""What changes of the displays cost: curves, pictures, and tables of scores and losses."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,26 +14,16 @@ from ..data.categories import OFFLINE, ONLINE
 from ..data.phrases import CONSTANT
 from ..data.results import Results
 from ..data.statistics import Estimate
-from ..data.sweeps import SMALL, Sweep
-from ..data.text import percent, words
-from ..markdown import Markdown, bullets, heading, table
+from ..data.sweeps import Sweep
+from ..data.text import words
+from ..markdown import Markdown, heading, table
 from ..section import Blocks, Figures, Report, Section
 
-# What Chakravarthula et al. 2020, Section 7.2, say of their method, by kind of change, and how far a sweep has to go to
-# tell (None: two of a kind).
-PAPER = {
-    "camera_shift_x": ("The quality stays stable when the camera moves by up to 4 cm", 40.0),
-    "camera_shift_y": ("The quality stays stable when the camera moves by up to 4 cm", 40.0),
-    "drift": ("There is no significant change in quality over three months", 90.0),
-    "sensor": ("Captures of two cameras are consistent", None),
-}
-REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
 MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
 MOST_ROWS = 4
 
 
-def _render(report: Report, figures: Figures) -> Blocks:
-    results, sweeps = report.results, report.sweeps
+def _render(report: Report, _: Figures) -> Blocks:
     yield heading("Changes of the displays")
     yield (
         "Methods are prepared on the display before the change, and their holograms are shown on it after the change. "
@@ -41,17 +31,13 @@ def _render(report: Report, figures: Figures) -> Blocks:
         "before the change, positive where the picture got worse. Slopes are least-squares lines through zero, one on "
         "each side of the unchanged display."
     )
-    yield claims(results, sweeps)
-    for sweep in sweeps:
+    for sweep in report.sweeps:
         if sweep.methods:
             words = sweep.kind.words
             yield heading(f"{words[0].upper()}{words[1:]}: {sweep.swept.before}", 3)
             yield _introduction(sweep)
-            yield Markdown("{}:").format(results.headline.axis)
             yield scores(sweep)
             yield losses(sweep)
-            yield bullets(sentences(sweep, sweeps))
-    yield from figures
 
 
 def value_text(value: float | str) -> str:
@@ -130,88 +116,6 @@ def _break_even(sweep: Sweep, label: str) -> str:
     if before.mean <= 0:
         return "not above it before"
     return words([f"{value:.3g} {sweep.kind.unit}".strip() for value in ends]) if ends else "nowhere in this range"
-
-
-def sentences(sweep: Sweep, sweeps: Sequence[Sweep]) -> list[str]:
-    """What the sweep shows, from its numbers alone; sweeps: all of the study."""
-    lines = _stated_range(sweep) if sweep.swept.kind == "refocus" else []
-    for remedy in sweeps:
-        if remedy.swept.kind in REMEDIES.get(sweep.swept.kind, ()) and remedy.swept.before == sweep.swept.before:
-            lines += _recovered(sweep, remedy)
-    return lines
-
-
-def _stated_range(sweep: Sweep) -> list[str]:
-    ranges: dict[str, list[str]] = {}
-    for label in sweep.methods:
-        if reach := sweep.small_range(label):
-            ranges.setdefault(reach, []).append(label)
-    limit = f"{SMALL:g} {sweep.results.headline.unit}"
-    return [
-        f"The score changes by at most {limit} {reach if reach == 'nowhere' else f'from {reach}'}: {words(labels)}."
-        for reach, labels in ranges.items()
-    ]
-
-
-def _recovered(sweep: Sweep, remedy: Sweep) -> list[str]:
-    lines = []
-    for label in sweep.methods:
-        parts = [f"{value}: {percent(share)} %" for value, share in sweep.recovered(label, remedy).items()]
-        if parts:
-            lines.append(f"Share of the loss that {remedy.swept.kind} recovers for {label}: {'; '.join(parts)}.")
-    return lines
-
-
-def claims(results: Results, sweeps: Sequence[Sweep]) -> str:
-    """One paragraph: the paper's three claims of robustness for its method, and what these sweeps say of each.
-
-    Empty where the paper's method, or every one of the three changes, is missing, and for a headline that is not in dB.
-    """
-    if results.headline.unit != "dB":
-        return ""
-    labels = list(dict.fromkeys(results.frame.loc[results.frame["method"] == "hil", "label"]))
-    verdicts = [
-        _claim(sweep, label)
-        for sweep in sweeps
-        for label in labels
-        if label in sweep.methods and sweep.swept.kind in PAPER
-    ]
-    if not verdicts:
-        return ""
-    rule = (
-        f"A claim holds here if the 95 % interval of the largest mean loss ends at or below {SMALL:g} dB, does not if "
-        "it begins above, and else neither is shown."
-    )
-    return f"Chakravarthula et al. 2020 (Section 7.2) support three claims with pictures. {rule} {' '.join(verdicts)}"
-
-
-def _claim(sweep: Sweep, label: str) -> str:
-    score, baseline = sweep.results.headline, sweep.results.layout.baseline
-    claim, far = PAPER[sweep.swept.kind]
-    complete = len(sweep.losses(label)) == len(sweep.swept.points)
-    reached = len(sweep.swept.points) > 1 if far is None else max(abs(float(v)) for v, _ in sweep.swept.points) >= far
-    worst = sweep.worst(label)
-    if not (complete and reached) or worst is None:
-        lacking = "the sweep does not go far enough" if complete else "some points have no score"
-        return f'"{claim}" cannot be judged for {label} on {sweep.swept.before} ({sweep.kind.words}): {lacking}.'
-    value, loss = worst
-    verdict = "holds" if loss.high <= SMALL else "does not hold" if loss.low > SMALL else "is not shown to hold or fail"
-    where = f"{sweep.kind.words}, {value_text(value)} {sweep.kind.unit}".rstrip(" ,")
-    sentence = (
-        f'"{claim}" {verdict} for {label} on {sweep.swept.before}: its largest loss ({where}) is '
-        f"{score.estimate(loss)} {score.unit}"
-    )
-    if label == baseline:
-        return f"{sentence}."
-    condition = dict(sweep.swept.points)[value]
-    gained, before = sweep.gain(label, condition), sweep.gain(label, sweep.swept.before)
-    other = sweep.loss(str(baseline), condition)
-    if gained is None or before is None or other is None:
-        return f"{sentence}."
-    return (
-        f"{sentence}, that of {baseline} there {score.number(other.mean)}, and its lead over {baseline} goes from "
-        f"{score.number(before.mean, signed=True)} to {score.number(gained.mean, signed=True)} {score.unit}."
-    )
 
 
 def _by_kind(report: Report) -> list[list[Sweep]]:
@@ -316,11 +220,11 @@ def _any(report: Report) -> bool:
 SECTIONS = (
     Section("along the changes", 45, lambda _, figures: figures, applies=_any, figures=_curves),
     Section(
-        "sweeps",
-        50,
-        _render,
+        "pictures along the changes",
+        46,
+        lambda _, figures: figures,
         applies=_any,
         figures=lambda report: report.pictures("sweep-*.jpg", lambda: _pictures(report)),
-        details=True,
     ),
+    Section("sweeps", 50, _render, applies=_any, details=True),
 )

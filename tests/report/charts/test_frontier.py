@@ -11,7 +11,7 @@ from holobench_eval.report.charts.frontier import Costs, Frontier, Mark, draw_fr
 from holobench_eval.report.charts.labels import Names
 from holobench_eval.report.charts.look.methods import look
 from holobench_eval.report.charts.style import new_figure
-from holobench_eval.report.sections.leaderboard import draw
+from holobench_eval.report.sections.cost import draw
 from tests.support import budget_study as budget
 
 NAN = float("nan")
@@ -145,7 +145,7 @@ def test_the_axis_names_zero_and_round_numbers_with_a_break_between(most, expect
 def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(
-        "holobench_eval.report.sections.leaderboard.draw_frontiers", lambda path, panels, *_: seen.append(panels)
+        "holobench_eval.report.sections.cost.draw_frontiers", lambda path, panels, *_: seen.append(panels)
     )
     list(draw(found, tmp_path))
     marks = {one.label: one for one in seen[0][0].marks}
@@ -164,7 +164,7 @@ def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_p
 def test_a_method_that_lacks_a_target_is_omitted_and_named(tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(
-        "holobench_eval.report.sections.leaderboard.draw_frontiers", lambda path, panels, *_: seen.append(panels)
+        "holobench_eval.report.sections.cost.draw_frontiers", lambda path, panels, *_: seen.append(panels)
     )
     records = budget.study()
     lost = next(i for i, record in enumerate(records) if record["label"] == "hil")

@@ -1,18 +1,8 @@
 import numpy as np
-import pytest
-from matplotlib import colormaps
 from PIL import Image
 
-from holobench_eval.report.charts.comparison import HEADER, SIDE, draw_comparison, tile_size
-from holobench_eval.report.charts.gallery import (
-    Column,
-    Tile,
-    error_limit,
-    error_map,
-    load_picture,
-    most_detailed,
-    spread,
-)
+from holobench_eval.report.charts.gallery import Tile, load_picture, most_detailed, spread
+from holobench_eval.report.charts.rows import HEADER, SIDE, Row, draw_rows, tile_size
 from holobench_eval.report.charts.style import LARGEST, save_picture, slugs
 from tests.support import synthetic_study as synthetic
 
@@ -37,18 +27,6 @@ def test_of_equally_detailed_windows_the_first_is_taken():
     assert (crop.top, crop.left) == (0, 0)
 
 
-def test_the_window_is_drawn_at_four_times_the_scale_with_its_own_error_beside(tmp_path):
-    target, capture = noise(207), noise(207, seed=1)
-    draw_comparison(tmp_path / "page.png", "bench", [("noise", target)], [Column("method", (Tile(capture, "x"),))], 0.5)
-    page, crop = load_picture(tmp_path / "page.png"), most_detailed(target)
-    left, top, side = SIDE + 207 + 8, HEADER + 207 + 20, 4 * 23
-    enlarged = crop.of(capture).repeat(4, axis=0).repeat(4, axis=1)
-    assert np.abs(page[top : top + side, left : left + side] - enlarged).max() < 1 / 255
-    drawn = page[top : top + side, left + 207 - side : left + 207]
-    colours = colormaps["magma"](np.minimum(error_map(crop.of(capture), crop.of(target)) / 0.5, 1))[..., :3]
-    assert np.abs(drawn - colours.repeat(4, axis=0).repeat(4, axis=1)).max() < 2 / 255
-
-
 def test_a_page_of_speckle_keeps_colours_at_full_resolution_and_stays_small(tmp_path):
     pixels = np.random.default_rng(0).integers(0, 256, size=(500, 500, 3), dtype=np.uint8)
     save_picture(pixels, tmp_path / "page.jpg")
@@ -57,38 +35,25 @@ def test_a_page_of_speckle_keeps_colours_at_full_resolution_and_stays_small(tmp_
         assert {layer[1:3] for layer in picture.layer} == {(1, 1)}
 
 
-def test_the_error_scale_is_a_round_number_above_most_errors():
-    assert error_limit([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
-    assert error_limit([np.zeros((4, 4))]) == pytest.approx(0.1)
-    assert error_limit([np.ones((4, 4))]) == 1.0
-
-
 def test_targets_of_a_large_study_are_spread_from_first_to_last():
     assert spread([str(n) for n in range(21)], 5) == ["0", "5", "10", "15", "20"]
 
 
-def test_captures_are_in_the_figure_pixel_by_pixel(tmp_path):
+def test_captures_are_in_the_figure_pixel_by_pixel_and_an_absent_one_is_a_note(tmp_path):
     target, capture = noise(200), noise(200, seed=1)
-    columns = [Column("method", (Tile(capture, "PSNR 7.00 dB"),))]
-    draw_comparison(tmp_path / "page.png", "bench", [("noise", target)], columns, 0.5)
+    tiles = (("method", Tile(capture, "PSNR 7.00 dB")), ("lost", Tile(None, "failed: the residual is too large $x$")))
+    draw_rows(tmp_path / "page.png", "bench", ("noise", target), [Row("", tiles)])
     page = load_picture(tmp_path / "page.png")
-    left = SIDE + 200 + 8
-    assert np.abs(page[HEADER : HEADER + 200, left : left + 200] - capture).max() < 1 / 255
+    first, second = (page[HEADER : HEADER + 200, SIDE + place * 208 :][:, :200] for place in (1, 2))
+    assert np.abs(first - capture).max() < 1 / 255
+    assert 0.85 < np.median(second) < 0.95
+    assert second.min() < 0.3
 
 
 def test_small_captures_are_enlarged_by_a_whole_factor():
     assert tile_size((64, 64, 3)) == (192, 192)
     assert tile_size((150, 100)) == (300, 200)
     assert tile_size((300, 400)) == (300, 400)
-
-
-def test_an_absent_capture_leaves_a_note_in_its_place(tmp_path):
-    columns = [Column("method", (Tile(None, "failed: the registration residual is too large $x$"),))]
-    draw_comparison(tmp_path / "page.png", "bench", [("noise", noise(64))], columns, 0.5)
-    page = load_picture(tmp_path / "page.png")
-    tile = page[HEADER : HEADER + 192, SIDE + 200 : SIDE + 392]
-    assert 0.85 < np.median(tile) < 0.95
-    assert tile.min() < 0.3
 
 
 def test_gray_thumbnails_are_read_as_colour(tmp_path):

@@ -14,6 +14,7 @@ from holobench_eval.report.answers import kind_of
 from holobench_eval.report.build import related
 from holobench_eval.report.charts.family import draw_map
 from holobench_eval.report.charts.look.methods import looks
+from holobench_eval.report.data.board import board
 from holobench_eval.report.data.display_map import display_map, judged, left_out
 from holobench_eval.report.files import write_files
 from tests.report.answers.test_answers import NOISE, TARGETS
@@ -115,7 +116,7 @@ def test_a_score_of_models_is_judged_by_the_pairs_of_methods_that_it_orders() ->
 
 def test_the_answer_names_the_best_method_what_to_measure_and_who_judges_models() -> None:
     results = crossing(budget=budget(), models=models({"new": 0.9, "other": 0.5}, {"new": 20.0, "other": 25.0}))
-    told = " ".join(kind_of(results).whole_answer(results))
+    told = " ".join(kind_of(results).answer(results))
     assert "is best on 6 of 10. To choose, measure what part of the error is explained by terms and what" in told
     assert "of displays left out these name the best of 3 methods on" in told
     assert "R2 of margins that these parts predict on displays left out: 1.00 of new." in told
@@ -132,15 +133,19 @@ def test_the_map_is_drawn(tmp_path: Path) -> None:
 
 def test_related_studies_of_many_displays_answer_with_means_over_them() -> None:
     of_errors, of_models = budget(), models({"new": 0.9, "other": 0.5}, {"new": 20.0, "other": 25.0})
-    assert kind_of(of_errors).whole_answer(of_errors) == [
-        "Over 10 displays, means and ranges of the shares of the squared error: the ideal image 0 % (0 to 0), terms "
-        "24 % (10 to 37), field 66 % (53 to 80), unexplained 9 % (9 to 9) and temporal noise 1 % (1 to 1)."
+    assert kind_of(of_errors).answer(of_errors) == [
+        "Over 10 displays, the squared error is explained by the ideal image 0 % (0 to 0), terms 24 % (10 to 37), "
+        "field 66 % (53 to 80), unexplained 9 % (9 to 9) and temporal noise 1 % (1 to 1)."
     ]
-    by_psnr, by_control = kind_of(of_models).whole_answer(of_models)
+    by_psnr, by_control = kind_of(of_models).answer(of_models)
     assert by_psnr == "By PSNR other leads on 10 of 10 displays; its mean over 10 is 25.00 dB."
     assert by_control.startswith("By control new leads on 10 of 10 displays; its mean over 10 is 0.900")
-    assert str(kind_of(of_models).table(of_models)).splitlines()[2].startswith("| new | 20.00 | 20.00 to 20.00 | 0.900")
-    assert len(str(kind_of(of_errors).table(of_errors)).splitlines()) == 2 + 5
+    assert (
+        str(kind_of(of_models).table(board(of_models)))
+        .splitlines()[2]
+        .startswith("| new | 20.00 | 20.00 to 20.00 | 0.900")
+    )
+    assert len(str(kind_of(of_errors).table(board(of_errors))).splitlines()) == 2 + 5
 
 
 def test_the_report_reads_its_related_studies_beside_it(tmp_path: Path) -> None:

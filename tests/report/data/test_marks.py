@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from holobench_eval.report.data.board import board
 from holobench_eval.report.data.phrases import marked
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import csv_text, read_records, records_frame
-from holobench_eval.report.sections.results import headline_rows
 from holobench_eval.study.plan import REFERENCE
 from tests.support.synthetic_study import TARGETS, cell, layout, record
 
@@ -59,8 +59,12 @@ def test_a_network_that_predicts_worse_than_no_training_is_marked(
     found = results(network, identity, constant)
     assert marked(found, "U-Net", DISPLAY) == f"U-Net{mark}"
     assert marked(found, "Identity", DISPLAY) == "Identity"  # it has nothing to learn
-    _, rows = headline_rows(found, DISPLAY)
-    assert [row[0] for row in rows] == [f"U-Net{mark}", "Identity", "Wirtinger"]
+    gray = {
+        label: ("no better than gray",) * (value < constant)
+        for label, value in zip(LABELS, (network, identity, 40), strict=True)
+    }
+    rows = {row.label: row.marks for row in board(found).displays[0].rows}
+    assert rows == gray | {"U-Net": (*filter(None, [mark.removeprefix(", ")]), *gray["U-Net"])}
 
 
 def test_pictures_are_not_compared_with_predictions() -> None:

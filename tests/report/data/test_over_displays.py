@@ -37,9 +37,7 @@ def test_the_answer_says_on_how_many_displays_by_how_much_and_where_the_publishe
     results = study(lambda name: 3.0 if name == DISPLAYS[0] else 1.0, reported=reported)
     assert kind_of(results) is over_displays.KIND
     first, *_ = kind_of(results).answer(results)
-    assert first.startswith(
-        "new is shown better than old on 10 of 10 displays: median +1.05 dB, +1.05 to +2.15 on nine"
-    )
+    assert first.startswith("new beats old on 10 of 10 displays: median +1.05 dB, +1.05 to +2.15 on nine")
     assert first.endswith("; 1 has the published +2.90 dB.")
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, read_records, recompute_files, records_frame, table_from_records
-from holobench_eval.report.sections.cost import timing
 from holobench_eval.study.plan import FLOORS, REFERENCE
 from tests.support import synthetic_study as synthetic
 
@@ -137,34 +136,6 @@ def test_records_that_do_not_say_what_was_beside_them_have_no_column_for_it_and_
     frame = records_frame(old, PLAIN)
     assert "timed_alone" not in frame
     assert row_of(table_from_records(frame, PLAIN), "a")["solving_s"] == 4.0
-
-
-SHARED = {"t1": (5.0, False), "t2": (3.0, False)}
-ALL = {"t1": (5.0, True), "t2": (3.0, True)}
-INFLATED = "timed with 2 concurrent workers and are inflated"
-SENTENCES = [
-    (timed(), "Seconds are those of one hologram per row, timed alone."),
-    (
-        [*timed(), *timed("b", SHARED)],
-        f"Seconds are those of one hologram per row, timed alone; those of b on bench were {INFLATED}.",
-    ),
-    (
-        [*timed("a", SHARED), *timed("b", ALL)],
-        f"Seconds are those of the holograms timed alone; those of a on bench were {INFLATED}.",
-    ),
-    (timed("a", SHARED), f"Seconds were {INFLATED}."),
-    (timed("a", ALL), "Each hologram was timed alone."),
-    (rows({"t1": 1.0}), f"Seconds were {INFLATED}."),
-]
-
-
-@pytest.mark.parametrize(("found", "sentence"), SENTENCES)
-def test_the_report_says_what_was_at_work_beside_what_was_timed(found, sentence):
-    assert timing(Results(records_frame(found, PLAIN), PLAIN), workers=2) == sentence
-
-
-def test_nothing_is_said_of_records_that_a_single_worker_left_without_a_note():
-    assert timing(Results(records_frame(rows({"t1": 1.0}), PLAIN), PLAIN), workers=1) == ""
 
 
 def test_published_figures_have_columns_of_their_own(records):

@@ -1,21 +1,18 @@
-"""Focal stacks in the report: plane by plane, what one hologram of all planes costs, and a sheet a scene."""
+"""Focal stacks in the report, plane by plane."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
-import pytest
 
 from holobench_eval.report import Description, Results, records_frame
 from holobench_eval.report.charts.thumbnails import noted
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.text import BY_MEASURE
 from holobench_eval.report.section import Report
-from holobench_eval.report.sections.comparison import pages_of_targets
-from holobench_eval.report.sections.focus import SECTIONS, by_plane, sentences
+from holobench_eval.report.sections.focus import SECTIONS, by_plane
 from tests.support import synthetic_study as synthetic
 
 PLANES = {
@@ -70,23 +67,6 @@ def test_a_table_has_a_column_a_plane_and_the_seconds_of_a_hologram_and_of_a_sce
     assert joint[6:] == ["5", "5"]
 
 
-def test_the_cost_and_the_loss_of_a_hologram_of_all_planes_are_told() -> None:
-    (told,) = sentences(results_of({"lens": 20.0, "joint": 19.0}), "bench")
-    assert "It takes 5 s: 2.5 times the time of lens for one plane, 0.833 times that for all planes." in told
-    assert "it loses in focus: -2.33 [" in told
-    assert "-3.00 dB at -2 mm, -1.00 dB at 0 mm and -3.00 dB at 2 mm" in told
-
-
-def test_a_gain_is_called_a_gain() -> None:
-    (told,) = sentences(results_of({"lens": 20.0, "joint": 24.0}), "bench")
-    assert "it gains in focus: +2.67 [" in told
-
-
-@pytest.mark.parametrize("changes", [{"stacked": frozenset()}, {"baseline": "joint"}, {"baseline": None}])
-def test_without_both_there_is_nothing_to_compare(changes: dict[str, Any]) -> None:
-    assert sentences(results_of({"lens": 20.0, "joint": 19.0}, **changes), "bench") == []
-
-
 def test_other_studies_have_no_such_section() -> None:
     (section,) = SECTIONS
     assert section.applies(report_of(results_of({"lens": 20.0}), Path()))
@@ -100,19 +80,6 @@ def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
     scores = [parse(key) for key in leading[:2]]
     cell = pd.Series({score.column: value for score, value in zip(scores, (16.384, 0.4), strict=True)})
     assert noted(scores, cell) == "in focus: PSNR 16.38 dB   SSIM 0.400"
-
-
-def test_blur_is_compared_with_whole_pictures() -> None:
-    assert [score.key for score in results_of({"lens": 20.0}).blur_scores] == ["psnr_linear", "psnr_linear_blur1"]
-
-
-def test_a_sheet_shows_every_plane_of_a_scene(tmp_path: Path) -> None:
-    report = report_of(results_of({"lens": 20.0}), tmp_path)
-    for target in PLANES:
-        synthetic.save_picture(report.thumbnails.store.target_thumbnail(target), np.zeros((8, 8, 3)))
-    sheets = pages_of_targets(report, "bench")
-    assert len(sheets) == 1
-    assert {PLANES[target] for target in sheets[0]} == {(PLANES[sheets[0][0]][0], plane) for plane in (-2.0, 0.0, 2.0)}
 
 
 def test_the_words_say_what_the_display_does() -> None:

@@ -100,10 +100,6 @@ def test_places_and_agreement_follow_from_the_order_of_each_draw():
     assert one.unchanged == high.sum()
     assert one.tau.low < one.taus.mean() < one.tau.high
     assert one.shares.sum(axis=1) == pytest.approx(1)
-    text = " ".join(section_ranks.sentences(one))
-    assert "2 of 3 pairs of methods keep their nominal order in every draw" in text
-    assert f"keep their nominal order in {high.sum()} of 30 draws" in text
-    assert f"Also first in some draws: steady in {(~high).sum()}" in text
 
 
 def test_lower_is_better_turns_the_ranking_and_not_the_meaning_of_a_lead():
@@ -126,9 +122,6 @@ def test_methods_that_are_far_apart_never_flip():
     assert [pair.flips for pair in one.pairs] == [0, 0, 0]
     assert all(pair.cause is None for pair in one.pairs)
     assert section_ranks.flips(one) is None
-    text = " ".join(section_ranks.sentences(one))
-    assert "best, also first in 30 of 30 draws (100 [89, 100] %). No other method is first in any draw." in text
-    assert "3 of 3 pairs of methods keep their nominal order in every draw" in text
 
 
 def test_ties_share_the_first_place_flip_nothing_and_have_no_tau(tmp_path):
@@ -137,7 +130,6 @@ def test_ties_share_the_first_place_flip_nothing_and_have_no_tau(tmp_path):
     assert one.first("a").mean == one.first("b").mean == 1
     assert one.pairs[0].flips == 0
     assert len(one.taus) == 0
-    assert "is not defined" in " ".join(section_ranks.sentences(one))
     ((path, caption),) = section_ranks.draw([one], tmp_path)
     assert path.is_file()
     assert "tau" not in caption
@@ -193,7 +185,6 @@ def test_a_method_that_mostly_fails_is_not_ranked_and_takes_no_draws_from_the_ot
 def test_without_a_draw_that_has_scores_there_is_no_ranking(tmp_path):
     one = found(FLIPPING, lost=[(None, str(index), None) for index in range(1, COUNT + 1)])
     assert not one.exists
-    assert "No ranking" in section_ranks.sentences(one)[-1]
     assert list(section_ranks.draw([one], tmp_path)) == []
 
 
@@ -215,7 +206,6 @@ def test_a_share_has_wilsons_interval():
 def test_the_report_has_the_section_its_tables_and_its_figure(tmp_path):
     records, layout = study(FLIPPING)
     text = whole(write_report(layout, records, tmp_path, {}, Description())[0])
-    section = text.partition("## Rank stability")[2].partition("\n## ")[0]
     for phrase in (
         "### leto-aged, 30 draws",
         "| method | nominal rank | first in [% of draws] | mean rank | best rank | worst rank |",
@@ -224,7 +214,7 @@ def test_the_report_has_the_section_its_tables_and_its_figure(tmp_path):
         "0.25 px measured",
         "(figures/quality-ranks-leto-aged.png)",
     ):
-        assert phrase in section, phrase
+        assert phrase in text, phrase
     assert "## Changes of the displays" not in text
     picture = imread(tmp_path / "figures" / "quality-ranks-leto-aged.png")
     assert picture.shape[1] == 900

@@ -8,7 +8,7 @@ import pytest
 
 from holobench_eval.display.estimates import estimate, joined
 from holobench_eval.report.data.trainings import Training
-from holobench_eval.report.sections.display.diagnosis import diagnoses, difference, missing
+from holobench_eval.report.sections.diagnosis import diagnoses, difference, missing
 from holobench_eval.study.artifacts import TrainingRecord
 
 FOUND = [

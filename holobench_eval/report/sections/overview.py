@@ -7,27 +7,25 @@ from pathlib import Path
 
 import numpy as np
 
-from ...answers import kind_of
-from ...answers.kind import subjects
-from ...charts import paired
-from ...charts.family import draw_map
-from ...charts.look.methods import looks
-from ...charts.rows import Row, draw_rows
-from ...data import over_displays
-from ...data.categories import OFFLINE, ONLINE
-from ...data.display_map import display_map
-from ...data.results import Results
-from ...markdown import heading
-from ...section import Blocks, Figures, Report, Section
+from ..answers import kind_of
+from ..answers.kind import subjects
+from ..charts import paired
+from ..charts.family import draw_map
+from ..charts.look.methods import looks
+from ..charts.rows import Row, draw_rows
+from ..data import over_displays
+from ..data.board import board
+from ..data.categories import OFFLINE, ONLINE
+from ..data.display_map import display_map
+from ..data.results import Results
+from ..section import Blocks, Figures, Report, Section
 
 PICTURES = "answer-pictures.jpg"
 MOST_METHODS = 5  # in the map
 
 
 def _table(report: Report, _: Figures) -> Blocks:
-    if rows := kind_of(report.results).table(report.results):
-        yield heading("What the answer rests on")
-        yield rows
+    yield kind_of(report.results).table(board(report.results))
 
 
 def _plot(report: Report) -> Iterator[tuple[Path, str]]:
@@ -39,6 +37,15 @@ def _plot(report: Report) -> Iterator[tuple[Path, str]]:
         yield from _map(report)
         return
     for condition, stem in paired.displays(report.results)[:1]:
+        path = report.figures / f"quality-paired-{stem}.png"
+        paired.draw(report.results, condition, path)
+        yield path, paired.caption(report.results, condition)
+
+
+def _other_plots(report: Report) -> Iterator[tuple[Path, str]]:
+    """The differences on the displays after the first."""
+    many = over_displays.is_many(report.results)
+    for condition, stem in [] if many else paired.displays(report.results)[1:]:
         path = report.figures / f"quality-paired-{stem}.png"
         paired.draw(report.results, condition, path)
         yield path, paired.caption(report.results, condition)
@@ -60,9 +67,16 @@ def _map(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _row(report: Report) -> Iterable[tuple[Path, str]]:
-    """The row of pictures; where an earlier report has none to keep, its first page of pictures."""
-    kept = report.pictures(PICTURES, lambda: _pictures(report))
-    return kept or list(report.pictures("comparison-*.jpg", lambda: ()))[:1]
+    """The row of pictures."""
+    return report.pictures(PICTURES, lambda: _pictures(report))
+
+
+def _stages(report: Report) -> Iterator[tuple[Path, str]]:
+    """Pictures of the bench's stages, drawn before the report, where they are."""
+    for name in dict.fromkeys(report.results.frame["display"]):
+        path = report.figures / f"stages-{name}.png"
+        if path.is_file():
+            yield path, f"Stages of the simulated bench {name}."
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
@@ -117,4 +131,6 @@ SECTIONS = (
         applies=_has_scores,
         figures=_row,
     ),
+    Section("other plots", 30, lambda _, figures: figures, applies=_has_scores, figures=_other_plots, details=True),
+    Section("stages", 90, lambda _, figures: figures, figures=_stages, details=True),
 )

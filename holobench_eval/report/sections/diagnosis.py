@@ -9,11 +9,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ....core.errors import listed
-from ....display.estimates import QUANTITIES
-from ...data.trainings import Training
-from ...markdown import Markdown, bullets, heading, table
-from ...section import Blocks, Figures, Report, Section
+from ...core.errors import listed
+from ...display.estimates import QUANTITIES
+from ..data.trainings import Training
+from ..markdown import Markdown, bullets, heading, table
+from ..section import Blocks, Figures, Report, Section
 
 COLOURS = ("red", "green", "blue")
 MOST = 1e12  # no quantity is anywhere near; a larger number in a stranger's file is no estimate

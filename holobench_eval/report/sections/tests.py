@@ -1,15 +1,15 @@
-"""Target by target: paired tests, every value of the headline metric, and the holes."""
+"""The paired tests against the baseline, and the cells without a score."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..data.results import Results
-from ..data.statistics import FEWEST, POWER, SIGNIFICANCE, Array, PairedTest
+from ..data.statistics import FEWEST, POWER, SIGNIFICANCE, PairedTest
 from ..data.text import sample
-from ..markdown import Markdown, blocks, heading, table
+from ..markdown import Markdown, heading, table
 from ..section import Blocks, Figures, Report, Section
 
 
@@ -59,31 +59,6 @@ def _tests(results: Results, tests: Sequence[PairedTest]) -> Markdown:
     return table(["comparison", "display", "complete pairs", *columns], rows)
 
 
-def _every_target(report: Report, _: Figures) -> Blocks:
-    yield heading("Every target")
-    yield f"{report.results.headline.axis}{report.layout.text.axis}, repeats averaged."
-    yield report.by_display(_by_target)
-
-
-def _by_target(results: Results, condition: str) -> Markdown:
-    names, baseline = results.methods(condition), results.layout.baseline
-    values = {name: results.values(name, condition) for name in names}
-    if baseline not in names or len(names) == 1:
-        return _values(results, values)
-    differences = {name: values[name] - values[baseline] for name in names if name != baseline}
-    minus = f"Minus the baseline {baseline}:"
-    return blocks([_values(results, values), minus, _values(results, differences, signed=True)])
-
-
-def _values(results: Results, values: Mapping[str, Array], signed: bool = False) -> Markdown:
-    """A row a target, a column a method of ``(targets,)`` values."""
-    rows = [
-        [target, *(results.headline.number(column[index], signed) for column in values.values())]
-        for index, target in enumerate(results.targets)
-    ]
-    return table(["target", *map(results.layout.marked, values)], rows)
-
-
 def _holes(report: Report, _: Figures) -> Blocks:
     """Every cell without a score, with its reason."""
     columns = ["label", "condition", "target", "repeat", "state", "reason"]
@@ -103,6 +78,5 @@ def _holes(report: Report, _: Figures) -> Blocks:
 
 SECTIONS = (
     Section("paired tests", 120, _paired_tests, details=True),
-    Section("every target", 180, _every_target, details=True),
     Section("holes", 190, _holes, details=True),
 )

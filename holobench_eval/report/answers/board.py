@@ -1,0 +1,67 @@
+"""The board as tables: a display a table, its groups one below the other."""
+
+from __future__ import annotations
+
+import math
+
+from ..data.board import GROUPS, Board, Display, Row
+from ..data.categories import ORACLE
+from ..data.phrases import verdict
+from ..data.text import FILES, number, words
+from ..markdown import Markdown, blocks, heading, table
+
+SIGNS = {"better": "", "worse": "", "not shown to differ": " (not shown)", "not tested": " (no test)"}
+
+
+def board_table(board: Board) -> Markdown | None:
+    """The board of every display, under its name where there are several."""
+    many = len(board.displays) > 1
+    parts: list[object] = []
+    for display in board.displays:
+        parts += [heading(display.name, 3)] * many + [display_table(board, display)]
+    return blocks([*parts, _note(board)]) if board.displays else None
+
+
+def display_table(board: Board, display: Display) -> Markdown:
+    """The board of a display: a row a method, the name of its group above it."""
+    score, layout = board.results.headline, board.results.layout
+    columns = ["", "method", score.heading]
+    columns += [f"against {layout.baseline}{score.brackets}"] * bool(layout.baseline)
+    columns += [each.name for each in board.beside]
+    costs = [*(["photographs"] * layout.spends_captures), *(["seconds"] * (layout.measure != FILES))]
+    lines = []
+    for group, rows in display.groups:
+        name = Markdown("**{}**").format(GROUPS[group])
+        blank = [""] * (len(columns) + len(costs) - 2)
+        lines += [["", name, *blank]] if len(display.groups) > 1 else []
+        lines += [_line(board, row, group, bool(layout.baseline), costs) for row in rows]
+    return table([*columns, *costs], lines)
+
+
+def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) -> list[object]:
+    score, results = board.results.headline, board.results
+    named = ", ".join([row.label, *row.marks])
+    if row.scored < len(results.targets):
+        named += f", {row.scored} of {len(results.targets)} targets"
+    line: list[object] = [row.tier, named, score.number(row.score.mean)]
+    if tested and row.test:
+        sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]
+        line.append(f"{score.estimate(row.test.estimate, signed=True)}{sign}")
+    elif tested:
+        line.append("baseline" if row.label == results.layout.baseline else "–")
+    line += [each.number(value) for each, value in zip(board.beside, row.beside, strict=True)]
+    known = {"photographs": row.photographs, "seconds": row.seconds}
+    return line + [number(math.nan if (value := known[cost]) is None else value) for cost in costs]
+
+
+def _note(board: Board) -> Markdown:
+    """What the letters are, and what a gray picture scores."""
+    score, floors = board.results.headline, dict[str, list[str]]()
+    for display in board.displays:
+        if display.floor is not None:
+            floors.setdefault(score.with_unit(display.floor), []).append(display.name)
+    many = len(floors) > 1
+    gray = [f"{value} on {words(names)}" if many else value for value, names in floors.items()]
+    floor = f" A gray picture scores {'; '.join(gray)}." if gray else ""
+    letters = "A letter holds the methods of a group that no test tells from its best."
+    return Markdown("{}").format(f"{letters}{floor} Brackets: 95 % intervals.")

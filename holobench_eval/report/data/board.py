@@ -1,0 +1,182 @@
+"""The board of a study: its methods on each display, best first, in groups and tiers, with what each of them cost.
+
+Methods of one group were given as much of the camera. A letter holds the methods of a group that no test tells from the
+best of the letter (``statistics.tiers``). board.json is the board in the numbers of table.csv; report.md, the page, the
+site, the terminal and the tables of the documentation are drawn from it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
+from .columns import costs
+from .phrases import CONSTANT, marks, tested, verdict
+from .results import Results
+from .scores import Score
+from .statistics import Estimate, PairedTest, tiers
+from .tables import rounded
+
+# In the order of the board.
+GROUPS = {
+    ONLINE: "With photographs of the picture itself",
+    CALIBRATED: "Trained on photographs of other pictures",
+    OPEN_LOOP: "No camera",
+    GIVEN: "Photographs that were given",
+    ORACLE: "Knows the display: the best phase known",
+}
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method on a display.
+
+    tier: its letter (empty: a target is missing, there is no test, or it is an oracle); score: mean of the headline with its interval; scored: of how many
+    targets; test: against the baseline (None: it is the baseline, or lacks a target); beside: means of other scores;
+    photographs: in total, those of its training included (None: unknown); seconds: of one hologram (None: unknown);
+    marks: what must be known of it.
+    """
+
+    label: str
+    tier: str
+    score: Estimate
+    scored: int
+    test: PairedTest | None
+    beside: tuple[float, ...]
+    photographs: float | None
+    seconds: float | None
+    marks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Display:
+    """The methods on a display, by group, best first; floor: the mean of a constant image (None: unknown)."""
+
+    name: str
+    groups: tuple[tuple[str, tuple[Row, ...]], ...]
+    floor: float | None
+
+    @property
+    def rows(self) -> list[Row]:
+        """Of all groups."""
+        return [row for _, rows in self.groups for row in rows]
+
+
+@dataclass(frozen=True)
+class Board:
+    """The displays of a study; beside: the scores beside the headline; what: the headline and what it is compared with
+    stand in ``results``."""
+
+    results: Results
+    beside: tuple[Score, ...]
+    displays: tuple[Display, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Ready for JSON: no NaN, and six significant digits as in table.csv."""
+        layout, score = self.results.layout, self.results.headline
+        return {
+            "board": VERSION,
+            "study": layout.study,
+            "title": layout.title,
+            "question": layout.question,
+            "baseline": layout.baseline,
+            "headline": {"key": score.key, "title": score.axis, "unit": score.unit, "higher": score.higher_is_better},
+            "targets": len(self.results.targets),
+            "clusters": len(set(self.results.clusters)),
+            "displays": [
+                {
+                    "name": display.name,
+                    "floor": _number(display.floor),
+                    "groups": [
+                        {"name": GROUPS[group], "rows": [self._row(row) for row in rows]}
+                        for group, rows in display.groups
+                    ],
+                }
+                for display in self.displays
+            ],
+        }
+
+    def _row(self, row: Row) -> dict[str, Any]:
+        return {
+            "method": row.label,
+            "registered": self.results.names[row.label],
+            "tier": row.tier,
+            "targets": row.scored,
+            "score": _ends(row.score),
+            "difference": _ends(row.test.estimate) | {"p": _number(row.test.p)} if row.test else None,
+            "verdict": verdict(self.results.headline, row.test) if row.test else None,
+            "beside": {score.key: _number(value) for score, value in zip(self.beside, row.beside, strict=True)},
+            "photographs": _number(row.photographs),
+            "seconds": _number(row.seconds),
+            "marks": list(row.marks),
+        }
+
+
+def board(results: Results) -> Board:
+    """The board of a study: the displays before any change of them."""
+    beside = [*results.beside, *results.control]
+    beside += [score for score in results.leading[1:] if score.metric == "ssim" and not results.beside]
+    return Board(results, tuple(beside), tuple(_display(results, name, tuple(beside)) for name in results.conditions))
+
+
+def _display(results: Results, condition: str, beside: tuple[Score, ...]) -> Display:
+    groups = []
+    for category in GROUPS:
+        labels = [label for label in results.methods(condition) if results.layout.category(label) == category]
+        if labels:
+            groups.append((category, tuple(_rows(results, condition, labels, beside))))
+    return Display(condition, tuple(groups), _floor(results, condition))
+
+
+def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Score, ...]) -> Iterator[Row]:
+    complete = [label for label in labels if results.is_complete(label, condition)]
+    complete.sort(key=lambda label: -results.headline.sign * _mean(results, label, condition))
+    floor = _floor(results, condition)
+    values = np.array([results.values(label, condition) for label in complete])
+    letters = dict(zip(complete, tiers(values, results.clusters), strict=True))
+    known = costs(results.table, "")
+    for label in [*complete, *(label for label in labels if label not in complete)]:
+        row = results.row(label, condition)
+        yield Row(
+            label,
+            letters.get(label, "") if label not in results.layout.privileged else "",
+            results.headline.of(row),
+            int(row["n"]),
+            tested(results, label, condition),
+            tuple(float(row[score.column]) for score in beside),
+            float(row["total_captures"]) if "total_captures" in results.table else None,
+            float(row["solving_s"]) if "solving_s" in known else None,
+            (
+                *marks(results, label, condition),
+                *(["no better than gray"] * _is_gray(results, label, condition, floor)),
+            ),
+        )
+
+
+def _floor(results: Results, condition: str) -> float | None:
+    """The mean of a constant image."""
+    has_one = CONSTANT in results.floors and results.has_pictures(condition)
+    return _mean(results, CONSTANT, results.reference(condition)) if has_one else None
+
+
+def _is_gray(results: Results, label: str, condition: str, floor: float | None) -> bool:
+    mean = _mean(results, label, condition)
+    return floor is not None and math.isfinite(mean) and not results.headline.better(mean, floor)
+
+
+def _mean(results: Results, label: str, condition: str) -> float:
+    return float(results.values(label, condition).mean())
+
+
+def _ends(estimate: Estimate) -> dict[str, float | None]:
+    return {"mean": _number(estimate.mean), "low": _number(estimate.low), "high": _number(estimate.high)}
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or math.isnan(value) else rounded(value)

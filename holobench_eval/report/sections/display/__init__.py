@@ -1,1 +1,0 @@
-"""Sections that say what a display is like, not what a method makes of it."""
