@@ -53,7 +53,7 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     Examples
     --------
     >>> load_study("configs/quick.yaml").labels
-    ('double_phase', 'gerchberg_saxton', 'wirtinger', 'oracle')
+    ('double_phase', 'gerchberg_saxton', 'wirtinger', 'hil_plus')
     """
     document, changes = load(Path(path)), changes or Changes()
     document = changed(replace(document, data=_long_form(document.data)), changes)

@@ -184,7 +184,7 @@ def plan(study: Study) -> Plan:
     >>> from holobench_eval.study.config import load_study
     >>> grid = plan(load_study("configs/quick.yaml"))
     >>> len(grid.tasks), len(grid.cells)
-    (10, 20)
+    (40, 80)
     """
     targets = [(item, study.dataset.digest(item)) for item in study.items]
     displays_by_source = displays(study)

@@ -5,7 +5,7 @@ from __future__ import annotations
 OPEN_LOOP = "open loop"
 CALIBRATED = "calibrated"
 ONLINE = "online"
-ORACLE = "ceiling"
+ORACLE = "oracle"
 GIVEN = "given"
 FLOOR = "floor"  # in files, of rows that no method made
 

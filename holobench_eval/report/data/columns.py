@@ -92,8 +92,8 @@ def label(record: Record, layout: Layout) -> str:
 
 @column(CELL, table=first)
 def category(record: Record, layout: Layout) -> str:
-    """What the method knows of the display: `open loop`, `calibrated`, `online` (captures the scored image), `ceiling`
-    (oracle), `given` (pictures from files); `floor`: an image that no method made."""
+    """What the method knows of the display: `open loop`, `calibrated`, `online` (captures the scored image), `oracle`,
+    `given` (pictures from files); `floor`: an image that no method made."""
     return FLOOR if is_reference(record["cell"]["condition"]) else layout.category(record["label"])
 
 

@@ -92,7 +92,7 @@ def _frontier(results: Results, condition: str, cost: Cost) -> Frontier:
         marks,
         higher=results.headline.higher_is_better,
         baseline=_line(results, str(baseline), condition, "baseline", band=False) if known else None,
-        oracle=_line(results, oracle, condition, "ceiling", band=True) if oracle else None,
+        oracle=_line(results, oracle, condition, "oracle", band=True) if oracle else None,
         constant=_constant(results, condition) if has_constant else None,
     )
 

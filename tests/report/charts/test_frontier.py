@@ -60,7 +60,7 @@ def test_no_two_names_overlap_and_none_leaves_its_panel(found, tmp_path, drawn):
     assert [path.name for path, _ in files] == ["quality-captures.png", "quality-time.png"]
     for axes in {axes for *_, axes in drawn}:
         names = [(text, box) for text, box, where in drawn if where is axes]
-        assert len(names) == 11 + 2  # eleven rows, floor and ceiling
+        assert len(names) == 11 + 2  # eleven rows, floor and oracle
         assert overlaps(names) == []
         assert all(axes.bbox.x0 <= box.x0 and box.x1 <= axes.bbox.x1 for _, box in names)
     for path, _ in files:
@@ -157,7 +157,7 @@ def test_bars_are_paired_with_the_baseline_and_its_own_row_has_none(found, tmp_p
     assert one.high - one.quality == pytest.approx(gained.high - gained.mean)
     assert np.isnan(marks["wirtinger"].low)
     assert "oracle" not in marks
-    assert seen[0][0].oracle.label.startswith("ceiling: oracle, ")
+    assert seen[0][0].oracle.label.startswith("oracle: oracle, ")
     assert seen[0][0].baseline.label.startswith("baseline: wirtinger, ")
 
 

@@ -61,7 +61,7 @@ def test_a_layout_holds_what_the_config_orders(study):
     assert (layout.title, layout.seed, layout.baseline, layout.headline) == ("Two methods", 7, "honest", "ssim_linear")
     assert layout.privileged == {"knowing"}
     assert layout.camera == {"seeing"}
-    assert [layout.category(label) for label in layout.methods] == ["open loop", "ceiling", "online"]
+    assert [layout.category(label) for label in layout.methods] == ["open loop", "oracle", "online"]
     assert layout.reported_metrics == ("psnr",)
     assert layout.reported_source == "a paper, table 3"
 

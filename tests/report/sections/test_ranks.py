@@ -188,7 +188,7 @@ def test_without_a_draw_that_has_scores_there_is_no_ranking(tmp_path):
     assert list(section_ranks.draw([one], tmp_path)) == []
 
 
-def test_the_ceiling_and_methods_that_see_the_camera_are_not_ranked():
+def test_oracles_and_methods_that_see_the_camera_are_not_ranked():
     one = found(FLIPPING, privileged=frozenset({"robust"}), camera=frozenset({"poor"}))
     assert one.methods == ["steady"]
     assert not one.exists

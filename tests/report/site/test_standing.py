@@ -85,7 +85,7 @@ def test_the_same_targets_display_and_harness_are_one_group_across_folders(found
 def test_ranks_are_within_a_category_and_holes_and_oracles_have_none(found: list[Group]) -> None:
     rows = of(found, "leto-aged").rows
     ranks = {(row.label, row.source.by): row.rank for row in rows}
-    assert [row.rank for row in rows if row.category == "ceiling"] == [None, None]
+    assert [row.rank for row in rows if row.category == "oracle"] == [None, None]
     holes = [row for row in rows if row.label == "GS"]
     assert [(row.rank, row.failed, len(row.values), row.gain) for row in holes] == [(None, 1, 3, None)] * 2
     for row in rows:
@@ -165,7 +165,7 @@ def test_ranks_count_methods_with_their_parameters_and_not_their_runs(
     assert both.ranked == alone.ranked
     own = {row.label: row.rank for row in both.rows if not row.source.by}
     assert own == {row.label: row.rank for row in alone.rows}
-    theirs = [row for row in both.rows if row.source.by and row.category != "ceiling"]
+    theirs = [row for row in both.rows if row.source.by and row.category != "oracle"]
     assert theirs
     assert all(row.rank is None and row.is_further for row in theirs)
 
