@@ -239,7 +239,8 @@ class Study:
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
     published figures to print beside the measured ones; related: names of error budgets and predictions of the same
-    displays, whose configs and reports lie beside this one's: a study over many displays holds margins against them.
+    displays, whose configs and reports lie beside this one's: a study over many displays holds margins against them;
+    board: whether the study enters the pages of displays on a site.
     file, text: the config file as the user named it, and what is in it; changes: those of the command line.
     """
 
@@ -266,6 +267,7 @@ class Study:
     limits: Limits = Limits()
     reported: Reported | None = None
     related: tuple[Text, ...] = ()
+    board: bool = False
     file: Path = field(default=Path(), metadata={"key": False})
     text: str = field(default="", metadata={"key": False})
     changes: Changes = field(default=Changes(), metadata={"key": False})

@@ -119,6 +119,7 @@ def _basis(study: Study, plan: Plan, output: Path) -> dict[str, Any]:
     return {
         "config": os.path.relpath(study.file, output),
         "config_sha256": text_digest(study.text),
+        "board": study.board,
         "harness": HARNESS,
         "scores": dict(plan.metrics),
         "profiles": profiles,

@@ -39,7 +39,7 @@ No.
 def provenance(**changes: Any) -> dict[str, Any]:
     """That of a run on this version's displays."""
     profiles = {name: {"version": 1, "sha256": load_profile(name).digest} for name in synthetic.SEVERITY}
-    given = {"package": "0.1.0", "harness": HARNESS, "profiles": profiles, "cpu": "A processor"}
+    given = {"package": "0.1.0", "harness": HARNESS, "board": True, "profiles": profiles, "cpu": "A processor"}
     return given | changes
 
 

@@ -29,7 +29,7 @@ def display_table(board: Board, display: Display) -> Markdown:
     columns += [f"against {layout.baseline}{score.brackets}"] * bool(layout.baseline)
     columns += [each.name for each in board.beside]
     costs = [*(["photographs"] * layout.spends_captures), *(["seconds"] * (layout.measure != FILES))]
-    lines = []
+    lines: list[list[object]] = []
     for group, rows in display.groups:
         name = Markdown("**{}**").format(GROUPS[group])
         blank = [""] * (len(columns) + len(costs) - 2)

@@ -1,7 +1,8 @@
-"""The pictures behind a figure: thumbnails of targets and captures, and the window that has most detail."""
+"""The pictures behind a comparison figure: thumbnails of targets and captures, the crop to enlarge, the error map."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,10 +34,18 @@ class Crop:
 
 @dataclass(frozen=True)
 class Tile:
-    """One capture: the picture ``(h, w, 3)`` sRGB in [0, 1], or None and the note why it is absent."""
+    """One capture in a comparison: the picture ``(h, w, 3)`` sRGB in [0, 1], or None and the note why it is absent."""
 
     picture: Picture | None
     note: str
+
+
+@dataclass(frozen=True)
+class Column:
+    """All captures of one method under one condition, in the order of the figure's targets."""
+
+    title: str
+    tiles: tuple[Tile, ...]
 
 
 def load_picture(path: Path) -> Picture | None:
@@ -65,6 +74,18 @@ def most_detailed(target: Picture, fraction: int = CROP_FRACTION) -> Crop:
     # Six decimals: summation order must not decide between equal windows.
     top, left = np.unravel_index(int(np.argmax(np.round(windows, 6))), windows.shape)
     return Crop(int(top), int(left), rows, columns)
+
+
+def error_map(capture: Picture, target: Picture) -> NDArray[np.float64]:
+    """``(h, w)`` absolute difference of sRGB values, mean over the three channels, in [0, 1]."""
+    error: NDArray[np.float64] = np.abs(capture - target).mean(axis=2)
+    return error
+
+
+def error_limit(errors: Sequence[NDArray[np.float64]]) -> float:
+    """The upper end of the shared error scale: the 99th percentile of all errors, rounded up to a tenth."""
+    high = float(np.quantile(np.concatenate([error.ravel() for error in errors]), 0.99))
+    return min(1.0, max(0.1, math.ceil(high * 10 - 1e-9) / 10))
 
 
 def spread(names: Sequence[str], most: int) -> list[str]:

@@ -186,7 +186,11 @@ def _displays(a: Run, b: Run, displays: Mapping[str, str] | None) -> dict[str, s
 def _references(a: Run, b: Run, names: Mapping[str, str]) -> dict[str, str]:
     """Reference rows of A: those of B for the display that is paired with theirs, else for the first displays."""
     of_a, of_b = (
-        {row.display: row.condition for row in run.records.itertuples() if is_reference(row.condition)}
+        {
+            str(display): str(name)
+            for display, name in run.records[["display", "condition"]].to_numpy()
+            if is_reference(name)
+        }
         for run in (a, b)
     )
     paired = {mine: of_b[names[display]] for display, mine in of_a.items() if names.get(display) in of_b}

@@ -37,10 +37,10 @@ VERSION = 1
 class Row:
     """A method on a display.
 
-    tier: its letter (empty: a target is missing, there is no test, or it is an oracle); score: mean of the headline with its interval; scored: of how many
-    targets; test: against the baseline (None: it is the baseline, or lacks a target); beside: means of other scores;
-    photographs: in total, those of its training included (None: unknown); seconds: of one hologram (None: unknown);
-    marks: what must be known of it.
+    tier: its letter (empty: a target is missing, there is no test, or it is an oracle); score: mean of the headline
+    with its interval; scored: of how many targets; test: against the baseline (None: it is the baseline, or lacks a
+    target); beside: means of other scores; photographs: in total, those of its training included (None: unknown);
+    seconds: of one hologram (None: unknown); marks: what must be known of it.
     """
 
     label: str

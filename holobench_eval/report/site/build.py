@@ -7,22 +7,17 @@ names the files of both, the earlier and the new one, so that the same command g
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 
 from ...core.errors import StorageError, UserError
 from ...core.io import TEMPORARY, write_atomically
-from ..charts.style import slugs as stems
-from .board import Names
 from .checks import folded
-from .displays import Display
-from .html import SCRIPTS, colours, slug
-from .index import index
+from .html import page, slug
 from .intake import Source, folders, read
-from .pages import Shown, display_page, method_page, study_page
-from .pictures import Picture, figures, sheet, thumbnails
-from .standing import Group, groups
+from .pages import Study, about, cards, facts, places, slugs
+from .pictures import figures, sheet, thumbnails
 
 MARK = "files-of-the-site.txt"
 
@@ -107,71 +102,76 @@ def _whole(contents: Iterable[tuple[str, bytes]]) -> dict[str, bytes]:
 
 def _contents(sources: Sequence[Source], without: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
     """(path below the site, bytes) of every file."""
-    standing, names = groups(sources), Names(_slugs(sources))
-    yield from _assets()
-    yield "index.html", index(standing, sources, without, names)
-    shown = {source.folder: _shown(source) for source in sources}
-    for source in sources:
-        folder = names.studies[str(source.folder)]
-        yield f"studies/{folder}.html", study_page(source, standing, names, shown[source.folder])
-        for picture in (*shown[source.folder].figures, *shown[source.folder].thumbnails):
-            yield f"pictures/{folder}/{picture.name}", picture.content
-    for method in dict.fromkeys(row.method for group in standing for row in group.rows):
-        pictures = [
-            (f"../pictures/{names.studies[str(source.folder)]}/{picture.name}", picture)
-            for source in sources
-            for picture in shown[source.folder].thumbnails
-            if picture.of == method
-        ]
-        yield f"methods/{slug(method)}.html", method_page(method, standing, names, pictures)
-    for display in {group.display.title: group.display for group in standing}.values():
-        yield from _display(display, standing, names, shown)
+    studies = [_study(source, name) for source, name in zip(sources, slugs(sources), strict=True)]
+    yield "assets/page.css", (files("holobench_eval.report.page") / "assets" / "page.css").read_bytes()
+    yield "assets/site.css", (files(__package__) / "assets" / "site.css").read_bytes()
+    shown, methods = (
+        cards(studies),
+        dict.fromkeys(row for study in studies for row in study.source.results.names.values()),
+    )
+    found = [(title, slug(title), own) for title, own in shown.items()]
+    yield (
+        "index.html",
+        page(
+            "index",
+            title="Which phase-retrieval method, on which display?",
+            displays=[
+                {
+                    "title": title,
+                    "slug": name,
+                    "about": own[0]["about"],
+                    "verdict": own[0]["verdict"],
+                    "pictures": own[0]["pictures"],
+                }
+                for title, name, own in found
+            ],
+            studies=[
+                {"slug": each.slug, "name": each.source.name, "whose": each.whose, "question": each.question}
+                for each in studies
+            ],
+            methods=[{"name": name, "about": about(name)} for name in sorted(methods) if not name.startswith("floor_")],
+            without=without,
+        ),
+    )
+    for title, name, own in found:
+        sheets = [each["sheet"] for each in own if each["sheet"]][:1]
+        text = page("display", 1, title=f"Display {title}", about=own[0]["about"], boards=own, sheets=sheets)
+        yield f"displays/{name}.html", text
+    for method in methods:
+        pictures = [placed for study in studies for placed in study.thumbnails if placed[1].of == method]
+        if found_places := places(studies, method):
+            text = page("method", 1, title=method, about=about(method), places=found_places, pictures=pictures)
+            yield f"methods/{slug(method)}.html", text
+    for study in studies:
+        yield f"studies/{study.slug}.html", _study_page(study)
+        placed = (*study.figures, *study.thumbnails, *study.sheets.values())
+        yield from ((path, picture.content) for path, picture in placed)
 
 
-def _display(
-    display: Display, standing: Sequence[Group], names: Names, shown: Mapping[Path, Shown]
-) -> Iterator[tuple[str, bytes]]:
-    """The page of a display, its stage sheet, and the pictures of its newest study."""
-    own = [group for group in standing if group.display.title == display.title]
-    sources = list({row.source.folder: row.source for group in own for row in group.rows}.values())
-    drawn = next((each for source in sources if (each := sheet(source, display.name))), None)
-    if drawn is not None:
-        yield f"pictures/displays/{slug(display.title)}.png", drawn.content
-    pictures = next((found for source in sources if (found := _of(display, source, shown, names))), [])
-    yield f"displays/{slug(display.title)}.html", display_page(display, standing, names, drawn, pictures)
-
-
-def _of(display: Display, source: Source, shown: Mapping[Path, Shown], names: Names) -> list[tuple[str, Picture]]:
-    """The first comparisons of a study on a display."""
-    folder = names.studies[str(source.folder)]
-    start = f"comparison-{stems([display.name])[display.name]}-"
-    return [
-        (f"../pictures/{folder}/{picture.name}", picture)
-        for picture in shown[source.folder].figures
-        if picture.of.startswith(start) and picture.of.removeprefix(start).isdigit()
-    ][:1]
-
-
-def _shown(source: Source) -> Shown:
+def _study(source: Source, name: str) -> Study:
     taken, count = figures(source)
-    return Shown(taken, thumbnails(source), count)
+    sheets = {display: drawn for display in source.results.conditions if (drawn := sheet(source, display))}
+    return Study(
+        source,
+        name,
+        [(f"pictures/{name}/{picture.name}", picture) for picture in taken],
+        [(f"pictures/{name}/{picture.name}", picture) for picture in thumbnails(source)],
+        count - len(taken),
+        {display: (f"pictures/{name}/{picture.name}", picture) for display, picture in sheets.items()},
+    )
 
 
-def _slugs(sources: Sequence[Source]) -> dict[str, str]:
-    """The name of each study's page, by folder; folders of one name are numbered."""
-    found: dict[str, str] = {}
-    for source in sources:
-        name, number = slug(source.name), 1
-        while name in found.values() or name == "displays":
-            number += 1
-            name = f"{slug(source.name)}-{number}"
-        found[str(source.folder)] = name
-    return found
-
-
-def _assets() -> Iterator[tuple[str, bytes]]:
-    own, of_page = files(__package__) / "assets", files("holobench_eval.report.page") / "assets"
-    yield "assets/page.css", (of_page / "page.css").read_bytes()
-    yield "assets/site.css", (own / "site.css").read_bytes() + colours().encode()
-    for name in SCRIPTS:
-        yield f"assets/{name}", (own / name).read_bytes()
+def _study_page(study: Study) -> bytes:
+    source = study.source
+    notes = [f"{study.left} more figures are in its folder."] if study.left else []
+    notes += [f"{source.changed} conditions are changes of a display, and not shown."] if source.changed else []
+    return page(
+        "study",
+        1,
+        title=f"{source.name}{study.whose}",
+        question=study.question,
+        boards=study.boards,
+        pictures=study.figures,
+        notes=" ".join(notes),
+        facts=facts(source),
+    )

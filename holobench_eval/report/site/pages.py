@@ -1,66 +1,164 @@
-"""The page of a method, of a display, and of a study."""
+"""What the pages show: the boards of every study, a card a display, the places of a method."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from inspect import getdoc
 from pathlib import Path
-
-from markdown_it import MarkdownIt
-from markupsafe import Markup
+from typing import Any
 
 from ...core import plugins
-from ..data.error_budget import budgets
-from ..data.text import FILES, percent
-from ..description import basis
-from .board import MEASURED, Names, board
-from .checks import LONGEST
-from .displays import Display, ancestors, counted, parameters, stage_title
-from .html import joined, listed, page, slug, swatch, table
+from ...display.simulated.profile import Profile, load_profile, names
+from ..answers.comparison import of_display
+from ..data import board as boards
+from ..data.phrases import verdict
+from ..data.statistics import Estimate
+from ..data.text import number
+from .html import slug
 from .intake import Source
 from .pictures import Picture
-from .standing import Group
 
-REPORT = ("report.html", "report.md")
-ANSWERS = ("## Question", "## Answer")
-FACTS = ("package", "harness", "revision", "dirty", "command", "config_sha256", "python", "platform", "cpu", "gpu",
-         "device", "threads", "workers", "started", "ended")  # fmt: skip
-LONGEST_TEXT = 40_000  # characters of report.md, of which question and answer are the first
+BOARD = "board"  # the key of a provenance that says whether a study enters the pages of displays
+WIDTH, EDGE = 200, 6  # of a row's drawing
+FACTS = ("by", "package", "harness", "revision", "dirty", "command", "config_sha256", "python", "platform", "cpu",
+         "gpu", "device", "threads", "workers", "started", "ended")  # fmt: skip
+
+Placed = tuple[str, Picture]  # path below the site
+Shown = dict[str, Any]  # the board of a display in a study
 
 
 @dataclass(frozen=True)
-class Shown:
-    """The pictures of a study: what the site has of its figures and thumbnails, and how many figures there are."""
+class Study:
+    """A source with its pictures. slug: of its page; figures, thumbnails: with their paths; left: figures left out."""
 
-    figures: Sequence[Picture]
-    thumbnails: Sequence[Picture]
-    count: int
+    source: Source
+    slug: str
+    figures: Sequence[Placed]
+    thumbnails: Sequence[Placed]
+    left: int
+    sheets: Mapping[str, Placed] = field(default_factory=dict)
+
+    @property
+    def enters(self) -> bool:
+        """Whether it enters the pages of displays."""
+        return self.source.known.get(BOARD) is True
+
+    @property
+    def whose(self) -> str:
+        """Words behind its name."""
+        return f", by {self.source.by}" if self.source.by else ""
+
+    @property
+    def question(self) -> str:
+        """What report.md of an own study asks; of others what they have named."""
+        text = "" if self.source.by else _text(self.source.folder / "board.json")
+        try:
+            return str(json.loads(text)["question"]) if text else ""
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return ""
+
+    @cached_property
+    def boards(self) -> list[Shown]:
+        """Of its displays."""
+        whole = boards.board(self.source.results)
+        return [shown(self, whole, display) for display in whole.displays]
 
 
-def method_page(method: str, groups: Sequence[Group], names: Names, pictures: Sequence[tuple[str, Picture]]) -> bytes:
-    """The page of a method: every display that it was measured on."""
-    names = replace(names, up="../")
-    rows = [row for group in groups for row in group.rows if row.method == method]
-    labels = {(row.label, row.source.name): row.source.parameters.get(row.label, "") for row in rows}
-    settings = [
-        Markup("<strong>{}</strong> in {}: <code>{}</code>").format(label, study, text)
-        for (label, study), text in labels.items()
-        if text not in ("", "{}")
+def shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
+    """The board of a display in a study, as templates take it."""
+    source, results, score = study.source, study.source.results, study.source.results.headline
+    profile, digest = _profile(source, display.name), _digest(source, display.name)
+    panel = source.panels.get(display.name, "")
+    count, clusters = len(results.targets), len(set(results.clusters))
+    place = _places(display)
+    return {
+        "name": display.name,
+        # another display or version than that of the package has the beginning of its digest, or its lab
+        "title": display.name if profile else f"{display.name} ({digest[:8] or source.by or source.name})",
+        "about": profile.description
+        if profile
+        else "Another display, or another version of one, than in this package.",
+        "heading": f"{score.heading}{f', panel of {panel} pixels' if panel else ''}",
+        "score": score,
+        "baseline": results.layout.baseline,
+        "beside": whole.beside,
+        "floor": "" if display.floor is None else f" A gray picture scores {score.with_unit(display.floor)}.",
+        "counted": f"{count} targets{f' in {clusters} clusters' if clusters < count else ''}.",
+        "verdict": of_display(results, display) if source.measure == "picture" else "",
+        "zero": place(0.0),
+        "groups": [
+            {"name": boards.GROUPS[group], "rows": [_row(study, whole, row, place) for row in rows]}
+            for group, rows in display.groups
+        ],
+        "pictures": [
+            placed
+            for placed in study.figures
+            if display.name == results.conditions[0] and placed[1].of == "answer-pictures"
+        ],
+        "sheet": study.sheets.get(display.name),
+        "of": study,
+    }
+
+
+def _digest(source: Source, name: str) -> str:
+    known = dict(source.known.get("profiles") or {}).get(name)
+    return str(known.get("sha256", "")) if isinstance(known, Mapping) else ""
+
+
+def _profile(source: Source, name: str) -> Profile | None:
+    """That of the package, where the digest is the same."""
+    if name not in {*names(), *names(family=True)}:
+        return None
+    profile = load_profile(name)
+    return profile if profile.digest == _digest(source, name) else None
+
+
+def _drawn(row: boards.Row) -> Estimate | None:
+    """The difference of a row that is drawn."""
+    return row.test.estimate if row.test and math.isfinite(row.test.estimate.low) else None
+
+
+def _places(display: boards.Display) -> Callable[[float], float]:
+    """Where a difference stands in the drawings of a display [px]."""
+    found = [estimate for row in display.rows if (estimate := _drawn(row))]
+    ends = [0.0, *(end for estimate in found for end in (estimate.low, estimate.high))]
+    low, scale = min(ends), (WIDTH - 2 * EDGE) / (max(ends) - min(ends) or 1.0)
+    return lambda value: round(EDGE + (value - low) * scale, 2)
+
+
+def _row(study: Study, whole: boards.Board, row: boards.Row, place: Callable[[float], float]) -> dict[str, Any]:
+    results, test, drawn = study.source.results, row.test, _drawn(row)
+    score, total = results.headline, len(results.targets)
+    lacks = [f"{row.scored} of {total} targets"] if row.scored < total else []
+    found = verdict(score, test) if test else ""
+    return {
+        "tier": row.tier,
+        "method": results.names[row.label],
+        "name": ", ".join([row.label, *row.marks, *lacks]),
+        "score": score.number(row.score.mean),
+        "difference": score.estimate(test.estimate, signed=True) if test else "",
+        "verdict": found if found in ("better", "worse") else "same",
+        "mark": {end: place(getattr(drawn, end)) for end in ("low", "mean", "high")} if drawn else None,
+        "beside": [each.number(value) for each, value in zip(whole.beside, row.beside, strict=True)],
+        "photographs": number(math.nan if row.photographs is None else row.photographs),
+        "seconds": number(math.nan if row.seconds is None else row.seconds),
+    }
+
+
+def places(studies: Sequence[Study], method: str) -> list[dict[str, Any]]:
+    """The rows of a method on every display of every study."""
+    return [
+        {**row, "display": shown["title"], "baseline": shown["baseline"], "of": study, "unit": shown["score"].unit}
+        for study in studies
+        for shown in study.boards
+        for group in shown["groups"]
+        for row in group["rows"]
+        if row["method"] == method
     ]
-    categories = ", ".join(dict.fromkeys(row.category for row in rows))
-    body = Markup("<p>{}{}</p>\n<p>{}</p>\n{}{}{}").format(
-        swatch(method),
-        about(method),
-        f"Category: {categories}. Displays: {len({row.display.title for row in rows})}. Scores compare within a group; "
-        "ranks are those among all methods of the group.",
-        board(groups, names, rows),
-        Markup("<details><summary>Parameters</summary>{}</details>").format(listed(settings)) if settings else "",
-        _gallery("Captures", pictures),
-    )
-    return page(method, body, depth=1)
 
 
 @lru_cache(maxsize=256)
@@ -71,182 +169,32 @@ def about(method: str) -> str:
     return " ".join((getdoc(plugins.find("methods", method)) or "").partition("\n\n")[0].replace("`", "").split())
 
 
-def display_page(
-    display: Display,
-    groups: Sequence[Group],
-    names: Names,
-    sheet: Picture | None,
-    pictures: Sequence[tuple[str, Picture]],
-) -> bytes:
-    """The page of a display: its stages and their sources, its error budget, and every method's scores."""
-    names = replace(names, up="../")
-    own = [group for group in groups if group.display.title == display.title]
-    body = Markup("{}\n<h2>Scores</h2>\n{}{}{}{}{}").format(
-        _what(display),
-        board(own, names),
-        _budgets(display, own, names),
-        _stages(display),
-        _gallery("Stages", [(f"../pictures/displays/{slug(display.title)}.png", sheet)] if sheet else []),
-        _gallery("Pictures", pictures),
-    )
-    return page(f"Display {display.marked}", body, depth=1)
+def facts(source: Source) -> list[tuple[str, str]]:
+    """What the provenance says of a study."""
+    return [(name, str(source.known[name])) for name in FACTS if source.known.get(name) not in (None, "")]
 
 
-def _what(display: Display) -> Markup:
-    profile = display.profile
-    if profile is not None:
-        text = f"{profile.description} {sentence(basis(profile))}"
-        return Markup("<p>{}</p><p>Version {}, sha256 {}.</p>").format(text, profile.version, display.digest)
-    told = {
-        "real": "A real bench, as its folder says: nothing is simulated, and deviations from its nominal optics are "
-        "not known.",
-        "learned": "A trained, frozen network in the place of a display: scores say how well a method exploits it.",
-        FILES: "Photographs that were given as files; how they were taken is not known.",
-        "simulated": "A simulated display that does not come with this version of the package, so that its stages are "
-        "not known here.",
-    }[display.kind]
-    other = (
-        f" The package has another profile by the name {display.name}; scores of the two do not compare."
-        if display.is_other
-        else ""
-    )
-    digest = Markup("<p>sha256 {}.</p>").format(display.digest) if display.kind != FILES else ""
-    return Markup("<p>{}{}</p>{}").format(told, other, digest)
+def cards(studies: Sequence[Study]) -> dict[str, list[Shown]]:
+    """The boards that enter, by the title of their display, own ones first."""
+    found: dict[str, list[Shown]] = {}
+    for study in sorted(studies, key=lambda study: bool(study.source.by)):
+        for shown in study.boards if study.enters else ():
+            found.setdefault(shown["title"], []).append(shown)
+    return found
 
 
-def _budgets(display: Display, groups: Sequence[Group], names: Names) -> Markup:
-    """What of the error of the display's captures each prediction explains, from every study with error budgets."""
-    sources = {row.source.folder: row.source for group in groups for row in group.rows}.values()
-    found = [(source, budget) for source in sources for budget in budgets(source.results)]
-    parts = []
-    for source, budget in found:
-        if budget.condition != display.name:
-            continue
-        rows = (
-            (
-                part.label,
-                percent(part.share),
-                "–" if part.gain is None else source.results.headline.estimate(part.gain, True),
-            )
-            for part in budget.parts
-        )
-        headings = ("explained by", "share of the error [%]", "gain of captures without it and those before it [dB]")
-        parts.append(
-            Markup(
-                "<h2>Error budget</h2><p>From {}, over {} targets: what the error of the captures is made of.</p>{}"
-            ).format(names.study(source), budget.psnr.n, table("Error budget", headings, rows))
-        )
-    return joined(parts)
+def _text(path: Path) -> str:
+    readable = path.is_file() and not path.is_symlink() and path.stat().st_size < 10_000_000
+    return path.read_text(encoding="utf-8", errors="replace") if readable else ""
 
 
-def _stages(display: Display) -> Markup:
-    if display.profile is None:
-        return Markup("")
-    parts = []
-    for name in (display.name, *ancestors(display.profile)):
-        found = parameters(name)
-        counts = counted(found)
-        heading = "Stages and their sources" if name == display.name else f"Values of {name}"
-        note = "" if name == display.name else f"They hold where {display.name} gives none. "
-        text = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
-        rows = (
-            (stage_title(each.stage) if each.stage else "bench", each.key, each.value, each.basis, each.source or "–")
-            for each in found
-        )
-        headings = ("stage", "parameter", "value", "basis", "what the profile says of it")
-        parts.append(
-            Markup(
-                "<h2>{}</h2><p>{}Of {} parameters: {}. Fitted, drawn and assumed are what the profile calls so; stated "
-                "is all else that it says something of.</p>{}"
-            ).format(heading, note, len(found), text, table(heading, headings, rows, numbers=False))
-        )
-    effects = listed(
-        Markup("<strong>{}</strong>: {}").format(e.name.replace("_", " "), e.text) for e in display.profile.effects()
-    )
-    return Markup("{}<details><summary>Effects, in the order of the light</summary>{}</details>").format(
-        joined(parts), effects
-    )
-
-
-def study_page(source: Source, groups: Sequence[Group], names: Names, shown: Shown) -> bytes:
-    """The page of a study: its question and answer, its scores, where its numbers come from, and pictures."""
-    names = replace(names, up="../")
-    rows = [row for group in groups for row in group.rows if source in row.sources]
-    own = [group for group in groups if any(row in rows for row in group.rows)]
-    folder = names.studies[str(source.folder)]
-    figures = [(f"../pictures/{folder}/{picture.name}", picture) for picture in shown.figures]
-    thumbnails = [(f"../pictures/{folder}/{picture.name}", picture) for picture in shown.thumbnails]
-    rest = shown.count - len(shown.figures)
-    more = f" {rest} more figures are in the folder of the report." if rest else ""
-    changed = f" {source.changed} changes of its displays are in the report alone." if source.changed else ""
-    body = Markup("<p>{}</p>{}\n{}\n<h2>Scores</h2>{}\n{}\n{}{}").format(
-        f"{sentence(MEASURED[source.measure])} Whose result: {source.by or 'own'}.{changed}{more}",
-        _reports(source),
-        _answer(source.folder),
-        board(own, names, rows),
-        _origin(source),
-        _gallery("Figures", figures),
-        _gallery("Captures", thumbnails),
-    )
-    return page(f"Study {source.name}", body, depth=1)
-
-
-def _reports(source: Source) -> Markup:
-    """Where an own report lies, as text: it is no part of the site, and need not be near it."""
-    files = [name for name in REPORT if (path := source.folder / name).is_file() and not path.is_symlink()]
-    if source.by or not files:
-        return Markup("")
-    folder = "/".join(source.folder.resolve().parts[-2:])
-    paths = Markup(", ").join(Markup("<code>{}/{}</code>").format(folder, name) for name in files)
-    return Markup("<p>Its report, which is no part of this site: {}.</p>").format(paths)
-
-
-def _answer(folder: Path) -> Markup:
-    """Question and answer of report.md. Links and pictures stay text."""
-    path = folder / "report.md"
-    if path.is_symlink() or not path.is_file():
-        return Markup("<p>The folder has no report.md, so that question and answer of the study are not known.</p>")
-    with path.open(encoding="utf-8", errors="replace") as file:
-        text = file.read(LONGEST_TEXT)
-    parts = re.split(r"^(?=## )", text, flags=re.MULTILINE)
-    title = next((line.removeprefix("# ") for line in text.splitlines() if line.startswith("# ")), "")
-    chosen = [part for part in parts if part.startswith(ANSWERS)]
-    reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["link", "image", "autolink"])
-    return Markup('<div class="prose"><p><strong>{}</strong></p>{}</div>').format(
-        reader_text(title), Markup(reader.render("\n".join(chosen)))
-    )
-
-
-def sentence(text: str) -> str:
-    """A text as a sentence: a capital and a full stop."""
-    return f"{text[:1].upper()}{text[1:]}."
-
-
-def reader_text(text: str) -> str:
-    """A heading of Markdown as plain text."""
-    return re.sub(r"\\(?=[\\`*|~$_\]])", "", text)
-
-
-def _origin(source: Source) -> Markup:
-    known, packages = source.known, source.known.get("packages")
-    facts = [(name, known.get(name)) for name in FACTS]
-    if isinstance(packages, dict):
-        facts += [(f"package {name}", value) for name, value in packages.items()]
-    if isinstance(known.get("profiles"), dict):
-        facts += [(f"display {name}", profile["sha256"]) for name, profile in known["profiles"].items()]
-    rows = [(name.replace("_", " "), str(value)[:LONGEST]) for name, value in facts if value not in (None, "")]
-    return Markup("<h2>Origin of the numbers</h2>{}").format(table("Origin", ("fact", "value"), rows, numbers=False))
-
-
-def _gallery(title: str, pictures: Sequence[tuple[str, Picture]]) -> Markup:
-    """Pictures with their captions; (address, picture)."""
-    if not pictures:
-        return Markup("")
-    shown = joined(
-        Markup(
-            '<figure><a href="{0}"><img src="{0}" alt="{1}" width="{2}" height="{3}" loading="lazy"></a>'
-            "<figcaption>{1}</figcaption></figure>\n"
-        ).format(address, picture.caption, picture.width, picture.height)
-        for address, picture in pictures
-    )
-    return Markup('<h2>{}</h2><div class="gallery">{}</div>').format(title, shown)
+def slugs(sources: Sequence[Source]) -> list[str]:
+    """The name of each study's page; folders of one name are numbered."""
+    found: list[str] = []
+    for source in sources:
+        name, count = slug(source.name), 1
+        while name in found or name == "displays":
+            count += 1
+            name = f"{slug(source.name)}-{count}"
+        found.append(name)
+    return found

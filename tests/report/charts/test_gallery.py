@@ -1,7 +1,18 @@
 import numpy as np
+import pytest
+from matplotlib import colormaps
 from PIL import Image
 
-from holobench_eval.report.charts.gallery import Tile, load_picture, most_detailed, spread
+from holobench_eval.report.charts.comparison import draw_comparison
+from holobench_eval.report.charts.gallery import (
+    Column,
+    Tile,
+    error_limit,
+    error_map,
+    load_picture,
+    most_detailed,
+    spread,
+)
 from holobench_eval.report.charts.rows import HEADER, SIDE, Row, draw_rows, tile_size
 from holobench_eval.report.charts.style import LARGEST, save_picture, slugs
 from tests.support import synthetic_study as synthetic
@@ -72,3 +83,21 @@ def test_displays_keep_figures_of_their_own_whatever_they_are_called():
     stems = slugs(["a/b", "a-b", "../../x", "***"])
     assert len(set(stems.values())) == 4
     assert all("/" not in stem and not stem.startswith(".") for stem in stems.values())
+
+
+def test_the_window_is_drawn_at_four_times_the_scale_with_its_own_error_beside(tmp_path):
+    target, capture = noise(207), noise(207, seed=1)
+    draw_comparison(tmp_path / "page.png", "bench", [("noise", target)], [Column("method", (Tile(capture, "x"),))], 0.5)
+    page, crop = load_picture(tmp_path / "page.png"), most_detailed(target)
+    left, top, side = SIDE + 207 + 8, HEADER + 207 + 20, 4 * 23
+    enlarged = crop.of(capture).repeat(4, axis=0).repeat(4, axis=1)
+    assert np.abs(page[top : top + side, left : left + side] - enlarged).max() < 1 / 255
+    drawn = page[top : top + side, left + 207 - side : left + 207]
+    colours = colormaps["magma"](np.minimum(error_map(crop.of(capture), crop.of(target)) / 0.5, 1))[..., :3]
+    assert np.abs(drawn - colours.repeat(4, axis=0).repeat(4, axis=1)).max() < 2 / 255
+
+
+def test_the_error_scale_is_a_round_number_above_most_errors():
+    assert error_limit([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
+    assert error_limit([np.zeros((4, 4))]) == pytest.approx(0.1)
+    assert error_limit([np.ones((4, 4))]) == 1.0
