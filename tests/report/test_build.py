@@ -60,7 +60,6 @@ def test_a_report_is_written_with_tables_and_every_figure(records, report):
         "figures/quality-paired-leto-aged.png",
         "figures/answer-pictures.jpg",
         "figures/quality-paired-ideal.png",
-        "figures/quality-time.png",
     ]
     for name in linked:
         picture = imread(folder / name)

@@ -25,7 +25,6 @@ def test_every_chart_of_numbers_is_written_for_one_and_two_columns_as_pdf_and_sv
         "quality-paired-leto-aged",
         "quality-paired-ideal",
         "quality-captures",
-        "quality-time",
     }
     expected = {
         (column, f"{name}.{end}") for column in ("single", "double") for name in names for end in ("pdf", "svg")

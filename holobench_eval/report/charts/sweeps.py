@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from .labels import at_right
+from .cost import legend
 from .look.medium import medium
 from .look.methods import Look
 from .style import GREY, grid, save, stacked, style
@@ -56,9 +56,8 @@ def draw_sweep(path: Path, panels: Sequence[Panel], quality: str) -> None:
 
 
 def _draw_curves(axes: Axes, panel: Panel) -> None:
-    """The curves, and their names to the right at the height of their last points."""
+    """The curves, and their names in rows to the right."""
     spread = np.ptp(panel.positions) / 250 if len(panel.positions) > 1 else 0.0
-    ends: list[tuple[str, float]] = []
     for index, curve in enumerate(panel.curves):
         positions = np.array(panel.positions) + (index - (len(panel.curves) - 1) / 2) * (
             spread if panel.ticks is None else 0.07
@@ -76,12 +75,10 @@ def _draw_curves(axes: Axes, panel: Panel) -> None:
             linestyle="--" if curve.dashed else "-",
             elinewidth=0.8,
             capsize=2,
+            label=curve.label,
         )
-        known = [value for value in curve.mean if np.isfinite(value)]
-        ends += [(curve.label, known[-1])] if known else []
     if panel.floor is not None:
-        axes.axhline(panel.floor, color=GREY, linewidth=1.1, linestyle=(0, (3, 3)), zorder=1)
-        ends.append(("constant image", panel.floor))
+        axes.axhline(panel.floor, color=GREY, linewidth=1.1, linestyle=(0, (3, 3)), zorder=1, label="a gray picture")
     if panel.nominal is not None:
         axes.axvline(panel.nominal, color="black", linewidth=0.8, linestyle=":")
     if panel.ticks is not None:
@@ -89,4 +86,4 @@ def _draw_curves(axes: Axes, panel: Panel) -> None:
     axes.set_xlabel(medium().wrap(panel.axis, 0.6 * medium().width))
     axes.margins(x=0.03)
     grid(axes)
-    at_right(axes, ends, medium().scale * (PANEL - 70))
+    legend(axes)
