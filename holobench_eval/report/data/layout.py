@@ -21,7 +21,7 @@ from ...study.displays import Condition, changed, displays
 from ...study.focal_stacks import planes_of
 from ...study.plan import is_reference
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
-from .text import AS_STORED, BY_MEASURE, COMPARED, FILES, ON_A_NETWORK, REAL, REAL_SEEDS, Text, plain
+from .text import AS_STORED, BY_MEASURE, COMPARED, FILES, ON_A_NETWORK, REAL, Text, plain
 
 RATIO = "1"  # unit of a swept ratio
 
@@ -168,9 +168,9 @@ class Layout:
         text, holograms = ON_A_NETWORK if on_a_network else BY_MEASURE[self.measure], self.holograms.partition(" (")[0]
         if self.measure == FILES:
             stored = self.values == "stored"
-            text = replace(text, compared=COMPARED[self.values], domains=AS_STORED if stored else text.domains)
+            text = replace(text, compared=COMPARED[self.values], caution=AS_STORED if stored else text.caution)
         if self.real:
-            text = replace(text, displays=REAL, seeds=REAL_SEEDS)
+            text = replace(text, displays=REAL)
         procedure, picture = (words.replace("{holograms}", holograms) for words in (text.procedure, text.picture))
         return replace(text, procedure=procedure, picture=picture)
 

@@ -66,8 +66,8 @@ class Text:
 
     scored, truth: what is scored, and what it is compared with, in the singular; axis: added to the headline metric in
     figures; each: what a method makes for one target; procedure: what is done; caution: what the figures do not say;
-    displays: what the displays are; compared: in which values pictures are matched; domains: what the domains of
-    metrics mean; picture: what a tile of a picture is; seeds: what is random.
+    displays: what the displays are; compared: in which values pictures are matched; picture: what a tile of a
+    picture is.
     """
 
     scored: str = "capture"
@@ -84,15 +84,7 @@ class Text:
         "each stage that differs from an ideal bench, which methods do not know."
     )
     compared: str = "in linear light"
-    domains: str = (
-        "Linear: light intensity in [0, 1], as the sensor measures it. Amplitude: its square root. sRGB: encoded "
-        "for a monitor; perceptual metrics are defined on it."
-    )
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
-    seeds: str = (
-        "The noise of a capture depends on target, display and repeat, not on the method: all methods meet the same "
-        "noise, and differences are paired."
-    )
 
     def floor_name(self, name: str) -> str:
         """What a floor row shows."""
@@ -119,7 +111,6 @@ ON_A_NETWORK = Text(
     ),
     displays="The display is a trained, frozen network; there is no bench, no camera and no noise.",
     picture="Each predicted capture is matched in intensity and sRGB-encoded",
-    seeds="A learned display has no noise: repeats differ only by the methods' own random numbers.",
 )
 
 PREDICTION = Text(
@@ -140,10 +131,6 @@ PREDICTION = Text(
     picture=(
         'The column "capture" shows the capture of the hologram by {holograms}, registered and matched to the target; '
         "each prediction is matched to it in intensity; all are sRGB-encoded"
-    ),
-    seeds=(
-        "The noise of a capture depends on target, display and repeat, not on the method: all methods predict the "
-        "same captures, and differences are paired."
     ),
 )
 
@@ -175,7 +162,6 @@ GIVEN = Text(
         "capture. A capture is matched in intensity and scored on the pixels of its target."
     ),
     picture="Each capture is aligned with its target and matched in intensity",
-    seeds="Only the speckle of the floor is random; it depends on the target's name alone.",
 )
 
 
@@ -188,10 +174,4 @@ REAL = (
     "The display is a real bench. Listed are its nominal optics, which methods know; its deviations from them are "
     "unknown."
 )
-REAL_SEEDS = (
-    "The noise of a photograph is the camera's own: the same study photographed again gives other numbers. Methods are "
-    "shown in mixed order, so that a slow drift favours none."
-)
-
-
 BY_MEASURE = {"picture": Text(), "prediction": PREDICTION, "error_budget": PREDICTION, "focus": FOCUS, FILES: GIVEN}

@@ -14,6 +14,7 @@ from ..data.text import FILES, plain, words
 from ..data.trainings import DISPLAY, Training
 from ..markdown import Markdown, blocks, bullets, code, heading, properties, table
 from ..section import Blocks, Figures, Report, Section
+from .alignment import agreement
 
 TARGETS_NAMED = 40
 
@@ -65,6 +66,8 @@ def _on_displays(report: Report) -> list[tuple[str, str]]:
         ("seed", str(layout.seed)),
         ("headline metric", report.results.headline.axis),
         ("baseline", layout.baseline or "none"),
+        ("registration", _registration(report.results)),
+        ("saturated samples of a capture", _saturation(report.results)),
     ]
 
 
@@ -79,7 +82,31 @@ def _from_files(report: Report) -> list[tuple[str, str]]:
         ("metric protocol", _distinct(report.results, "protocol")),
         ("headline metric", report.results.headline.axis),
         ("baseline", report.layout.baseline or "none"),
+        ("saturated samples of a capture", _saturation(report.results)),
     ]
+
+
+def _registration(results: Results) -> str:
+    """How far the geometry was off, display by display, and whether a second aligner agrees."""
+    layout, done = results.layout, results.done
+    if layout.learned_display is not None:
+        return "none: the network predicts in the frame of the target"
+    changed = done["condition"].isin(layout.changed)
+    named = done["condition"].where(~changed, "displays after a change")
+    residuals = [
+        f"{condition} {' to '.join(dict.fromkeys(f'{end:.3f}' for end in (cells.min(), cells.max())))} px"
+        for condition, cells in done.groupby(named, sort=False)["registration_residual_px"]
+        if cells.notna().any()
+    ]
+    found = f"rms residual, in pixels of the scored region: {', '.join(residuals)}" if residuals else "not recorded"
+    return f"{found}. {agreement(results)}" if layout.real else found
+
+
+def _saturation(results: Results) -> str:
+    if results.layout.learned_display is not None:
+        return "none: there is no sensor"
+    most = float(results.done["saturated"].max())
+    return f"at most {100 * most:.3g} %" if most >= 0 else "not recorded"
 
 
 def _targets(results: Results) -> tuple[str, str]:
