@@ -176,7 +176,7 @@ class Layout:
 
     def marked(self, label: str) -> str:
         """A method's label, marked when it is the oracle."""
-        return f"{label}, the oracle" if label in self.privileged else label
+        return f"{label}, oracle" if label in self.privileged and "oracle" not in label.lower() else label
 
     def published(self, label: str, condition: str) -> Mapping[str, float]:
         """Published figures of a row, by metric."""

@@ -7,19 +7,18 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..charts.look.methods import looks
+from ..data.board import GROUPS, board
 from ..data.columns import costs
 from ..data.phrases import counted
-from ..data.ranks import Ranks
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Estimate
-from ..data.sweeps import Sweep
 from ..data.text import number, p_value
 from ..section import Report
 
 Json = dict[str, Any]
 
-GAIN, P = "gain", "p"
+TIER, GAIN, P = "tier", "gain", "p"
 
 
 def page_data(report: Report) -> Json:
@@ -27,6 +26,9 @@ def page_data(report: Report) -> Json:
     results = report.results
     changed = [name for name in dict.fromkeys(results.table["condition"]) if name in results.layout.changed]
     conditions = [*results.conditions, *changed]
+    drawn = board(results)
+    tiers = {name: dict[str, str]() for name in conditions}
+    tiers |= {display.name: {row.label: row.tier for row in display.rows} for display in drawn.displays}
     return {
         "study": results.layout.title,
         "headline": _score(results.headline),
@@ -41,7 +43,10 @@ def page_data(report: Report) -> Json:
             {"name": target, "cluster": str(cluster)}
             for target, cluster in zip(results.targets, results.clusters, strict=True)
         ],
-        "rows": {name: [_row(results, label, name) for label in results.methods(name)] for name in conditions},
+        "rows": {
+            name: [_row(results, label, name, tiers[name].get(label, "")) for label in _ordered(results, name, tiers)]
+            for name in conditions
+        },
         "values": {
             name: {label: _by_target(results, label, name) for label in results.methods(name)} for name in conditions
         },
@@ -57,9 +62,6 @@ def page_data(report: Report) -> Json:
             for column in [results.headline.column]
             for name in results.conditions
         },
-        "oracles": {name: results.oracle(name) for name in results.conditions},
-        "sweeps": [_sweep(sweep) for sweep in report.sweeps],
-        "ranks": [_ranks(found) for found in report.ranks if found.exists],
     }
 
 
@@ -72,11 +74,16 @@ def _labels(results: Results, conditions: list[str]) -> list[str]:
     return list(dict.fromkeys(label for name in conditions for label in results.methods(name)))
 
 
+def _ordered(results: Results, condition: str, tiers: dict[str, dict[str, str]]) -> list[str]:
+    """Labels in the order of the board, where the condition has one."""
+    return list(dict.fromkeys([*tiers[condition], *results.methods(condition)]))
+
+
 def _method(results: Results, label: str) -> Json:
     registered = results.names[label]
     return {
         "registered": registered,
-        "track": results.layout.category(label),
+        "group": GROUPS[results.layout.category(label)],
         "oracle": label in results.layout.privileged,
         "colour": colour(results, label),
     }
@@ -95,6 +102,7 @@ def _score(score: Score) -> Json:
 
 def _columns(results: Results) -> Iterator[Json]:
     """Key, heading and direction of every column; the interval and the text of a cell stand in its row."""
+    yield {"key": TIER, "heading": "letter", "higher": False}
     for score in results.leading:
         yield {"key": score.key, "heading": score.heading, "higher": score.higher_is_better}
         if score == results.headline and results.layout.baseline is not None:
@@ -105,10 +113,11 @@ def _columns(results: Results) -> Iterator[Json]:
         yield {"key": key, "heading": heading, "higher": False}
 
 
-def _row(results: Results, label: str, condition: str) -> Json:
+def _row(results: Results, label: str, condition: str, tier: str) -> Json:
     """A row of the table: of every column the value, the interval where there is one, and the text."""
     row = results.row(label, condition)
-    cells = {score.key: _estimate(score, score.of(row)) for score in results.leading}
+    cells = {TIER: _cell(tier, float(ord(tier)))} if tier else {}
+    cells |= {score.key: _estimate(score, score.of(row)) for score in results.leading}
     gain = results.gain(label, condition)
     if gain is not None and label != results.layout.baseline:
         cells[GAIN] = _estimate(results.headline, gain, signed=True)
@@ -139,37 +148,6 @@ def _by_target(results: Results, label: str, condition: str) -> Json:
     return {
         score.key: [_number(value) for value in results.values(label, condition, score.key)]
         for score in results.leading
-    }
-
-
-def _sweep(sweep: Sweep) -> Json:
-    """Values and conditions in their order; ends: of the bars, by condition and method."""
-    changed = [condition for _, condition in sweep.swept.points]
-    return {
-        "display": sweep.swept.before,
-        "words": sweep.kind.words,
-        "unit": sweep.kind.unit,
-        "numeric": sweep.kind.numeric,
-        "points": [{"value": value, "condition": condition} for value, condition in sweep.points],
-        "ends": {name: {label: _ends(sweep, label, name) for label in sweep.methods} for name in changed},
-    }
-
-
-def _ends(sweep: Sweep, label: str, condition: str) -> list[float | None]:
-    """Ends of the paired interval of the loss, moved to the mean after the change; empty where there is none."""
-    loss = sweep.loss(label, condition)
-    if loss is None or math.isnan(loss.low):
-        return []
-    mean, half = float(sweep.results.values(label, condition).mean()), (loss.high - loss.low) / 2
-    return [_number(mean - half), _number(mean + half)]
-
-
-def _ranks(found: Ranks) -> Json:
-    return {
-        "display": found.swept.before,
-        "draws": len(found.used),
-        "methods": found.methods,
-        "shares": [[_number(share) for share in row] for row in found.shares],
     }
 
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -20,7 +22,7 @@ from typing import Any
 from markdown_it import MarkdownIt
 
 from ...core.io import write_atomically
-from ..markdown import blocks
+from ..markdown import FIGURE, blocks
 from ..section import Report
 from ..sections import sections
 from ..sections.answer import counts
@@ -30,7 +32,9 @@ from .pictures import pictures
 
 MOST_BYTES = 24_000_000  # of the whole page
 OWN = 200_000  # bytes that the template, the policy and the provenance may take beside scripts, data and pictures
-TOP = ("answer", "limits")  # the sections of report.md that the page begins with
+TOP, BOTTOM = "answer", "limits"  # sections of report.md that stand first and last
+# Figures of the report that the page has: those of numbers but the paired differences, which it draws itself.
+CHARTS = ("quality-[!p]*", "error-budget*", "sweep-*", "training-*", "stages-*")
 VENDORED = ("d3.min.js", "plot.umd.min.js")
 SCRIPTS = (
     "dom.js",
@@ -38,7 +42,6 @@ SCRIPTS = (
     "table.js",
     "copy.js",
     "plots.js",
-    "charts.js",
     "pixels.js",
     "flip.js",
     "viewer.js",
@@ -59,8 +62,8 @@ def write_page(report: Report) -> Path:
 def page(report: Report) -> str:
     """The text of the page, at most ``MOST_BYTES`` of UTF-8 where the numbers alone do not take more."""
     style, scripts, data = _asset("page.css"), list(_scripts()), page_data(report)
-    stages = list(_stages(report))
-    taken = [style, *scripts, json_text(data), *stages]
+    charts = "".join(_charts(report))
+    taken = [style, *scripts, json_text(data), charts]
     held, shown = pictures(report, MOST_BYTES - OWN - sum(len(text.encode()) for text in taken))
     data |= {"pictures": shown}
     encoded = [base64.b64encode(content).decode() for content in held.contents]
@@ -69,8 +72,9 @@ def page(report: Report) -> str:
         policy=policy(scripts, style),
         style=style,
         counts=escape(counts(report.results)),
-        top=top(report),
-        stages="".join(stages),
+        top=section_html(report, TOP),
+        limits=section_html(report, BOTTOM),
+        charts=charts,
         provenance=_provenance(report),
         data=json_text(data),
         scripts="\n".join(f"<script>{script}</script>" for script in scripts),
@@ -94,12 +98,12 @@ def policy(scripts: list[str], style: str) -> str:
     )
 
 
-def top(report: Report) -> str:
-    """The first sections of report.md as HTML; links and pictures, which would be loaded, stay text.
+def section_html(report: Report, name: str) -> str:
+    """A section of report.md as HTML; links and pictures, which would be loaded, stay text.
 
     Columns of numbers get a class, since the policy takes no style of an element.
     """
-    chosen = [section for section in sections() if section.name in TOP and section.applies(report)]
+    chosen = [section for section in sections() if section.name == name and section.applies(report)]
     text = blocks(block for section in chosen for block in section.render(report, []))
     reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["link", "image", "autolink"])
     tokens = reader.parse(str(text))
@@ -122,17 +126,22 @@ def _scripts() -> Iterator[str]:
     yield from (f'"use strict";\n{_asset(name)}' for name in SCRIPTS)
 
 
-def _stages(report: Report) -> Iterator[str]:
-    """The stage sheets of the benches, where the report has them."""
-    for name in dict.fromkeys(report.results.frame["display"]):
-        path = report.figures / f"stages-{name}.png"
-        if path.is_file():
-            caption = escape(f"Stages of the simulated bench {name}")
+def _charts(report: Report) -> Iterator[str]:
+    """The charts of the report with their captions, as far as they are there."""
+    paths = [path for name in ("report.md", "details.md") if (path := report.output / name).is_file()]
+    for name, caption in FIGURE.findall("\n".join(path.read_text(encoding="utf-8") for path in paths)):
+        path = report.figures / name
+        if any(fnmatch(name, f"{pattern}.*") for pattern in CHARTS) and path.is_file():
+            text = escape(_plain(caption))
             encoded = base64.b64encode(path.read_bytes()).decode()
-            yield (
-                f'<details><summary>{caption}</summary><img alt="{caption}" '
-                f'src="data:image/png;base64,{encoded}"></details>'
-            )
+            kind = "jpeg" if path.suffix == ".jpg" else "png"
+            yield f'<figure><img alt="{text}" src="data:image/{kind};base64,{encoded}">'
+            yield f"<figcaption>{text}</figcaption></figure>"
+
+
+def _plain(markdown: str) -> str:
+    """What Markdown of one line shows."""
+    return re.sub(r"\\(?=[\\`*|~$_\]])|`", "", markdown)
 
 
 def _provenance(report: Report) -> str:

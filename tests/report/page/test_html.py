@@ -15,7 +15,7 @@ import pytest
 from holobench_eval.report import Description, Results, read_records
 from holobench_eval.report.markdown import table
 from holobench_eval.report.page import html
-from holobench_eval.report.page.html import MOST_BYTES, TOP, json_text
+from holobench_eval.report.page.html import BOTTOM, MOST_BYTES, TOP, json_text
 from holobench_eval.report.section import Report, Section
 from holobench_eval.report.sections import sections
 
@@ -104,7 +104,7 @@ def test_vendored_files_are_those_that_the_readme_lists() -> None:
 
 
 def test_the_page_begins_with_sections_that_exist(written: Written) -> None:
-    assert {section.name for section in sections()} >= set(TOP)
+    assert {section.name for section in sections()} >= {TOP, BOTTOM}
     assert "<h2>Answer</h2>" in written.text
 
 
@@ -120,9 +120,9 @@ def test_tables_at_the_top_have_no_style_of_their_own(written: Written, monkeypa
         {},
         Description(),
     )
-    section = Section(TOP[0], 1, lambda report, figures: [table(["method", "dB"], [["<b>|", "1.0"]])])
+    section = Section(TOP, 1, lambda report, figures: [table(["method", "dB"], [["<b>|", "1.0"]])])
     monkeypatch.setattr(html, "sections", lambda: [section])
-    text = html.top(report)
+    text = html.section_html(report, TOP)
     assert '<td class="number">1.0</td>' in text
     assert "&lt;b&gt;|" in text
     assert "style" not in text

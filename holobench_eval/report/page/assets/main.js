@@ -75,5 +75,4 @@ function onKey(event) {
 setUpTable();
 setUpCopies();
 setUpPaired();
-setUpCharts();
 document.addEventListener("DOMContentLoaded", setUpViewer);

@@ -81,7 +81,7 @@ function shownRows() {
   const words = state.filter.toLowerCase().split(/\s+/).filter(Boolean);
   const rows = (data.rows[state.display] ?? []).filter((row) => {
     const method = data.methods[row.method];
-    const text = `${row.marked} ${method.registered} ${method.track}`.toLowerCase();
+    const text = `${row.marked} ${method.registered} ${method.group}`.toLowerCase();
     return words.every((word) => text.includes(word));
   });
   if (!state.sort) return rows;

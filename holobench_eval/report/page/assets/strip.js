@@ -26,7 +26,10 @@ function drawStrip() {
       [canvas.width, canvas.height] = [pixels.width, pixels.height];
       canvas.getContext("2d").putImageData(seen(pixels), 0, 0);
     });
-    const compare = () => update({ right: option });
+    const compare = () => {
+      update({ right: option });
+      byId("viewer").scrollIntoView();
+    };
     return element("li", {}, element("button", { type: "button", "data-option": option, click: compare }, canvas, element("span", {}, text), element("span", { class: "interval" }, score)));
   }));
   pressStrip();

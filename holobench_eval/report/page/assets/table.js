@@ -24,7 +24,7 @@ function drawTable() {
   byId("rows").replaceChildren(
     element("caption", { class: "hidden" }, `Methods on ${state.display}`),
     element("thead", {}, element("tr", {}, heading("method", "method"), ...columns().map((c) => heading(c.key, c.heading)))),
-    element("tbody", {}, ...rows.flatMap(bodyRows))
+    element("tbody", {}, ...rows.flatMap((row, index) => [...groupRow(rows, index), ...bodyRows(row)]))
   );
   if (focused) byId("rows").querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
 }
@@ -45,6 +45,13 @@ function heading(key, text) {
     { scope: "col", "aria-sort": sorted ? (falling ? "descending" : "ascending") : "none" },
     element("button", { type: "button", "data-key": `sort ${key}`, click: turn }, text, element("span", { class: "arrow", "aria-hidden": "true" }, sorted ? (falling ? "▼" : "▲") : "↕"))
   );
+}
+
+/** The name of a group above its first row, where rows stand in the order of the board. */
+function groupRow(rows, index) {
+  const group = data.methods[rows[index].method].group;
+  if (state.sort || (index && data.methods[rows[index - 1].method].group === group)) return [];
+  return [element("tr", { class: "group" }, element("th", { scope: "rowgroup", colspan: String(columns().length + 1) }, group))];
 }
 
 function bodyRows(row) {
