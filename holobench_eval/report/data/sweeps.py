@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from ...display.simulated.changes import KINDS, Kind
 from .layout import Swept
@@ -77,41 +74,12 @@ class Sweep:
         known = [(value, losses[condition]) for value, condition in self.swept.points if condition in losses]
         return max(known, key=lambda point: point[1].mean, default=None)
 
-    @property
-    def sides(self) -> list[int]:
-        """-1 and 1 where there are points below and above the nominal value; none for names and for factors."""
-        return [side for side, way in self._ways.items() if len(way) > 1 and self.kind.per]
-
-    def slope(self, label: str, side: int) -> Estimate | None:
-        """Loss for ``kind.per`` of the change to one side: the least-squares line through zero, target by target."""
-        (nominal, _), *points = self._ways[side]
-        if not points or any(self.loss(label, name) is None for _, name in points):
-            return None
-        reach = np.array([abs(value - nominal) for value, _ in points])
-        lost = np.stack([self._lost(label, name) for _, name in points])
-        return self.results.estimate(self.kind.per * (reach @ lost) / float(reach @ reach))
-
     def gain(self, label: str, condition: str) -> Estimate | None:
         """Headline score above the baseline under the same change, positive where it is better."""
         gained = self.results.gain(label, condition)
         if gained is None or self.results.headline.higher_is_better:
             return gained
         return replace(gained, mean=-gained.mean, low=-gained.high, high=-gained.low)
-
-    def break_even(self, label: str) -> list[float] | None:
-        """Where a method that is above the baseline without a change falls to it, on either side of the nominal value,
-        by straight lines between the points; empty where it never does. None where a difference is not known."""
-        gains = {name: gained.mean for _, name in self.points if (gained := self.gain(label, name))}
-        if self.kind.nominal is None or len(gains) < len(self.points):
-            return None
-        crossings = []
-        for way in self._ways.values():
-            for (near, before), (far, after) in itertools.pairwise(way):
-                above, below = gains[before], gains[after]
-                if above > 0 >= below:
-                    crossings.append(near + (far - near) * above / (above - below))
-                    break
-        return crossings
 
     def small_range(self, label: str) -> str | None:
         """The values around the nominal one up to which the mean changes by at most ``SMALL``, with their unit:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from ...study.plan import is_reference
 from ..data.categories import FLOOR
-from ..data.layout import Layout, TrainingSet
+from ..data.layout import TrainingSet
 from ..data.results import Results
-from ..data.text import FILES, plain, words
-from ..data.trainings import DISPLAY, Training
+from ..data.text import FILES, plain
 from ..markdown import Markdown, blocks, bullets, code, heading, properties, table
 from ..section import Blocks, Figures, Report, Section
 from .alignment import agreement
@@ -36,7 +34,6 @@ def _described(report: Report, _: Figures) -> Blocks:
         yield bullets(display.lines)
     yield heading("Methods", 3)
     yield _methods(report)
-    yield training_paragraph(layout, report.trainings)
 
 
 def _details_of(report: Report) -> Markdown:
@@ -140,39 +137,6 @@ def _methods(report: Report) -> Markdown:
 def _limit(cell: Mapping[str, Any]) -> str:
     """The most captures that the display allows for a target, where the study limits them."""
     return f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
-
-
-def training_paragraph(layout: Layout, trainings: Sequence[Training]) -> str:
-    """Who is trained, on what, and that no training image is scored; empty for a study in which nothing is trained."""
-    given = layout.training
-    if given is None or not trainings:
-        return ""
-    methods = [label for label in layout.methods if label in layout.trained]
-    trained = [*methods, *([DISPLAY] if layout.learned_display is not None else [])]
-    who = words(trained)
-    limit = (
-        "" if given.captures is None else f", and none may take more than {given.captures} captures for its training"
-    )
-    return (
-        f"{who[:1].upper() + who[1:] if who.startswith('the ') else who} {'are' if len(trained) > 1 else 'is'} trained "
-        f"on captures of a display before any target is seen. The {given.images} training images come from the dataset "
-        f"{given.dataset}; {given.held_out} of them only monitor the training. All methods of the study "
-        f"receive the same images{limit}. Training images are never scored: a study in which one is a target is "
-        f"refused. {_captures_taken(trainings)}"
-    )
-
-
-def _captures_taken(trainings: Sequence[Training]) -> str:
-    counts = sorted(value for training in trainings if math.isfinite(value := training.number("captures")))
-    if not counts:
-        return "No training has been finished."
-    if counts[0] == counts[-1]:
-        each = "The training" if len(counts) == 1 else f"Each of the {len(counts)} trainings"
-        return f"{each} took {counts[0]:.0f} captures, those of held-out images included."
-    return (
-        f"The {len(counts)} trainings took {counts[0]:.0f} to {counts[-1]:.0f} captures, those of held-out images "
-        "included."
-    )
 
 
 SECTIONS = (

@@ -1,4 +1,4 @@
-"""What changes of the displays cost: curves, pictures, and tables of scores and losses."""
+"""What changes of the displays cost: curves and pictures."""
 
 from __future__ import annotations
 
@@ -12,32 +12,11 @@ from ..charts.rows import Row, draw_rows
 from ..charts.sweeps import Curve, Panel, draw_sweep
 from ..data.categories import OFFLINE, ONLINE
 from ..data.phrases import CONSTANT
-from ..data.results import Results
-from ..data.statistics import Estimate
 from ..data.sweeps import Sweep
-from ..data.text import words
-from ..markdown import Markdown, heading, table
-from ..section import Blocks, Figures, Report, Section
+from ..section import Report, Section
 
 MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
 MOST_ROWS = 4
-
-
-def _render(report: Report, _: Figures) -> Blocks:
-    yield heading("Changes of the displays")
-    yield (
-        "Methods are prepared on the display before the change, and their holograms are shown on it after the change. "
-        "A method that captures the scored image solves under the change. A loss is the paired difference to the score "
-        "before the change, positive where the picture got worse. Slopes are least-squares lines through zero, one on "
-        "each side of the unchanged display."
-    )
-    for sweep in report.sweeps:
-        if sweep.methods:
-            words = sweep.kind.words
-            yield heading(f"{words[0].upper()}{words[1:]}: {sweep.swept.before}", 3)
-            yield _introduction(sweep)
-            yield scores(sweep)
-            yield losses(sweep)
 
 
 def value_text(value: float | str) -> str:
@@ -45,77 +24,9 @@ def value_text(value: float | str) -> str:
     return f"{value:g}" if isinstance(value, float) else value
 
 
-def _introduction(sweep: Sweep) -> str:
-    """The stages that change, and what is assumed."""
-    stages = words([stage.replace("_", " ") for stage in sweep.kind.stages])
-    seen = "The camera is registered anew." if sweep.kind.moves else "The registration from before the change is kept."
-    return f"Changes: {stages}. Model: {sweep.kind.model}. {seen}"
-
-
-def scores(sweep: Sweep) -> Markdown:
-    """Mean of the headline metric at every value."""
-    score = sweep.results.headline
-    rows = [
-        [_marked(sweep.results, label), *(score.number(sweep.mean(label, name).mean) for _, name in sweep.points)]
-        for label in sweep.methods
-    ]
-    return table(["method", *(_with_unit(sweep, value) for value, _ in sweep.points)], rows)
-
-
 def _with_unit(sweep: Sweep, value: float | str) -> str:
     unit = f" {sweep.kind.unit}" if sweep.kind.unit and value != "before" else ""
     return f"{value_text(value)}{unit}"
-
-
-def _marked(results: Results, name: str) -> str:
-    """A label, marked for the oracle and for methods that see the changed display while they solve."""
-    return f"{name} (online)" if results.layout.category(name) == ONLINE else results.layout.marked(name)
-
-
-def losses(sweep: Sweep) -> Markdown | None:
-    """What the worst change cost each method, the slope, and what is left above the baseline."""
-    score, kind, baseline = sweep.results.headline, sweep.kind, sweep.results.layout.baseline
-    sides = {-1: " below", 1: " above"} if len(sweep.sides) > 1 else {-1: "", 1: ""}
-    per = [f"loss per {kind.per:g} {kind.unit}{sides[side]}{score.brackets}" for side in sweep.sides]
-    columns = ["method", "worst at", f"loss there{score.brackets}", *per]
-    columns += [f"above {baseline} there{score.brackets}", *([f"falls to {baseline} at"] if kind.numeric else [])]
-    rows = []
-    for label in sweep.methods:
-        worst, slopes = sweep.worst(label), [sweep.slope(label, side) for side in sweep.sides]
-        if worst is None:
-            continue
-        value, loss = worst
-        condition = dict(sweep.swept.points)[value]
-        gained = sweep.gain(label, condition) if label != baseline else None
-        row = [
-            _marked(sweep.results, label),
-            f"{value_text(value)} {kind.unit}".strip(),
-            score.estimate(loss, signed=True),
-        ]
-        row += [_slope(slope) for slope in slopes]
-        row += [score.estimate(gained, signed=True) if gained else "–"]
-        row += [_break_even(sweep, label)] if kind.numeric else []
-        rows.append(row)
-    return table(columns, rows) if rows else None
-
-
-def _slope(slope: Estimate | None) -> str:
-    if slope is None:
-        return "–"
-    ends = "" if np.isnan(slope.low) else f" [{slope.low:+.3g}, {slope.high:+.3g}]"
-    return f"{slope.mean:+.3g}{ends}"
-
-
-def _break_even(sweep: Sweep, label: str) -> str:
-    """Where an advantage ends; in words where there is none or it does not end."""
-    if label == sweep.results.layout.baseline:
-        return "–"
-    before, ends = sweep.gain(label, sweep.swept.before), sweep.break_even(label)
-    if before is None or ends is None:
-        return "–"
-    if before.mean <= 0:
-        return "not above it before"
-    return words([f"{value:.3g} {sweep.kind.unit}".strip() for value in ends]) if ends else "nowhere in this range"
 
 
 def _by_kind(report: Report) -> list[list[Sweep]]:
@@ -226,5 +137,4 @@ SECTIONS = (
         applies=_any,
         figures=lambda report: report.pictures("sweep-*.jpg", lambda: _pictures(report)),
     ),
-    Section("sweeps", 50, _render, applies=_any, details=True),
 )

@@ -54,11 +54,6 @@ class Source:
     changed: int
 
     @property
-    def harness(self) -> str:
-        """The version of everything between a phase and its score; empty where it is not recorded."""
-        return str(self.known.get("harness", ""))
-
-    @property
     def processor(self) -> str:
         """What the seconds were taken on."""
         return str(self.known.get("gpu") or self.known.get("cpu") or "processor not recorded")

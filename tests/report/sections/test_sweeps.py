@@ -13,9 +13,7 @@ from holobench_eval.report.data.layout import Layout, Swept
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.sweeps import Sweep, sweeps
 from holobench_eval.report.data.tables import records_frame
-from holobench_eval.report.sections import sweeps as section_sweeps
 from tests.support import synthetic_study as synthetic
-from tests.support.reports import whole
 
 TARGETS = ("a", "b", "c", "d")
 DAYS = (30.0, 60.0, 90.0)
@@ -78,25 +76,10 @@ def test_changed_displays_have_no_tables_of_their_own(results: Results) -> None:
     assert results.conditions == ["leto-aged"]
 
 
-def test_losses_are_told_target_by_target_and_by_unit(results: Results) -> None:
+def test_losses_are_told_target_by_target(results: Results) -> None:
     drift = of(results, "drift")
     value, loss = drift.worst("HIL") or pytest.fail("no loss")
     assert (value, loss.mean, loss.low, loss.high) == pytest.approx((90, 9, 9, 9))
-    assert drift.sides == [1]
-    slope = drift.slope("HIL", 1)
-    assert slope is not None
-    assert slope.mean == pytest.approx(3)  # dB in 30 days
-    assert (drift.slope("Wirtinger", 1) or slope).mean == pytest.approx(0)
-    shift = of(results, "camera_shift_x")
-    assert shift.sides == [-1, 1]
-    assert "loss per 1 mm below [dB]" in section_sweeps.losses(shift)
-
-
-def test_an_advantage_ends_between_the_points_on_either_side(results: Results) -> None:
-    assert of(results, "drift").break_even("HIL") == [pytest.approx(40)]
-    assert of(results, "camera_shift_x").break_even("HIL") == []
-    assert "40 days" in section_sweeps.losses(of(results, "drift"))
-    assert "nowhere in this range" in section_sweeps.losses(of(results, "camera_shift_x"))
 
 
 def test_the_range_of_small_losses_reaches_to_the_last_point_within_it(results: Results) -> None:
@@ -114,24 +97,8 @@ def test_what_a_remedy_gets_back_is_told_as_a_share(results: Results) -> None:
     assert of(results, "eye").recovered("Wirtinger", of(results, "known_eye")) == {}  # it lost nothing
 
 
-def test_a_hole_leaves_no_slope_and_no_end_of_an_advantage(results: Results) -> None:
-    frame = results.frame.copy()
-    hole = (frame["label"] == "HIL") & (frame["condition"] == title("drift", 90.0)) & (frame["target"] == "b")
-    frame.loc[hole, "state"] = "failed"
-    frame.loc[hole, "psnr_linear_db"] = np.nan
-    holed = Results(frame, layout())
-    drift = of(holed, "drift")
-    assert drift.slope("HIL", 1) is None
-    assert drift.break_even("HIL") is None
-    assert of(holed, "camera_shift_x").slope("HIL", 1) is not None
-    assert "–" in section_sweeps.scores(drift)
-
-
-def test_a_report_with_sweeps_has_curves_and_tables(tmp_path: Path, results: Results) -> None:
-    path, _ = write_report(layout(), records(), tmp_path, {}, Description())
-    text = whole(path)
-    assert "## Changes of the displays" in text
-    assert "### Drift since calibration: leto-aged" in text
-    assert "loss per 30 days [dB]" in text
+def test_a_report_with_sweeps_has_curves(tmp_path: Path) -> None:
+    text = write_report(layout(), records(), tmp_path, {}, Description())[0].read_text()
     for kind in ("drift", "camera_shift_x", "eye", "known_eye"):
+        assert f"(figures/quality-sweep-{kind}.png)" in text
         assert np.ptp(Image.open(tmp_path / "figures" / f"quality-sweep-{kind}.png").convert("L")) > 200  # is drawn

@@ -221,7 +221,6 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         "| HIL and the display itself | leto-aged | 140 |",
         "none: there is no sensor",
         "none: the network predicts in the frame",
-        "HIL solves through the network that is the display, and so knows the display exactly.",
     ):
         assert phrase in text, phrase
 

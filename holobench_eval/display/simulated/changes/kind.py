@@ -19,9 +19,9 @@ class Kind:
     words: what changes; unit: of the values, empty for a factor or a name; stages: the parameters of ``Profile`` that
     may differ; apply: the profile after a change; model: what is assumed, for reports; nominal: the value that changes
     nothing (None: values are names, or draws, and there is none); low, high: what a number may be; moves: whether the
-    camera's view moves, so that it is registered anew (else it stays as it was before the change); per: the loss is
-    stated for so much (0: not at all); counted: whether values are whole numbers from 1 that name one of many; read:
-    the one form of a name, UserError for one without a meaning; names: what a name may be, in words.
+    camera's view moves, so that it is registered anew (else it stays as it was before the change); counted: whether
+    values are whole numbers from 1 that name one of many; read: the one form of a name, UserError for one without a
+    meaning; names: what a name may be, in words.
     """
 
     words: str
@@ -33,7 +33,6 @@ class Kind:
     low: float = -math.inf
     high: float = math.inf
     moves: bool = False
-    per: float = 1.0
     counted: bool = False
     read: Callable[[str], str] = str
     names: str = "names"

@@ -115,7 +115,7 @@ KINDS: Mapping[str, Kind] = {
         "drift since calibration", "days", ("drift",), number(_drift),
         "seeded walks of laser power, tilt of the beam, stroke of the panel and pose at the profile's daily rates, and "
         "dust that settles at the rate at which the profile's came in a year (assumed)",
-        low=0, high=3650, moves=True, per=30,
+        low=0, high=3650, moves=True,
     ),
     "sensor": Kind(
         "another camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)),
@@ -123,7 +123,7 @@ KINDS: Mapping[str, Kind] = {
     ),
     "distance": Kind(
         "error of the propagation distance", "%", ("propagation",), number(_distance),
-        "added to the profile's error", low=-20, high=20, per=0.1,
+        "added to the profile's error", low=-20, high=20,
     ),
     "wavelength": Kind(
         "drift of the lasers' wavelength", "nm", ("propagation",), number(_wavelength),
@@ -131,21 +131,20 @@ KINDS: Mapping[str, Kind] = {
     ),
     "defocus": Kind(
         "defocus", "waves rms", ("propagation",), number(_defocus),
-        "Zernike defocus at 517 nm over the iris, added to the profile's", low=-10, high=10, per=0.1,
+        "Zernike defocus at 517 nm over the iris, added to the profile's", low=-10, high=10,
     ),
     "laser_power": Kind(
         "laser power", "of the nominal", ("illumination",), number(_power),
         "the exposure stays, so that less light is noisier and more may saturate", nominal=1.0, low=0.01, high=20,
-        per=0,
     ),
     "temperature": Kind(
         "panel temperature above that of calibration", "K", ("lut",), number(_temperature),
         "the stroke follows the birefringence by Haller's law, clearing point 100 C, panel at 35 C (assumed)",
-        low=-30, high=50, per=10,
+        low=-30, high=50,
     ),
     "obstruction": Kind(
         "disc in the middle of the pupil", "of its radius", ("propagation",), number(_obstruction),
-        "opaque, with the soft edge of the iris", low=0, high=0.95, per=0.1,
+        "opaque, with the soft edge of the iris", low=0, high=0.95,
     ),
     "bits": Kind(
         "bit depth of the panel", "bits", ("panel",), number(_bits),
@@ -157,7 +156,7 @@ KINDS: Mapping[str, Kind] = {
     ),
     "ambient": Kind(
         "ambient light", "of a white pixel", ("sensor",), number(_ambient),
-        "even over the sensor, and not in the dark frame", low=0, high=10, per=0.01,
+        "even over the sensor, and not in the dark frame", low=0, high=10,
     ),
     "refocus": Kind(
         "image moved by a lens phase, camera at its new place", "mm", ("lens", "propagation"), number(_refocus),
