@@ -1,0 +1,64 @@
+"""Tables of documentation that are drawn from the boards of committed reports: ``python -m tests.docs.boards``.
+
+Between ``<!-- board: STUDY: DISPLAY, ... -->`` and ``<!-- /board -->`` stands the table; every number of it is that of
+``reports/STUDY/board.json``, rounded once.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+PAGES = ("README.md",)
+BLOCK = re.compile(r"(<!-- board: (\S+): (.*?) -->\n).*?(<!-- /board -->)", re.DOTALL)
+NAMES = {  # of the methods that stand in such a table, in its order
+    "hybrid_model": "a physical model and a network",
+    "hil_plus": "hardware in the loop through a physical model",
+    "gerchberg_saxton, smooth start": "Gerchberg-Saxton from a smooth start",
+    "wirtinger": "Wirtinger holography",
+    "hil": "hardware in the loop, Chakravarthula 2020",
+    "wirtinger_veil": "Wirtinger holography through a veil of two numbers",
+    "double_phase": "double-phase encoding",
+}
+
+
+def drawn(text: str) -> str:
+    """A page with its tables drawn anew."""
+    return BLOCK.sub(lambda found: f"{found[1]}{table(found[2], found[3].split(', '))}\n{found[4]}", text)
+
+
+def table(study: str, displays: list[str]) -> str:
+    """A row a method: photographs, and on each display its mean and difference to the baseline."""
+    board = json.loads((ROOT / "reports" / study / "board.json").read_text(encoding="utf-8"))
+    found = {
+        display["name"]: {row["method"]: row for group in display["groups"] for row in group["rows"]}
+        for display in board["displays"]
+    }
+    heads = [f"`{name}` [{board['headline']['unit']}] | against Wirtinger" for name in displays]
+    lines = ["| method (its name here) | photographs | " + " | ".join(heads) + " |"]
+    lines.append("|---|---:|" + "---:|---:|" * len(displays))
+    for label, name in NAMES.items():
+        rows = [found[display].get(label) for display in displays]
+        spent = next(row["photographs"] for row in rows if row)
+        cells = " | ".join(cell for row in rows for cell in cells_of(row))
+        lines.append(f"| {name} (`{label.partition(',')[0]}`) | {spent:.0f} | {cells} |")
+    return "\n".join(lines)
+
+
+def cells_of(row: dict[str, Any] | None) -> tuple[str, str]:
+    """Mean, and difference with its interval; dashes where the row is not there."""
+    if row is None:
+        return "–", "–"
+    apart = row["difference"]
+    if apart is None:
+        return f"{row['score']['mean']:.1f}", ""
+    told = " (not shown)" if row["verdict"] == "not shown to differ" else ""
+    return f"{row['score']['mean']:.1f}", f"{apart['mean']:+.1f} [{apart['low']:+.1f}, {apart['high']:+.1f}]{told}"
+
+
+if __name__ == "__main__":
+    for page in PAGES:
+        (ROOT / page).write_text(drawn((ROOT / page).read_text(encoding="utf-8")), encoding="utf-8")
