@@ -31,6 +31,7 @@ COMMANDS = {
         "schema",
     ),
     "Finished reports": (
+        "reports.figure",
         "reports.check",
         "reports.compare",
         "reports.site",

@@ -126,9 +126,8 @@ def test_a_study_from_run_to_check(
     assert holoeval(monkeypatch, "report", config) == 0
     assert [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
 
-    assert holoeval(monkeypatch, "report", config, "--print", "printed") == 0
-    assert Path("printed/single/quality-by-target.svg").exists()
-    assert "printed/double/quality-by-target.pdf" in capsys.readouterr().out
+    assert holoeval(monkeypatch, "figure", config, "--for", "column", "--into", "printed") == 0
+    assert not Path("printed").exists()  # no method has a difference to draw
 
     another = config.with_name("another.yaml")
     another.write_text(f"{config.read_text()}\nseed: 99\n")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ...core.errors import UserError
 from ...core.installed import as_typed
@@ -14,16 +13,32 @@ from ..options import Config, Output, output_folder
 from ..output import console, write_report
 
 if TYPE_CHECKING:
+    from ...study.definition import Study
     from ...study.plan import Plan
 
-Print = Annotated[Path | None, typer.Option("--print", help="Draw the charts for print too, into this folder.")]
+
+@dataclass(frozen=True)
+class Loaded:
+    """A study with its records, a record for every planned cell, the folder of its report, and its provenance.
+
+    raw: whether the records are those of a run, with pictures, and not a committed records.csv.
+    """
+
+    study: Study
+    records: list[dict[str, Any]]
+    folder: Path
+    known: dict[str, Any]
+    raw: bool
 
 
-def report(config: Config, output: Output = None, print_to: Print = None) -> None:
+def report(config: Config, output: Output = None) -> None:
     """Write the report of a study again: from its records, or from a committed records.csv."""
-    from ...report.description import describe
-    from ...report.printing import print_figures
-    from ...report.section import Report
+    found = load(config, output)
+    write_report(console(), found.study, found.records, found.folder, found.known, keep_pictures=not found.raw)
+
+
+def load(config: Path, output: Path | None) -> Loaded:
+    """Load what a report is written from. UserError: there are no records, or of another study or code."""
     from ...study import provenance
     from ...study.changes import recorded
     from ...study.config import load_study
@@ -49,10 +64,7 @@ def report(config: Config, output: Output = None, print_to: Print = None) -> Non
             f"holoeval rescore {typed} --output {shlex.quote(str(folder))} makes it from the kept captures"
         )
     known = provenance.read(folder) if missing else provenance.restate(folder, study, grid, as_scored=not raw)
-    results = write_report(console(), study, records, folder, known, keep_pictures=not raw)
-    if print_to is not None:
-        for path in print_figures(Report(results, records, folder, known, describe(study)), print_to):
-            print(path)
+    return Loaded(study, records, folder, known, raw)
 
 
 def _committed(grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:

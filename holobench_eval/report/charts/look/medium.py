@@ -1,4 +1,4 @@
-"""The medium that figures are drawn for: a page on a screen, or one or two columns of print."""
+"""The medium that figures are drawn for: a page on a screen, a slide, or one or two columns of print."""
 
 from __future__ import annotations
 
@@ -44,10 +44,12 @@ class Medium:
 
 
 SCREEN = Medium(900, 9, 8, (".png",))
-# Widths of one and two columns of the ACM's and of most journals [mm]; 7 pt is the smallest font that they accept.
-COLUMNS = {
-    name: Medium(int(width * DPI / MILLIMETRES), 7, 7, (".pdf", ".svg"))
-    for name, width in (("single", 84), ("double", 174))
+# A column and two columns of the ACM's and of most journals are 84 and 174 mm wide; 7 pt is the smallest font that they
+# accept. A slide of 16:9 is 1280 pixels wide, and read from the last row.
+MEDIA = {
+    "talk": Medium(1280, 16, 14, (".png", ".svg")),
+    "column": Medium(int(84 * DPI / MILLIMETRES), 7, 7, (".pdf", ".svg")),
+    "double": Medium(int(174 * DPI / MILLIMETRES), 7, 7, (".pdf", ".svg")),
 }
 
 _current = ContextVar("medium", default=SCREEN)

@@ -1,0 +1,34 @@
+"""``holoeval figure``: the charts of a report for a talk or a paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from ..options import Config, Output
+from .report import load
+
+Medium = Literal["talk", "column", "double"]
+
+
+def figure(
+    config: Config,
+    medium: Annotated[Medium, typer.Option("--for", help="A slide, a column of 84 mm, or two of 174 mm.")],
+    into: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the charts are written.")] = Path("figures"),
+    output: Output = None,
+) -> None:
+    """Draw the charts of a study for a talk or a paper: from its records, or from a committed records.csv."""
+    from ...report import Results, layout_of, records_frame
+    from ...report.build import related
+    from ...report.description import describe
+    from ...report.printing import print_figures
+    from ...report.section import Report
+
+    found = load(config, output)
+    layout = layout_of(found.study)
+    results = Results(records_frame(found.records, layout), layout, related(layout, found.folder.parent))
+    report = Report(results, found.records, found.folder, found.known, describe(found.study))
+    for path in print_figures(report, into, medium):
+        print(path)
