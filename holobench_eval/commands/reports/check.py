@@ -106,12 +106,16 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
         yield f"{differs}: the study or the code has changed; run the study again"
         return
     command = f"run: holoeval report {shlex.quote(as_typed(study.file))} --output {shlex.quote(str(report))}"
-    if text_digest(study.text) != known["config_sha256"]:
+    said_anew = text_digest(study.text) != known["config_sha256"]
+    if said_anew:
         yield f"the text of the config has changed, but no cell; {command} (computes nothing)"
     for name in ("report.md", "details.md"):
         if not (report / name).is_file():
             yield f"{name} is missing; {command}"
-    for name, again in recompute_files(records, layout_of(study)).items():
+    files = recompute_files(records, layout_of(study))
+    if said_anew:
+        del files["board.json"]  # which has the title and the question
+    for name, again in files.items():
         text = (report / name).read_text(encoding="utf-8") if (report / name).is_file() else None
         if text is None:
             yield f"{name} is missing; {command}"

@@ -52,7 +52,7 @@ def test_a_row_may_be_renamed_without_computing_it_again(committed: tuple[Path, 
     config, folder = committed
     config.write_text(config.read_text().replace("- plugins.py:Toy", '- {name: "plugins.py:Toy", label: Anew | <b>}'))
     report(config, folder)
-    assert "| Anew \\| &lt;b> |" in (folder / "report.md").read_text()
+    assert "| Anew \\| &lt;b>" in (folder / "report.md").read_text()
     assert problems_in(folder.parent)[1] == []
 
 
@@ -77,5 +77,5 @@ def test_a_report_written_again_from_committed_files_keeps_the_protocol_that_its
     report(config, folder)
     assert json.loads((folder / "provenance.json").read_text())["scores"] == before
     assert (folder / "records.csv").read_bytes() == records
-    assert "| metric protocol | v1 |" in (folder / "report.md").read_text()
+    assert "| metric protocol | v1 |" in (folder / "details.md").read_text()
     assert problems_in(folder.parent)[1] == []
