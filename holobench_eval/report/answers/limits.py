@@ -15,6 +15,7 @@ from ..section import Report
 from .kind import Kind, subjects
 
 WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
+MOST_NAMED = 4  # displays of one basis
 FIRST = 5  # that stand in report.md; the others are in details.md
 
 
@@ -63,7 +64,7 @@ def _displays(report: Report) -> Iterator[str]:
     for display in report.description.displays:
         same.setdefault(display.basis or display.heading, []).append(display.name)
     for basis, names in same.items():
-        yield f"{words(names)}: {basis.rstrip('.')}."
+        yield f"{words(names) if len(names) <= MOST_NAMED else f'{len(names)} displays'}: {basis.rstrip('.')}."
     if report.layout.measure == FILES:
         yield "Display: real, and known from its photographs alone."
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..data.display_map import display_map, judged
-from ..data.over_displays import Margin, applies, cause, margins, parameters, published, shown_on
+from ..data.over_displays import Margin, applies, cause, margins, parameters, published, shown_on, winners
 from ..data.results import Results
 from ..data.text import words
 from ..markdown import Markdown, table
@@ -59,6 +59,9 @@ def _map(results: Results) -> Iterator[str]:
     """The method that is best on most displays, and whether an error budget of a display tells where another is."""
     found, score = display_map(results), results.headline
     if found is None:
+        best = winners(results)
+        usual = max(best, key=best.count)
+        yield f"{usual} is best on {best.count(usual)} of {len(best)}."
         return
     count = len(found.best)
     yield (

@@ -85,6 +85,14 @@ def margins(results: Results) -> list[Margin]:
     return sorted(found, key=lambda one: -sign * one.over_both.mean)
 
 
+def winners(results: Results) -> list[str]:
+    """The best method, or the baseline, on each display of ``shown_on``."""
+    found, sign = margins(results), results.headline.sign
+    labels = [str(results.layout.baseline), *(each.label for each in found)]
+    values = np.stack([np.zeros(len(shown_on(results))), *(sign * each.values for each in found)])
+    return [labels[index] for index in values.argmax(0)]
+
+
 def published(results: Results, label: str) -> float | None:
     """The margin of two published figures, where a method and the baseline have one."""
     names, metric = (label, str(results.layout.baseline)), results.headline.metric
