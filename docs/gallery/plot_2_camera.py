@@ -63,5 +63,5 @@ table = pd.read_csv(report / "table.csv").query("category != 'floor'")
 columns = ["label", "category", "psnr_linear_db", "captures"]
 print(table[columns].to_string(index=False))
 figure, axis = plt.subplots(figsize=(10, 6), layout="constrained")
-axis.imshow(plt.imread(next(report.glob("figures/comparison-*.jpg"))))
+axis.imshow(plt.imread(report / "figures/answer-pictures.jpg"))
 axis.set_axis_off()

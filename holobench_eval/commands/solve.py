@@ -63,7 +63,7 @@ def solve(
         raise UserError(re.sub(rf"^{re.escape(str(config))}(:\d+)*: ", "", str(error))) from None
     labels = [file_name(label) for label in study.labels]
     for path in (
-        *sorted(folder.glob("figures/comparison-*.jpg")),
+        *sorted(folder.glob("figures/answer-pictures.jpg")),
         *(folder / what / label for what in ("phases", "captures") for label in labels),
     ):
         print(path)

@@ -44,7 +44,7 @@ def test_several_methods_give_phases_captures_scores_and_a_picture(
     solve("double_phase, mine.py:flat", picture, display="ideal", panel=(128, 128))
     folder = Path("holoeval-results", "my picture")
     printed = capsys.readouterr().out
-    for path in ("figures/comparison-ideal-1.jpg", "phases/double_phase", "captures/flat"):
+    for path in ("figures/answer-pictures.jpg", "phases/double_phase", "captures/flat"):
         assert str(folder / path) in printed.replace("\n", "")
         assert (folder / path).exists()
     table = pd.read_csv(folder / "table.csv")

@@ -15,13 +15,13 @@ from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..data import over_displays
 from ..data.board import board
-from ..data.categories import OFFLINE, ONLINE
 from ..data.display_map import display_map
 from ..data.results import Results
 from ..section import Blocks, Figures, Report, Section
 
 PICTURES = "answer-pictures.jpg"
 MOST_METHODS = 5  # in the map
+MOST_TILES = 6  # in the row of pictures, beside the target
 
 
 def _table(report: Report, _: Figures) -> Blocks:
@@ -80,7 +80,7 @@ def _stages(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
-    """A target, and its captures by the best method, those of the question, the baseline and the oracle."""
+    """A target, and its captures by the methods that are ``chosen``."""
     results, thumbnails = report.results, report.thumbnails
     condition = next((name for name in results.conditions if results.has_pictures(name)), None)
     if condition is None or not thumbnails.targets(condition):
@@ -99,15 +99,14 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def chosen(results: Results, condition: str) -> list[str]:
-    """The best method of each track, those of the question, the baseline and the oracle, as far as they have rows.
-
-    Where these are one method, the next in the ranking is another.
-    """
-    firsts = [results.ranking(condition, categories=track)[:1] for track in (OFFLINE, (ONLINE,))]
-    wanted = [*(label for ranking in firsts for label in ranking), *subjects(results)]
-    wanted += [label for label in (results.layout.baseline, results.oracle(condition)) if label]
-    found = [label for label in dict.fromkeys(wanted) if label in results.methods(condition)]
-    return found if len(found) > 1 else list(dict.fromkeys([*found, *results.ranking(condition)]))[:2]
+    """All methods where they are few; else the best of each group, those of the question, and the baseline."""
+    display = next(each for each in board(results).displays if each.name == condition)
+    everybody = [row.label for row in display.rows]
+    if len(everybody) <= MOST_TILES:
+        return everybody
+    firsts = [rows[0].label for _, rows in display.groups]
+    wanted = dict.fromkeys([*firsts, *subjects(results), str(results.layout.baseline)])
+    return [label for label in everybody if label in wanted]
 
 
 def _has_scores(report: Report) -> bool:

@@ -28,7 +28,7 @@ LONGEST_THUMBNAIL = 1024  # pixels
 MOST_THUMBNAILS = 400  # of a folder
 ROOM = 1_200_000  # bytes of the figures of a study; the others stay in its folder
 # Which figures are taken first: what answers, then what is looked at, then charts.
-ORDER = ("answer-*", "comparison-*-1.*", "error-budget*", "quality-paired-*", "quality-*", "rank*", "comparison-*", "*")
+ORDER = ("answer-*", "error-budget*", "quality-paired-*", "quality-*", "*")
 STAGES = "stages-"
 
 _MARKDOWN = re.compile(r"\\(?=[\\`*|~$_\]])|`")

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from types import SimpleNamespace
-from typing import Any
-
 import pytest
 
 from holobench_eval.report import Description, write_report
-from holobench_eval.report.data.categories import OFFLINE
 from holobench_eval.report.description import Display
 from holobench_eval.report.sections import overview
+from tests.report.answers.test_answers import results_of
 from tests.support import synthetic_study as synthetic
 
 TARGETS = synthetic.TARGETS[1:4]
@@ -79,15 +75,9 @@ def test_the_limits_name_sample_holes_inverse_crime_display_and_tuning(page: str
     assert "GS for" not in page
 
 
-def test_where_the_baseline_is_best_the_next_method_is_shown_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def ranking(_: str, categories: Sequence[str] = OFFLINE) -> list[str]:
-        return ["wirtinger", "mine", "another"] if categories == OFFLINE else []
-
-    monkeypatch.setattr(overview, "subjects", lambda _: [])
-    results: Any = SimpleNamespace(
-        layout=SimpleNamespace(baseline="wirtinger"),
-        ranking=ranking,
-        methods=lambda _: ranking(""),
-        oracle=lambda _: "",
-    )
-    assert overview.chosen(results, "ideal") == ["wirtinger", "mine"]
+def test_of_many_methods_the_best_of_each_group_the_question_and_the_baseline_are_shown() -> None:
+    means = {f"m{number}": 20.0 - number for number in range(8)} | {"old": 5.0, "trained": 1.0}
+    found = results_of(means, question="Is m6 better?", trained=frozenset({"trained"}))
+    assert overview.chosen(found, "bench") == ["trained", "m0", "m6", "old"]
+    few = results_of({"old": 17.0, "new": 16.0})
+    assert overview.chosen(few, "bench") == ["old", "new"]
