@@ -78,10 +78,12 @@ def test_photographs_through_files_score_as_the_direct_run_does(exported, averag
         assert ours.loc[row, "psnr_linear_db"] == pytest.approx(direct.loc[row, "psnr_linear_db"], abs=0.1)
         assert ours.loc[row, "ssim_linear"] == pytest.approx(direct.loc[row, "ssim_linear"], abs=0.01)
     run("site", folder / "bench" / "report", folder / "direct", "--output", folder / "site", "--own", folder)
-    index = (folder / "site" / "index.html").read_text()
-    names = re.findall(r"<strong><a [^>]*>([^<]*)</a></strong> [(]group", index)
-    assert re.fullmatch(r"leto-mild photographed [(]\w{8}[)], real", names[0])
-    assert names[1:] == ["leto-mild"]
+    titles = {
+        name: re.findall(r"<h2>(leto-mild.*)</h2>", (folder / "site" / "studies" / f"{name}.html").read_text())
+        for name in ("report", "direct")
+    }
+    assert re.fullmatch(r"leto-mild [(]real, \w{8}[)]", titles["report"][0])
+    assert titles["direct"] == ["leto-mild"]
 
 
 def wrong(folder: Path, *more: object) -> str:

@@ -74,11 +74,12 @@ def shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
     profile, digest = _profile(source, display.name), _digest(source, display.name)
     panel = source.panels.get(display.name, "")
     count, clusters = len(results.targets), len(set(results.clusters))
-    place = _places(display)
+    place, kind = _places(display), _kind(source, display.name)
+    other = ", ".join(filter(None, (kind if kind != "simulated" else "", digest[:8] or source.by or source.name)))
     return {
         "name": display.name,
         # another display or version than that of the package has the beginning of its digest, or its lab
-        "title": display.name if profile else f"{display.name} ({digest[:8] or source.by or source.name})",
+        "title": display.name if profile else f"{display.name} ({other})",
         "about": profile.description
         if profile
         else "Another display, or another version of one, than in this package.",
@@ -109,9 +110,14 @@ def _digest(source: Source, name: str) -> str:
     return str(known.get("sha256", "")) if isinstance(known, Mapping) else ""
 
 
+def _kind(source: Source, name: str) -> str:
+    """Simulated, real or learned, as its folder says."""
+    return str(dict(source.known.get("displays") or {}).get(name, "simulated"))
+
+
 def _profile(source: Source, name: str) -> Profile | None:
-    """That of the package, where the digest is the same."""
-    if name not in {*names(), *names(family=True)}:
+    """That of the package, where a simulated display has its digest."""
+    if _kind(source, name) != "simulated" or name not in {*names(), *names(family=True)}:
         return None
     profile = load_profile(name)
     return profile if profile.digest == _digest(source, name) else None
