@@ -9,13 +9,14 @@ from ..answers import budget, kind_of
 from ..charts.cost import draw_costs
 from ..charts.look.methods import looks
 from ..data.board import board
+from ..data.over_displays import is_many
 from ..data.results import Results
 from ..section import Report, Section
 
 
 def _spends(results: Results) -> bool:
     known = results.layout.spends_captures and not results.layout.predicts and "total_captures" in results.table
-    return known and bool((results.table["total_captures"] > 0).any())
+    return known and not is_many(results) and bool((results.table["total_captures"] > 0).any())
 
 
 def _is_budget(report: Report) -> bool:
