@@ -40,6 +40,9 @@ BEYOND = (
     ("repeats: 2", "protocol: {lpips_weights: no.pth}"),
     ("headline: ssim_srgb", "headline: ms_ssim_linear"),
     ("repeats: 2", "protocol: {metrics: [psnr]}"),
+    ("repeats: 2", "related: [absent]"),
+    ("repeats: 2", "related: [study]"),
+    ("repeats: 2", "measure: prediction\nrelated: [study]"),
 )
 
 

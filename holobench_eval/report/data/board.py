@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
-from .columns import costs
 from .phrases import CONSTANT, marks, tested, verdict
 from .results import Results
 from .scores import Score
@@ -140,7 +140,6 @@ def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Sco
     floor = _floor(results, condition)
     values = np.array([results.values(label, condition) for label in complete])
     letters = dict(zip(complete, tiers(values, results.clusters), strict=True))
-    known = costs(results.table, "")
     for label in [*complete, *(label for label in labels if label not in complete)]:
         row = results.row(label, condition)
         yield Row(
@@ -150,8 +149,8 @@ def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Sco
             int(row["n"]),
             tested(results, label, condition),
             tuple(float(row[score.column]) for score in beside),
-            float(row["total_captures"]) if "total_captures" in results.table else None,
-            float(row["solving_s"]) if "solving_s" in known else None,
+            _known(row, "total_captures"),
+            _known(row, "solving_s"),
             (
                 *marks(results, label, condition),
                 *(["no better than gray"] * _is_gray(results, label, condition, floor)),
@@ -168,6 +167,12 @@ def _floor(results: Results, condition: str) -> float | None:
 def _is_gray(results: Results, label: str, condition: str, floor: float | None) -> bool:
     mean = _mean(results, label, condition)
     return floor is not None and math.isfinite(mean) and not results.headline.better(mean, floor)
+
+
+def _known(row: pd.Series, key: str) -> float | None:
+    """A figure of a row of the table; None where it has none."""
+    value = float(row.get(key, math.nan))
+    return None if math.isnan(value) else value
 
 
 def _mean(results: Results, label: str, condition: str) -> float:
