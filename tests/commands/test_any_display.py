@@ -62,6 +62,8 @@ def arguments(words: tuple[str, ...], function: Any, folder: Path, panel: list[i
         if name in options:
             where = {"show": ["sheet.png"], "solve": ["solved"]}.get(words[-1], options[name])
             values += [f"--{name}", *(where if name == "output" else options[name])]
+        elif name == "medium":
+            values += ["--for", "column"]
         elif parameter.default is inspect.Parameter.empty or (name == "name" and words[-1] == "list"):
             values.append(given[name])
     return values

@@ -108,14 +108,7 @@ def test_every_round_is_listed_with_its_figures_on_held_out_images(found, tmp_pa
     assert "| U-Net | 2 | 24 | 200 | 21.25 | 15.50 | 18.12 |" in text
     assert "(figures/training-1.png)" in text
     assert (tmp_path / "figures" / "training-1.png").is_file()
-    for phrase in (
-        "HIL and U-Net are trained on captures of a display before any target is seen.",
-        "The 24 training images come from the dataset dead_leaves (count = 24, seed = 0); 4 of them",
-        "none may take more than 200 captures",
-        "Training images are never scored",
-        "Each of the 2 trainings took 140 captures",
-    ):
-        assert phrase in text, phrase
+    assert "24 of dead_leaves (count = 24, seed = 0), of which 4 only watch the training; at most 200 captures" in text
 
 
 def test_a_training_that_is_not_beside_the_report_or_not_the_right_one_is_said(found, tmp_path):
