@@ -70,8 +70,7 @@ class Display:
 
 @dataclass(frozen=True)
 class Board:
-    """The displays of a study; beside: the scores beside the headline; what: the headline and what it is compared with
-    stand in ``results``."""
+    """The displays of a study. results: of the study, with the headline; beside: the scores shown beside it."""
 
     results: Results
     beside: tuple[Score, ...]

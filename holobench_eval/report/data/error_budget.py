@@ -44,12 +44,11 @@ class Part:
 @dataclass(frozen=True)
 class Budget:
     """The error of the captures of a display. psnr: of the captures against their targets [dB], before the protocol's
-    clip; ideal_psnr: the same of the ideal images; explained: by the links of the chain after the first, that of the
-    ideal image first. All are means over targets."""
+    clip; explained: by the links of the chain after the first, that of the ideal image first. All are means over
+    targets."""
 
     condition: str
     psnr: Estimate
-    ideal_psnr: Estimate
     explained: tuple[Part, ...]
     rest: Part
     noise: Part
@@ -74,8 +73,8 @@ def budgets(results: Results) -> list[Budget]:
 def _budget(results: Results, condition: str) -> Budget:
     """The budget of a display, see the module."""
     methods, interval = results.methods(condition), results.estimate
-    keys = scores.TARGET, scores.IDEAL, scores.NOISE, scores.ALGORITHM
-    target, ideal, noise, algorithm = (results.values(methods[0], condition, key) for key in keys)
+    keys = scores.TARGET, scores.IDEAL, scores.NOISE
+    target, ideal, noise = (results.values(methods[0], condition, key) for key in keys)
     total, noisy = np.maximum(target, scores.SMALLEST), noise > scores.SMALLEST
     predicted = (results.values(label, condition, scores.PREDICTION) for label in methods)
     alone = np.stack([target, ideal, *predicted]) / total
@@ -83,7 +82,6 @@ def _budget(results: Results, condition: str) -> Budget:
     return Budget(
         condition=condition,
         psnr=interval(-decibel(total)),
-        ideal_psnr=interval(-decibel(algorithm)),
         explained=tuple(
             Part(label, interval(links[k - 1] - links[k]), interval(-decibel(links[k])), interval(alone[k]))
             for k, label in enumerate([IDEAL_IMAGE, *methods], start=1)
