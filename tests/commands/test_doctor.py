@@ -12,6 +12,7 @@ import typer
 from holobench_eval.commands import doctor as module
 from holobench_eval.commands.doctor import Finding, _ask, doctor, examine
 from holobench_eval.core.installed import installed, installing, pinned
+from tests.support.patience import PATIENCE
 
 DEVICES = [
     {"kind": "slm", "driver": "monitor", "version": "2.1", "devices": ["HDMI-2, 1920x1080"], "why": ""},
@@ -45,7 +46,7 @@ def named(findings, what):
 
 def test_this_installation_has_all_that_the_core_needs():
     code = "from holobench_eval.commands import main; main()"
-    done = subprocess.run([sys.executable, "-c", code, "doctor"], capture_output=True, text=True, timeout=400)
+    done = subprocess.run([sys.executable, "-c", code, "doctor"], capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "the core is complete" in done.stdout
     assert "cameras: gphoto2" in done.stdout
@@ -146,10 +147,10 @@ def test_a_check_that_fails_is_a_finding(quick):
 
 def test_what_hangs_is_cut_off_and_what_crashes_is_told():
     started = time.monotonic()
-    assert _ask("import time; time.sleep(60)", 1.0) == "takes longer than 1 s"
-    assert time.monotonic() - started < 20
-    assert str(_ask("import os; os.abort()", 20.0)).startswith("ends with -6")
-    assert _ask("raise SystemExit('no bus')", 20.0) == "ends with 1: no bus"
+    assert _ask("import time; time.sleep(10_000)", 1.0) == "takes longer than 1 s"
+    assert time.monotonic() - started < PATIENCE
+    assert str(_ask("import os; os.abort()", PATIENCE)).startswith("ends with -6")
+    assert _ask("raise SystemExit('no bus')", PATIENCE) == "ends with 1: no bus"
     assert _ask(f"print('chatter'); print({json.dumps([1, 2])!r})", 20.0) == [1, 2]
 
 

@@ -8,6 +8,7 @@ import torch
 from holobench_eval.optics import blocks, transfer
 from holobench_eval.optics.angular_spectrum import AngularSpectrum
 from holobench_eval.optics.blocks import in_blocks
+from tests.support.patience import PATIENCE
 
 
 @pytest.fixture(autouse=True)
@@ -79,8 +80,8 @@ def test_a_forked_process_has_threads_of_its_own():
     answer = context.Queue()
     child = context.Process(target=_work_in_the_child, args=(answer,))
     child.start()
-    child.join(20)
+    child.join(PATIENCE)
     hung = child.is_alive()
     child.kill()
     assert not hung
-    assert answer.get(timeout=5) == 100
+    assert answer.get(timeout=PATIENCE) == 100

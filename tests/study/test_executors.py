@@ -19,6 +19,7 @@ from holobench_eval.study.executors import Executor, Local, Serial, executor
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
+from tests.support.patience import PATIENCE
 
 
 def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:
@@ -95,7 +96,7 @@ def surroundings(_: int) -> tuple[str, str, str]:
 
 def endless(folder: Path) -> None:
     (folder / str(os.getpid())).touch()
-    time.sleep(600)
+    time.sleep(1000)
 
 
 @pytest.mark.slow
@@ -129,8 +130,8 @@ def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> N
         assert run.poll() is None
         time.sleep(0.05)
     run.send_signal(ending)
-    run.wait(timeout=120)  # far more than it takes, for a busy machine
-    deadline = time.monotonic() + 120
+    run.wait(timeout=PATIENCE)
+    deadline = time.monotonic() + PATIENCE
     for worker in tmp_path.iterdir():
         while Path("/proc", worker.name).exists():
             assert time.monotonic() < deadline
@@ -145,7 +146,7 @@ def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet() -> None:
         prepare()
         print("begun", flush=True)
         try:
-            time.sleep(60)
+            time.sleep(1000)
         except KeyboardInterrupt:
             print("seen")
     """
@@ -156,7 +157,7 @@ def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet() -> None:
     assert run.stdout.readline() == "begun\n"
     time.sleep(0.3)  # Python has started there, and the libraries take longer
     os.killpg(run.pid, signal.SIGINT)
-    assert run.communicate(timeout=60) == ("seen\n", "")
+    assert run.communicate(timeout=PATIENCE) == ("seen\n", "")
 
 
 @pytest.mark.slow
@@ -172,10 +173,10 @@ def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_serve
             with socket(AF_UNIX) as client:
                 client.connect(forkserver._forkserver._forkserver_address)
             other = start(time.sleep, 0)
-            other.join(60)
+            other.join(600)
             print(other.exitcode, forkserver._forkserver._forkserver_pid == server)
     """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert (done.stdout, done.stderr) == ("0 True\n" * 3, "")
 
 

@@ -17,6 +17,7 @@ from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import run
 from tests.support import fake_study
 from tests.support.fake_study import held, solves, untimed_table, write_config
+from tests.support.patience import PATIENCE
 
 TARGETS = 5
 
@@ -33,7 +34,7 @@ def start(config: Path, output: Path, *options: str) -> subprocess.Popen[str]:
 
 
 def wait_for_solves(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + PATIENCE
     while len(solves(folder)) < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
@@ -41,7 +42,7 @@ def wait_for_solves(folder: Path, count: int, process: subprocess.Popen[str]) ->
 
 
 def wait_for(process: subprocess.Popen[str]) -> tuple[int, str, str]:
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=PATIENCE)
     return process.returncode, out, err
 
 

@@ -23,6 +23,7 @@ from holobench_eval.study.progress import Follower, Lines
 from holobench_eval.study.run import run
 from holobench_eval.study.training import TrainingJob
 from tests.support import fake_study
+from tests.support.patience import PATIENCE
 from tests.support.trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write
 
 pytestmark = pytest.mark.usefixtures("no_physics")
@@ -142,7 +143,7 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
     place = artifact_of(config)
     wait_for_captures(place, 3, killed)
     killed.kill()
-    killed.communicate(timeout=60)
+    killed.communicate(timeout=PATIENCE)
     assert killed.returncode == -signal.SIGKILL
     assert not (place / STATE).exists()
     (place / "unfinished" / f"{TEMPORARY}left").write_bytes(b"half")
@@ -169,7 +170,7 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
 
 
 def wait_for_captures(artifact: Path, count: int, process: subprocess.Popen[bytes]) -> None:
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + PATIENCE
     while progress(artifact)[0] != count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
@@ -198,7 +199,7 @@ def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_p
     follower.start([(name, log.folder) for name, log in logs.items()], told.append)
 
     def tells(line: str) -> None:
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + PATIENCE
         while line not in told:
             assert time.monotonic() < deadline, (line, told)
             time.sleep(0.005)

@@ -8,13 +8,14 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.drivers.worker import Worker
+from tests.support.patience import PATIENCE
 
 
 def test_every_call_and_the_idling_between_are_on_one_thread_that_is_not_the_callers() -> None:
     idled: list[int] = []
     worker = Worker("panel", idle=lambda: idled.append(threading.get_ident()))
-    threads = {worker.call("a call", 5, threading.get_ident) for _ in range(3)}
-    deadline = time.monotonic() + 5
+    threads = {worker.call("a call", PATIENCE, threading.get_ident) for _ in range(3)}
+    deadline = time.monotonic() + PATIENCE
     while not idled and time.monotonic() < deadline:
         time.sleep(0.01)
     worker.stop(1, lambda: None)
@@ -28,9 +29,9 @@ def test_a_call_that_never_returns_is_left_behind_and_the_device_is_not_asked_ag
     with pytest.raises(DeviceError, match=r"camera: taking a picture took longer than 0\.2 s"):
         worker.call("taking a picture", 0.2, forever.wait)
     with pytest.raises(DeviceError, match="took longer"):
-        worker.call("taking a picture", 60, lambda: None)
-    worker.stop(60, forever.wait)
-    assert time.monotonic() - began < 5
+        worker.call("taking a picture", PATIENCE, lambda: None)
+    worker.stop(PATIENCE, forever.wait)
+    assert time.monotonic() - began < PATIENCE / 2
     forever.set()
 
 

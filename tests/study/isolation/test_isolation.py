@@ -23,6 +23,7 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import run
 from tests.study.test_run import compute
+from tests.support.patience import PATIENCE
 
 METHODS = '''
 import time
@@ -174,7 +175,7 @@ def test_a_call_that_is_left_ends_its_process(file: str) -> None:
     method = isolation.build(f"{file}:Mine", {}, Path())
     with isolation.opened(method, CPU) as ready:
         assert Path(f"/proc/{ready.pid}").exists() or not Path("/proc").exists()
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + PATIENCE
     while Path(f"/proc/{ready.pid}").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not Path(f"/proc/{ready.pid}").exists()
@@ -365,10 +366,8 @@ methods: ["one.py:One"]
 
 
 def test_what_a_method_leaves_running_does_not_keep_its_end_from_the_harness(tmp_path: Path) -> None:
-    began = time.monotonic()
-    record = solved(tmp_path, "(os.fork() or time.sleep(100)) and os._exit(3)")
+    record = solved(tmp_path, "(os.fork() or time.sleep(10_000)) and os._exit(3)")
     assert "ended with exit code 3" in record["reason"]
-    assert time.monotonic() - began < 50
 
 
 def test_a_method_may_have_processes_of_its_own(tmp_path: Path) -> None:
@@ -416,7 +415,7 @@ class Deaf:
     script = "from pathlib import Path\nfrom holobench_eval.study import isolation\n"
     script += "if __name__ == '__main__':\n    isolation.find('deaf.py:Deaf', Path('.'))\n"
     (tmp_path / "script.py").write_text(script)
-    assert subprocess.run([sys.executable, "script.py"], cwd=tmp_path, timeout=60, check=False).returncode == 0
+    assert subprocess.run([sys.executable, "script.py"], cwd=tmp_path, timeout=PATIENCE, check=False).returncode == 0
 
 
 def test_the_reason_of_a_failure_names_the_line_of_the_method_s_file(tmp_path: Path) -> None:
@@ -449,7 +448,7 @@ def test_a_plain_script_runs_in_a_folder_with_files_named_like_modules(tmp_path:
     )
     (tmp_path / "script.py").write_text(script)  # without ``if __name__ == "__main__"``
     command = [sys.executable, "../script.py"]
-    done = subprocess.run(command, cwd=tmp_path / "work", timeout=60, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=tmp_path / "work", timeout=PATIENCE, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.count("Mine")) == (0, 1), done.stderr
 
 

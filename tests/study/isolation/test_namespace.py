@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from tests.support.patience import PATIENCE
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="namespaces are of Linux")
 
 CODE = """
@@ -35,7 +37,7 @@ REFUSALS = {
 
 def entered(change: str) -> list[str]:
     code = CODE.format(change=change)
-    done = subprocess.run([sys.executable, "-c", code], timeout=60, capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], timeout=PATIENCE, capture_output=True, text=True, check=True)
     return done.stdout.split()
 
 
