@@ -15,6 +15,7 @@ from .data.results import Results
 from .data.tables import of_study, read_records, records_frame, records_text
 from .description import Description, describe
 from .files import texts, write_files
+from .files.pictures import keep_copies
 from .markdown import FIGURE, Markdown, blocks
 from .page import write_page
 from .section import Report
@@ -64,6 +65,7 @@ def write_report(
     for old in report.figures.glob(STAGES):  # of displays that the study had earlier
         if not any(old.name in text for text in written.values()):
             old.unlink()
+    keep_copies(report)
     write_page(report)
     return output / REPORT, results
 

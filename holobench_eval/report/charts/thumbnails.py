@@ -14,22 +14,35 @@ from ..data.scores import Score
 from ..data.tables import DONE
 from .gallery import Picture, Tile, load_picture
 
+COPIES = "pictures"  # folder of the small copies that a report keeps
+
 
 class Thumbnails:
     """Pictures of a report's targets and captures; ``absent`` holds the names of files that were asked for in vain."""
 
     def __init__(self, results: Results, output: Path) -> None:
         """output: the folder of the report."""
-        self.results, self.store = results, Store(output)
+        self.results, self.store, self.copies = results, Store(output), output / COPIES
         self.absent: set[str] = set()
         self._targets: dict[str, dict[str, Picture]] = {}
+
+    def of_capture(self, cell: str) -> Path:
+        """The file of a cell's capture: that of its record, or the small copy where the records are not there."""
+        return self._there(self.store.thumbnail(cell))
+
+    def of_target(self, target: str, shape: Sequence[int]) -> Path:
+        """The same of a target as displays show it, ``(C, h, w)``."""
+        return self._there(self.store.target_thumbnail(target, shape))
+
+    def _there(self, thumbnail: Path) -> Path:
+        return thumbnail if thumbnail.is_file() else self.copies / f"{thumbnail.stem}.webp"
 
     def targets(self, condition: str) -> dict[str, Picture]:
         """The targets that have a picture, as a display is to show them, in their order."""
         reference = self.results.reference(condition)
         shape = self.results.shape(reference)
         if reference not in self._targets:
-            paths = {target: self.store.target_thumbnail(target, shape) for target in self.results.targets}
+            paths = {target: self.of_target(target, shape) for target in self.results.targets}
             pictures = ((target, self._load(path)) for target, path in paths.items())
             self._targets[reference] = {target: picture for target, picture in pictures if picture is not None}
         return self._targets[reference]
@@ -44,7 +57,7 @@ class Thumbnails:
         if done.empty:
             return Tile(None, f"{cells.iloc[0]['state']}: {cells.iloc[0]['reason']}")
         cell, shape = done.iloc[0], self.targets(condition)[target].shape
-        picture = self._load(self.store.thumbnail(str(cell["cell"])))
+        picture = self._load(self.of_capture(str(cell["cell"])))
         if picture is None:
             return Tile(None, "no thumbnail of this capture")
         if picture.shape != shape:

@@ -20,7 +20,7 @@ Cell = tuple[str, str, str]  # method, condition, target; a target itself has ne
 
 @dataclass
 class Pictures:
-    """The pictures of a page, as the PNG files of the records; ``room``: bytes that more of them may take."""
+    """The pictures of a page, as files; ``room``: bytes that more of them may take."""
 
     room: int
     contents: list[bytes] = field(default_factory=list)
@@ -49,11 +49,11 @@ def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
     display; then the same on the changed displays, for the first targets only. A target's pictures come all or not.
     """
     found = Pictures(room)
-    everything = _files(report, _planned(report))
+    everything = files(report, planned(report))
     if encoded_length(everything.values()) <= room:
         found.add(everything)
     else:
-        for wanted in _groups(report):
+        for wanted in groups(report):
             found.add({cell: everything[cell] for cell in wanted if cell in everything})
     return found, {**_numbers(report, found), "note": _note(report, len(found.numbers), len(everything))}
 
@@ -79,8 +79,9 @@ def _numbers(report: Report, found: Pictures) -> Json:
 def _note(report: Report, held: int, there: int) -> str:
     text = report.layout.text
     sizes = (
-        f"Pictures are the stored ones, pixel for pixel: 8-bit sRGB PNG, {text.scored}s registered and matched in "
-        f"intensity, reduced where the longer side would exceed {LONGEST_THUMBNAIL} pixels."
+        f"Pictures are 8-bit sRGB, pixel for pixel from the records, or the report's WebP copies where these are not "
+        f"there; {text.scored}s are registered and matched in intensity, and reduced where the longer side would "
+        f"exceed {LONGEST_THUMBNAIL} pixels."
     )
     if not there:
         return f"This page holds no pictures: there were no thumbnails of {text.scored}s when it was written."
@@ -93,7 +94,8 @@ def _note(report: Report, held: int, there: int) -> str:
     )
 
 
-def _groups(report: Report) -> Iterator[list[Cell]]:
+def groups(report: Report) -> Iterator[list[Cell]]:
+    """The pictures that answer most, first things first: see ``pictures``."""
     results, conditions = report.results, _pictured(report)
     if not conditions:
         return
@@ -122,7 +124,8 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
             yield str(label), condition, target
 
 
-def _planned(report: Report) -> Iterator[Cell]:
+def planned(report: Report) -> Iterator[Cell]:
+    """The captures that a report could show."""
     results = report.results
     for condition, target in itertools.product([*_pictured(report), *_changed(report)], results.targets):
         yield from ((label, condition, target) for label in results.methods(condition))
@@ -138,13 +141,13 @@ def _changed(report: Report) -> list[str]:
     return [name for name in names if name in report.layout.changed and report.results.has_pictures(name)]
 
 
-def _files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
+def files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
     """The files of targets and captures that are there: of a capture that of the first repeat with a score."""
-    store, done = report.thumbnails.store, report.results.done.drop_duplicates(["label", "condition", "target"])
+    thumbnails, done = report.thumbnails, report.results.done.drop_duplicates(["label", "condition", "target"])
     names = zip(done["label"], done["condition"], done["target"], strict=True)
     captures = dict(zip(names, done["cell"], strict=True))
-    paths = {cell: store.thumbnail(captures[cell]) for cell in cells if cell in captures}
+    paths = {cell: thumbnails.of_capture(captures[cell]) for cell in cells if cell in captures}
     truths = (cell for target in report.results.targets for cell in _truths(report, target))
     shape = report.results.shape
-    targets = {cell: store.target_thumbnail(cell[2], shape(cell[1])) for cell in truths}
+    targets = {cell: thumbnails.of_target(cell[2], shape(cell[1])) for cell in truths}
     return {cell: path for cell, path in (targets | paths).items() if path.is_file()}

@@ -1,0 +1,72 @@
+"""A report keeps small copies of its pictures, and is whole again without the records."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holobench_eval.report import Description, Results, records_frame
+from holobench_eval.report.charts.gallery import load_picture
+from holobench_eval.report.files import pictures as module
+from holobench_eval.report.files.pictures import keep_copies
+from holobench_eval.report.page.pictures import pictures
+from holobench_eval.report.section import Report
+from tests.support import synthetic_study as synthetic
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Report:
+    records = synthetic.study(tmp_path, size=32)
+    results = Results(records_frame(records, synthetic.layout()), synthetic.layout())
+    return Report(results, records, tmp_path, {}, Description())
+
+
+def again(report: Report) -> Report:
+    """The report from the same folder, whose records are gone."""
+    shutil.rmtree(report.thumbnails.store.folder)
+    return Report(report.results, report.records, report.output, {}, report.description)
+
+
+def copies(report: Report) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in report.thumbnails.copies.iterdir()}
+
+
+def test_a_clone_shows_the_pictures_of_the_run(report: Report) -> None:
+    shown = pictures(report, 10**9)[0].numbers
+    tile = report.thumbnails.tile("HIL", "ideal", "chelsea")
+    keep_copies(report)
+    clone = again(report)
+    assert pictures(clone, 10**9)[0].numbers.keys() == shown.keys()
+    copied = clone.thumbnails.tile("HIL", "ideal", "chelsea")
+    assert copied.note == tile.note
+    assert tile.picture is not None
+    assert copied.picture is not None
+    assert np.abs(copied.picture - tile.picture).mean() < 0.03
+
+
+def test_without_room_whole_targets_are_kept_and_nothing_of_an_earlier_run(
+    report: Report, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keep_copies(report)
+    everything = copies(report)
+    room = sum(map(len, everything.values())) // 2
+    (report.thumbnails.copies / "of-another-run.webp").write_bytes(b"x")
+    monkeypatch.setattr(module, "MOST_BYTES", room)
+    keep_copies(report)
+    kept = copies(report)
+    assert sum(map(len, kept.values())) <= room
+    assert kept.items() < everything.items()
+    clone = again(report)
+    assert {target for *_, target in pictures(clone, 10**9)[0].numbers} <= set(clone.thumbnails.targets("ideal"))
+
+
+def test_writing_again_without_records_leaves_the_copies(report: Report) -> None:
+    keep_copies(report)
+    kept = copies(report)
+    clone = again(report)
+    keep_copies(clone)
+    assert copies(clone) == kept
+    assert load_picture(next(clone.thumbnails.copies.iterdir())) is not None
