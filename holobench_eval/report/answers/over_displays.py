@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..data.causes import cause
 from ..data.display_map import display_map, judged
-from ..data.over_displays import Margin, applies, cause, margins, parameters, published, shown_on, winners
+from ..data.over_displays import Margin, applies, gains, margins, parameters, published, shown_on, winners
 from ..data.results import Results
 from ..data.text import words
 from ..markdown import Markdown, table
 from .kind import Kind, subjects
 
 MOST = 2  # methods that the answer names beside those of the question
-CLEAR = 0.3  # share of the variance over displays that a parameter has to predict to be named as what decides
 
 
 def verdicts(results: Results) -> Iterator[str]:
@@ -59,7 +59,7 @@ def _map(results: Results) -> Iterator[str]:
     """The method that is best on most displays, and whether an error budget of a display tells where another is."""
     found, score = display_map(results), results.headline
     if found is None:
-        best = winners(results)
+        best = winners(gains(results))
         usual = max(best, key=best.count)
         yield f"{usual} is best on {best.count(usual)} of {len(best)}."
         return
@@ -88,7 +88,7 @@ def _decides(results: Results, about: list[Margin]) -> Iterator[str]:
         if found := cause(each.values, known):
             of = f"the margin of {each.label}"
             share = f"R2 {max(found.explained, 0.0):.2f} of displays left out"
-            if found.explained >= CLEAR:
+            if found.is_clear:
                 yield f"What decides {of}: {found.parameter} (rank correlation {found.rho:+.2f}, {share})."
             else:
                 yield f"No parameter of the displays predicts {of} (the best is {found.parameter}, {share})."

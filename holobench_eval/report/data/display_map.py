@@ -13,7 +13,7 @@ import numpy as np
 
 from ...metrics import control
 from .error_budget import budgets
-from .over_displays import Margin, margins, shown_on
+from .over_displays import Margin, gains, margins, shown_on, winners
 from .results import Results
 from .statistics import Array
 
@@ -35,7 +35,7 @@ class Map:
     @property
     def best(self) -> list[str]:
         """On each display."""
-        return [self.labels[index] for index in self.margins.argmax(0)]
+        return winners(dict(zip(self.labels, self.margins, strict=True)))
 
     @property
     def usual(self) -> str:
@@ -80,18 +80,18 @@ class Judged:
 
 def display_map(results: Results) -> Map | None:
     """The map from the first error budget among the related studies that has all displays; None without one."""
-    where, found = shown_on(results), margins(results)
+    where = shown_on(results)
     for other in results.related.values():
         known = {budget.condition: budget for budget in budgets(other)}
-        if not found or not where or not all(name in known for name in where):
+        if not where or not all(name in known for name in where):
             continue
         *image, field = known[where[0]].explained  # in the order of the config, the last one knows most
         shares = [[part.share.mean for part in known[name].explained] for name in where]
         axes = np.array([[sum(row[:-1]), row[-1]] for row in shares])
-        values = np.stack([np.zeros(len(where)), *(results.headline.sign * each.values for each in found)])
-        labels = (str(results.layout.baseline), *(each.label for each in found))
+        gained = gains(results)
+        values = np.stack(list(gained.values()))
         explained = (f"{image[-1].label} and what knows less", f"{field.label} alone")
-        return Map(labels, explained, axes, values, left_out(axes, values))
+        return Map(tuple(gained), explained, axes, values, left_out(axes, values))
     return None
 
 

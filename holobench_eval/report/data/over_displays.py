@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from ...study.calibration import value_of
 from ...study.calibration.family import load_family, names
+from .causes import FEWEST_DISPLAYS
 from .results import Results
 from .statistics import Array, Estimate, two_way
-
-FEWEST_DISPLAYS = 8  # from which on a study asks about displays and not about each of them
 
 
 @dataclass(frozen=True)
@@ -39,19 +37,8 @@ class Margin:
         return float(low), float(high)
 
 
-@dataclass(frozen=True)
-class Cause:
-    """A parameter of the displays that goes with a margin. rho: Spearman's; explained: the share of the variance over
-    displays that a line in it predicts of a display that it was not fitted to (R2, leaving one out; the parameter is
-    chosen anew each time, so that the choice is paid for)."""
-
-    parameter: str
-    rho: float
-    explained: float
-
-
 def is_many(results: Results) -> bool:
-    """Whether a study is about displays: it has many, those that are a change of another aside."""
+    """Whether a study asks about displays and not about each: it has many, those that are a change of another aside."""
     return len(results.conditions) >= FEWEST_DISPLAYS
 
 
@@ -85,12 +72,15 @@ def margins(results: Results) -> list[Margin]:
     return sorted(found, key=lambda one: -sign * one.over_both.mean)
 
 
-def winners(results: Results) -> list[str]:
-    """The best method, or the baseline, on each display of ``shown_on``."""
-    found, sign = margins(results), results.headline.sign
-    labels = [str(results.layout.baseline), *(each.label for each in found)]
-    values = np.stack([np.zeros(len(shown_on(results))), *(sign * each.values for each in found)])
-    return [labels[index] for index in values.argmax(0)]
+def gains(results: Results) -> dict[str, Array]:
+    """``(displays,)`` by how much each method is better than the baseline, which is the first; on ``shown_on``."""
+    rows = {each.label: results.headline.sign * each.values for each in margins(results)}
+    return {str(results.layout.baseline): np.zeros(len(shown_on(results))), **rows}
+
+
+def winners(gained: Mapping[str, Array]) -> list[str]:
+    """The best method on each display."""
+    return [list(gained)[index] for index in np.stack(list(gained.values())).argmax(0)]
 
 
 def published(results: Results, label: str) -> float | None:
@@ -112,30 +102,6 @@ def parameters(results: Results) -> dict[str, Array]:
         for given in (*loaded.parameters, *loaded.outside.parameters)
     }
     return {words: column for words, column in values.items() if np.ptp(column) > 0}
-
-
-def cause(values: Array, known: Mapping[str, Array]) -> Cause | None:
-    """The parameter that goes best with ``(displays,)`` margins."""
-    if not known or not np.ptp(values):
-        return None
-    words, columns = list(known), np.stack(list(known.values()))
-    predicted, mean = np.empty_like(values), np.empty_like(values)
-    for left in range(len(values)):
-        kept = np.arange(len(values)) != left
-        best = columns[_strongest(columns[:, kept], values[kept])]
-        slope, intercept = np.polyfit(best[kept], values[kept], 1)
-        predicted[left], mean[left] = slope * best[left] + intercept, values[kept].mean()
-    explained = 1 - np.square(values - predicted).sum() / np.square(values - mean).sum()
-    strongest = _strongest(columns, values)
-    rho = float(stats.spearmanr(columns[strongest], values).statistic)
-    return Cause(words[strongest], rho, float(explained))
-
-
-def _strongest(columns: Array, values: Array) -> int:
-    """The row that correlates best with the values; the first where nothing varies."""
-    products = (columns - columns.mean(1, keepdims=True)) @ (values - values.mean())
-    scales = columns.std(1) * values.std()
-    return int(np.argmax(np.abs(np.divide(products, scales, out=np.zeros_like(products), where=scales > 0))))
 
 
 def _over_both(differences: Array) -> Estimate:

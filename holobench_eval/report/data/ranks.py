@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -15,9 +12,10 @@ from scipy import stats
 
 from ...display.simulated.changes.draws import PARAMETERS
 from .categories import OFFLINE
+from .causes import Cause, cause
 from .layout import Swept
 from .results import Results
-from .statistics import FEWEST, SIGNIFICANCE, Array, Estimate, mean_interval
+from .statistics import Array, Estimate, mean_interval
 
 # Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take
 # the draws from all others.
@@ -25,40 +23,18 @@ ENOUGH = 0.5
 # Parameters that are angles over a full turn: neither end of their range is more than the other.
 CIRCULAR = frozenset({"zero_phase"})
 
-# In which forms a difference between two methods may go with a parameter.
-Form = Literal["value", "size", "sine", "cosine"]
-_FORMS: Mapping[Form, Callable[[Array], Array]] = {
-    "value": np.asarray,
-    "size": np.abs,
-    "sine": np.sin,
-    "cosine": np.cos,
-}
-
-
-@dataclass(frozen=True)
-class Cause:
-    """What a difference goes with: a parameter of ``draws.PARAMETERS`` in a form, Spearman's rank correlation, and its
-    p value times all that were tried."""
-
-    parameter: str
-    form: Form
-    correlation: float
-    p: float
-
 
 @dataclass(frozen=True)
 class Pair:
     """Two methods, the nominally better one first.
 
-    nominal, differences ``(draws,)``: by how much the first is better, in units of the headline metric; cause: what
-    the difference goes with most, None for none of the parameters, or for a pair that never flips.
+    nominal, differences ``(draws,)``: by how much the first is better, in units of the headline metric.
     """
 
     first: str
     second: str
     nominal: float
     differences: Array
-    cause: Cause | None = None
 
     @property
     def flips(self) -> int:
@@ -166,31 +142,34 @@ class Ranks:
         return int((self.positions == self.nominal_positions).all(axis=1).sum())
 
     @cached_property
-    def features(self) -> dict[tuple[str, Form], Array]:
-        """``(draws,)`` of what was drawn, by parameter and form: what a difference may go with."""
-        if not self.swept.drawn:
-            return {}
-        drawn = pd.DataFrame(self.swept.drawn).iloc[self.used].items()
-        return {
-            (str(name), form): _FORMS[form](values.to_numpy()) for name, values in drawn for form in _forms(str(name))
-        }
+    def features(self) -> dict[str, Array]:
+        """``(draws,)`` of what was drawn, by words: an angle by sine and cosine, a signed one by its size, too."""
+        drawn = pd.DataFrame(self.swept.drawn).iloc[self.used] if self.swept.drawn else pd.DataFrame()
+        found = dict[str, Array]()
+        for name, column in drawn.items():
+            parameter, values = PARAMETERS[str(name)], column.to_numpy()
+            if name in CIRCULAR:
+                found |= {f"sine of the {parameter.words}": np.sin(values)}
+                found |= {f"cosine of the {parameter.words}": np.cos(values)}
+                continue
+            found[parameter.words] = values
+            if parameter.low < 0 < parameter.high:
+                found[f"size of the {parameter.words}"] = np.abs(values)
+        return found
+
+    def cause(self, pair: Pair) -> Cause | None:
+        """What the difference of a pair goes with; None for nothing that was drawn."""
+        found = cause(pair.differences, self.features)
+        return found if found and found.is_clear else None
 
     @cached_property
     def pairs(self) -> list[Pair]:
         """Every pair of ranked methods, in the order of the nominal ranking."""
         ranked = zip(self.methods, self.nominal, self.drawn.T, strict=True)
-        pairs = [
+        return [
             Pair(first, second, float(nominal - other), draws - others)
             for (first, nominal, draws), (second, other, others) in itertools.combinations(ranked, 2)
         ]
-        tried = [list(_causes(pair, self.features)) if pair.flips else [] for pair in pairs]
-        made = sum(map(len, tried))
-        return [replace(pair, cause=_strongest(causes, made)) for pair, causes in zip(pairs, tried, strict=True)]
-
-    @property
-    def tests(self) -> int:
-        """How many correlations were tried."""
-        return len(self.features) * sum(pair.flips > 0 for pair in self.pairs)
 
 
 def positions(quality: Array) -> Array:
@@ -203,30 +182,6 @@ def share(count: int, total: int) -> Estimate:
     """A share of ``total`` draws with its 95 % interval (Wilson 1927)."""
     ends = stats.binomtest(count, total).proportion_ci(0.95, method="wilson")
     return Estimate(count / total, float(ends.low), float(ends.high), total, total)
-
-
-def _forms(name: str) -> tuple[Form, ...]:
-    """Of an angle its sine and cosine; else the value, and its size, too, where the range has both signs."""
-    if name in CIRCULAR:
-        return "sine", "cosine"
-    return ("value", "size") if PARAMETERS[name].low < 0 < PARAMETERS[name].high else ("value",)
-
-
-def _causes(pair: Pair, features: Mapping[tuple[str, Form], Array]) -> Iterator[Cause]:
-    """Every correlation of a pair that can be tested, by Spearman, with a two-sided p value of its own: of neither side
-    constant, and of enough draws."""
-    draws = len(pair.differences)
-    least = 2 / math.factorial(min(draws, 100))  # of all orders: the approximation by Student's t goes down to zero
-    for (parameter, form), values in features.items():
-        if draws >= FEWEST and np.ptp(values) > 0 and np.ptp(pair.differences) > 0:
-            test = stats.spearmanr(values, pair.differences)
-            yield Cause(parameter, form, float(test.statistic), max(float(test.pvalue), least))
-
-
-def _strongest(causes: Sequence[Cause], tried: int) -> Cause | None:
-    """The strongest correlation of a pair that is significant after Bonferroni."""
-    adjusted = [replace(cause, p=cause.p * tried) for cause in causes if cause.p * tried < SIGNIFICANCE]
-    return max(adjusted, key=lambda cause: abs(cause.correlation), default=None)
 
 
 def ranks(results: Results) -> list[Ranks]:

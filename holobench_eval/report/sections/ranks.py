@@ -8,15 +8,12 @@ from pathlib import Path
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
-from ..data.ranks import CIRCULAR, Cause, Pair, Ranks
+from ..data.causes import CLEAR
+from ..data.ranks import CIRCULAR, Pair, Ranks
 from ..data.statistics import mean_interval
-from ..data.text import p_value, percent, words
+from ..data.text import percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
-
-# Parameters of which there is more, and not a larger one.
-COUNTED = frozenset({"crosstalk", "flicker", "fringes", "astigmatism", "coma", "zero_order", "specks"})
-NOTHING = "none of the parameters"
 
 
 def _render(report: Report, _: Figures) -> Blocks:
@@ -30,7 +27,10 @@ def _render(report: Report, _: Figures) -> Blocks:
         yield heading(f"{ranks.swept.before}, {len(ranks.swept.points)} draws", 3)
         yield bullets(left_out(ranks))
         if ranks.exists and (pairs := flips(ranks)):
-            yield Markdown("Pairs of methods whose order changes, {}:").format(report.results.headline.axis)
+            yield Markdown(
+                "Pairs of methods whose order changes, {}. Goes with: the parameter that predicts the difference best, "
+                "if R2 on draws that were left out is {} or more."
+            ).format(report.results.headline.axis, CLEAR)
             yield pairs
         if drawn := _ranges(ranks):
             yield "Parameters that were drawn:"
@@ -49,32 +49,17 @@ def flips(ranks: Ranks) -> Markdown | None:
 
 
 def _flip(ranks: Ranks, pair: Pair) -> list[str]:
-    score = ranks.results.headline
+    score, cause = ranks.results.headline, ranks.cause(pair)
     return [
         pair.first,
         pair.second,
         score.number(pair.nominal, signed=True),
         score.estimate(mean_interval(pair.differences), signed=True),
         percent(pair.flipped),
-        favours(pair, pair.cause) if pair.cause else NOTHING,
+        f"{cause.parameter} (rank correlation {cause.rho:+.2f}, R2 {cause.explained:.2f})"
+        if cause
+        else "nothing drawn",
     ]
-
-
-def favours(pair: Pair, cause: Cause) -> str:
-    """``more crosstalk favours sgd (rho 0.81, p < 0.001)``."""
-    gains = pair.first if cause.correlation > 0 else pair.second
-    return f"{more(cause)} favours {gains} (rho {abs(cause.correlation):.2f}, {p_value(cause.p)})"
-
-
-def more(cause: Cause) -> str:
-    """More of a parameter, in words."""
-    parameter, counted = PARAMETERS[cause.parameter], cause.parameter in COUNTED
-    if cause.form in ("sine", "cosine"):
-        return f"a larger {cause.form} of the {parameter.words}"
-    if cause.form == "size":
-        return f"{'more' if counted else 'a larger'} {parameter.words} of either sign"
-    signed = " positive" if parameter.low < 0 else ""
-    return f"{'more' if counted else 'a more' if signed else 'a larger'}{signed} {parameter.words}"
 
 
 def left_out(ranks: Ranks) -> list[str]:
