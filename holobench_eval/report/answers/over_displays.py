@@ -63,23 +63,30 @@ def _map(results: Results) -> Iterator[str]:
         usual = max(best, key=best.count)
         yield f"{usual} is best on {best.count(usual)} of {len(best)}."
         return
-    count = len(found.best)
-    yield (
-        f"{found.usual} is best on {found.best.count(found.usual)} of {count}. To choose, measure what part of the "
-        f"error is explained by {found.axes[0]}, and by {found.axes[1]}: of displays left out these name the best of "
-        f"{len(found.labels)} methods on {found.hits} of {count}, {score.with_unit(found.cost)} behind the best on "
-        f"average ({found.usual} always: {score.number(found.usual_cost)})."
-    )
+    count, named = len(found.best), f"{found.hits} of {len(found.best)}"
+    behind, always = score.with_unit(found.cost), score.with_unit(found.usual_cost)
+    if found.cost < found.usual_cost:
+        yield (
+            f"To choose, measure an error budget: it names the best method on {named} displays left out and costs "
+            f"{behind} on average ({found.usual} always: {always})."
+        )
+    else:
+        yield (
+            f"To choose, measure nothing: always taking {found.usual} costs {always} on average. An error budget names "
+            f"the best method on {named} displays left out and costs {behind}."
+        )
+    yield f"{found.usual} is best on {found.best.count(found.usual)} of {count}."
     asked = [label for label in dict.fromkeys([*subjects(results), found.usual]) if label != found.labels[0]]
     if shares := [f"{max(found.explained(label), 0):.2f} of {label}" for label in asked]:
-        yield f"R2 of margins that these parts predict on displays left out: {words(shares)}."
+        yield (
+            f"Its parts ({found.axes[0]}; {found.axes[1]}) predict margins on displays left out: R2 {words(shares)}."
+        )
 
 
 def _judged(results: Results) -> Iterator[str]:
     """How well two scores of the models rank the methods that optimise through them."""
-    parts = [f"{each.score} names the better one in {each.right} of {each.pairs}" for each in judged(results)]
-    if parts:
-        yield f"Of two methods on a display, by their models: {words(parts)}."
+    if parts := [f"{each.score} in {each.right} of {each.pairs}" for each in judged(results)]:
+        yield f"Of two methods on a display, that of the better model is the better one: by {words(parts)} pairs."
 
 
 def _decides(results: Results, about: list[Margin]) -> Iterator[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from ...core.errors import listed
 from ...display.estimates import QUANTITIES
+from ..data.over_displays import is_many
 from ..data.trainings import Training
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section
@@ -136,4 +137,5 @@ def _verdict(rows: Sequence[Row]) -> str:
     return f"{len(judged) - len(outside)} of {len(judged)} numbers are within their stated errors; outside: {named}."
 
 
-SECTIONS = (Section("diagnosis", 110, _render, details=True),)
+# Of many displays these tables are too long to be read; training/*.json has their numbers.
+SECTIONS = (Section("diagnosis", 110, _render, applies=lambda report: not is_many(report.results), details=True),)
