@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from ..data.error_budget import Budget, Part
 from .look.medium import medium
-from .style import PALE, grid, new_figure, save, style
+from .style import PALE, grid, legend_below, new_figure, save, style
 
 ROW, HEADER, LEGEND = 110, 40, 110  # pixels: of a display, above and below all
 SHARES, GAINS = 0.6, 0.4  # of the width
@@ -52,8 +52,8 @@ def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
         for axes in (left, right):
             axes.tick_params(axis="y", length=0)
             grid(axes, "x")
-        handles = [Patch(facecolor=colour, label=label) for label, colour in colours.items()]
-        figure.legend(handles=handles, loc="outside lower center", ncols=1 if narrow else 3, frameon=False)
+        handles = [Patch(facecolor=colour) for colour in colours.values()]
+        legend_below(figure, handles, list(colours))
         save(figure, path)
 
 

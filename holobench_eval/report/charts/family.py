@@ -11,7 +11,7 @@ from ...study.calibration.family import Range, Row
 from ..data.display_map import Map
 from .look.medium import medium
 from .look.methods import Look
-from .style import PALE, grid, new_figure, save, style
+from .style import PALE, grid, legend_below, new_figure, save, style
 
 SIDE, FRAME = 150, 90  # pixels: of a panel, around all
 BINS = 12
@@ -66,22 +66,25 @@ def draw_map(path: Path, found: Map, axis: str, looked: Mapping[str, Look]) -> N
     axis: name of the margins; looked: the look of the methods by label.
     """
     with style():
-        width = medium().width
-        figure = new_figure(width, round(0.55 * width))
+        width, across = medium().width, 1 if medium().narrow else 2
+        figure = new_figure(width, round(width * (1.9 if medium().narrow else 0.55)))
         figure.set_layout_engine("constrained")
-        panels = figure.subplots(1, 2, sharey=True)
+        panels = figure.subplots(2 // across, across, sharey=True, squeeze=False).flat
         for axes, shares, name in zip(panels, 100 * found.shares.T, found.axes, strict=True):
             for label, look in looked.items():
                 values = found.margins[found.labels.index(label)]
-                given = {"marker": look.marker, "color": look.face, "edgecolor": look.colour, "s": 30}
+                given = {
+                    "marker": look.marker,
+                    "color": look.face,
+                    "edgecolor": look.colour,
+                    "s": 30 * medium().scale ** 2,
+                }
                 axes.scatter(shares, values, label=label, **given)
                 ends = np.array([shares.min(), shares.max()])
                 axes.plot(ends, np.polyval(np.polyfit(shares, values, 1), ends), color=look.colour, linewidth=1)
             axes.axhline(0, color="black", linewidth=1)
-            axes.set_xlabel(medium().wrap(f"error explained by {name} [%]", 0.42 * width), parse_math=False)
+            axes.set_xlabel(medium().wrap(f"error explained by {name} [%]", 0.84 * width / across), parse_math=False)
             grid(axes)
         panels[0].set_ylabel(medium().wrap(axis, 0.4 * width), parse_math=False)
-        handles = panels[0].get_legend_handles_labels()
-        for text in figure.legend(*handles, loc="outside lower center", ncols=4, frameon=False).get_texts():
-            text.set_parse_math(False)
+        legend_below(figure, *panels[0].get_legend_handles_labels())
         save(figure, path)

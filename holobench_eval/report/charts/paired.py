@@ -10,7 +10,7 @@ from ..data.results import Results
 from .look.medium import medium
 from .look.methods import looks
 from .quality import Row, best_first, draw_rows_of_dots, footer_of, height_of
-from .style import GREY, save, slugs, stacked, style
+from .style import GREY, legend_below, save, slugs, stacked, style
 
 
 def displays(results: Results) -> list[tuple[str, str]]:
@@ -61,9 +61,7 @@ def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: 
         for value, label in zip(lines.values(), labels[1:], strict=True):
             axes.axvline(value, color=GREY, linewidth=1.1, linestyle="--", zorder=1, label=label)
         axes.set_xlabel(axis, parse_math=False)
-        legend = figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False)
-        for text in legend.get_texts():
-            text.set_parse_math(False)
+        legend_below(figure, *axes.get_legend_handles_labels())
         save(figure, path)
 
 

@@ -16,6 +16,7 @@ from typing import Literal
 import cv2
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -77,6 +78,15 @@ def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     """Pale lines behind everything that is drawn."""
     axes.grid(axis=axis, color="#E5E5E5", linewidth=0.6)
     axes.set_axisbelow(True)
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    """A legend below all panels, with as many columns as the names leave room for."""
+    room = medium().characters(medium().width) // (max(map(len, labels)) + 8)
+    columns = max(1, min(room, len(labels)))
+    legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
 
 
 METADATA = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}

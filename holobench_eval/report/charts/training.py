@@ -14,14 +14,14 @@ from matplotlib.ticker import MaxNLocator
 
 from ...study.artifacts import Round
 from .look.medium import medium
-from .style import PALE, SHADES, grid, new_figure, save, style
+from .style import SHADES, grid, legend_below, new_figure, save, style
 
 Rounds = tuple[str, tuple[Round, ...]]  # a training's name and its rounds
 
 COLUMNS = 3
 A_PAGE = 6
 NARROWEST = 200  # pixels of a panel
-CURVES = 12  # up to so many trainings have a panel each; more are rows of one chart of their last rounds
+MOST = 12  # trainings with a panel each; of more, the table alone is in the report
 LINES = (
     ("predicted", "predicted picture, against the target", SHADES[0], "o"),
     ("captured", "captured picture, against the target", SHADES[1], "s"),
@@ -29,23 +29,18 @@ LINES = (
 )
 
 
-def draw_trainings(stem: Path, trainings: Sequence[Rounds]) -> list[tuple[Path, bool]]:
-    """Draw all trainings that have figures; the files, and whether each shows curves (or last rounds only).
+def draw_trainings(stem: Path, trainings: Sequence[Rounds]) -> list[Path]:
+    """Draw the trainings that have several rounds, where they are few enough to be looked at; the files.
 
     stem: the files' name without number and ending.
     """
     drawable = [(name, kept) for name, rounds in trainings if (kept := tuple(filter(_has_figures, rounds)))]
-    if not drawable:
+    if len(drawable) > MOST or all(len(rounds) == 1 for _, rounds in drawable):
         return []
-    if len(drawable) > CURVES or all(len(rounds) == 1 for _, rounds in drawable):
-        path = stem.with_name(f"{stem.name}-last.png")
-        last_rounds(path, [(name, rounds[-1:]) for name, rounds in drawable])
-        return [(path, False)]
     drawn = []
     for number, start in enumerate(range(0, len(drawable), A_PAGE), start=1):
-        path = stem.with_name(f"{stem.name}-{number}.png")
-        curves(path, drawable[start : start + A_PAGE], _limits(drawable))
-        drawn.append((path, True))
+        drawn.append(stem.with_name(f"{stem.name}-{number}.png"))
+        curves(drawn[-1], drawable[start : start + A_PAGE], _limits(drawable))
     return drawn
 
 
@@ -93,8 +88,7 @@ def curves(path: Path, trainings: Sequence[Rounds], limits: _Limits) -> None:
             axes.set_title(title, loc="left", weight="bold", parse_math=False)
             if index % columns == 0:
                 axes.set_ylabel("PSNR on held-out images [dB]")
-        handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(LINES), frameon=False)
+        legend_below(figure, *panels[0, 0].get_legend_handles_labels())
         save(figure, path)
 
 
@@ -107,32 +101,3 @@ def _curve(axes: Axes, rounds: tuple[Round, ...], limits: _Limits) -> None:
     axes.set_ylim(*limits.psnr)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     grid(axes)
-
-
-def last_rounds(path: Path, trainings: Sequence[Rounds]) -> None:
-    """A row per training with the three figures after its last round."""
-    heights = np.arange(len(trainings))
-    with style():
-        figure = new_figure(medium().width, round(medium().scale * (110 + 26 * len(trainings))))
-        figure.set_layout_engine("constrained")
-        axes = figure.subplots()
-        last = [rounds[-1] for _, rounds in trainings]
-        values = np.array([[getattr(step, key) for key, *_ in LINES] for step in last])
-        axes.hlines(heights, np.nanmin(values, axis=1), np.nanmax(values, axis=1), color=PALE, linewidth=1.2)
-        for column, (_, label, colour, marker) in enumerate(LINES):
-            axes.plot(values[:, column], heights, linestyle="", color=colour, marker=marker, label=label)
-        names = [
-            f"{_short(name)}, {step.captures:.0f} captures" for (name, _), step in zip(trainings, last, strict=True)
-        ]
-        axes.set_yticks(heights, names, parse_math=False)
-        axes.set_ylim(len(trainings) - 0.5, -0.5)
-        axes.tick_params(axis="y", length=0)
-        axes.set_xlabel("PSNR on held-out images after the last round [dB]")
-        grid(axes, "x")
-        axes.set_title("after the last round of training", loc="left", weight="bold")
-        figure.legend(loc="outside lower center", ncols=len(LINES), frameon=False)
-        save(figure, path)
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= 38 else f"{name[:35]}..."

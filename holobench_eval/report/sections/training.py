@@ -103,12 +103,11 @@ def _doubts(trainings: Sequence[Training]) -> list[str]:
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     rounds = [(training.name, training.record.rounds) for training in report.trainings if training.record]
-    for path, curves in draw_trainings(report.figures / "training", rounds):
-        how = "against the captures taken, a mark per round." if curves else "after the last round, a row per training."
+    for path in draw_trainings(report.figures / "training", rounds):
         yield (
             path,
             "Training: PSNR on held-out images of the predicted and of the captured picture against the target, and "
-            f"of the prediction against the capture (fidelity), {how}",
+            "of the prediction against the capture (fidelity), against the captures taken, a mark per round.",
         )
 
 

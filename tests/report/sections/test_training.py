@@ -7,7 +7,7 @@ import pytest
 
 from holobench_eval.core.hashing import digest
 from holobench_eval.report import Results, csv_text, recompute_files, records_frame, table_from_records, write_report
-from holobench_eval.report.charts.training import CURVES, draw_trainings
+from holobench_eval.report.charts.training import MOST, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
 from holobench_eval.study.artifacts import Round, rounds_of
@@ -153,12 +153,11 @@ def test_a_round_is_the_last_figure_of_every_kind(tmp_path):
     assert (lone.captures, math.isnan(lone.fidelity)) == (7, True)
 
 
-def test_many_trainings_are_one_chart_and_few_have_a_panel_each(tmp_path):
+def test_few_trainings_have_a_panel_each_and_many_are_left_to_the_table(tmp_path):
     rounds = logged(tmp_path, LOG)
     few = draw_trainings(tmp_path / "few", [(f"m{index}", rounds) for index in range(7)])
-    assert [(path.name, curves) for path, curves in few] == [("few-1.png", True), ("few-2.png", True)]
-    many = draw_trainings(tmp_path / "many", [(f"m{index}", rounds) for index in range(CURVES + 1)])
-    assert [(path.name, curves) for path, curves in many] == [("many-last.png", False)]
+    assert [path.name for path in few] == ["few-1.png", "few-2.png"]
+    assert draw_trainings(tmp_path / "many", [(f"m{index}", rounds) for index in range(MOST + 1)]) == []
     assert draw_trainings(tmp_path / "none", [("m", ())]) == []
 
 
