@@ -36,6 +36,7 @@ class DoublePhase:
     quantile: Annotated[float, Interval(gt=0, le=1)] = 1.0
     offset: Offset = "centre"
 
+    title: ClassVar[str] = "double-phase encoding"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 
@@ -86,6 +87,8 @@ class AntiAliasedDoublePhase(DoublePhase):
 
     sigma: Annotated[float, Interval(gt=0, le=5)] = 0.5
 
+    title: ClassVar[str] = "double phase, anti-aliased"
+
     def filter(self, field: Tensor, pitch: float) -> Tensor:
         """Gaussian blur of the complex field."""
         fy, fx = frequencies(_padded(field), pitch, field.device)
@@ -113,6 +116,8 @@ class BandLimitedDoublePhase(DoublePhase):
 
     band: Annotated[float, Interval(gt=0, le=1)] = 0.7
     shape: Literal["round", "square"] = "round"
+
+    title: ClassVar[str] = "double phase, band-limited"
 
     def filter(self, field: Tensor, pitch: float) -> Tensor:
         """Ideal low-pass of the complex field."""

@@ -42,6 +42,7 @@ class GerchbergSaxton:
     initial_phase: InitialPhase = "random"
     offset: Offset = "centre"
 
+    title: ClassVar[str] = "Gerchberg-Saxton"
     version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False

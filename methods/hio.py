@@ -47,6 +47,7 @@ class HybridInputOutput:
     initial_phase: InitialPhase = "random"
     offset: Offset = "centre"
 
+    title: ClassVar[str] = "hybrid input-output"
     version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False

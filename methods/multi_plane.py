@@ -52,6 +52,7 @@ class MultiPlane:
     initial_phase: InitialPhase = "constant"
     offset: Offset = "centre"
 
+    title: ClassVar[str] = "descent for all planes"
     version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False

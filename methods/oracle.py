@@ -53,6 +53,7 @@ class Oracle:
     tolerance: Annotated[float, Interval(gt=0, le=10)] = 0.3
     rounds: Annotated[int, Interval(ge=1, le=1000)] = 10
 
+    title: ClassVar[str] = "descent through the display itself"
     version: ClassVar[int] = 3
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = True

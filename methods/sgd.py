@@ -44,6 +44,7 @@ class AmplitudeSGD:
     initial_phase: InitialPhase = "narrow"
     offset: Offset = "centre"
 
+    title: ClassVar[str] = "gradient descent on amplitude"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 

@@ -83,6 +83,7 @@ class Wirtinger:
     initial_phase: InitialPhase = "constant"
     offset: Offset = "centre"
 
+    title: ClassVar[str] = "Wirtinger holography"
     tuned: ClassVar[str] = (
         "the starting phase and global offset were chosen on the display ideal and, in part, on an earlier leto-aged, "
         "with photographs that are cropped for the targets of most studies"

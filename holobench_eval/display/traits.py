@@ -18,8 +18,8 @@ class Traits:
 
     camera: captures while it solves; privileged: may see the simulated bench; trains: learns first; follows: is solved
     after all others; planes: solves all planes of a scene at once; form: effects that its model of the display has
-    parameters for; tuned: what its defaults were chosen on; version: of the numbers it gives; timed: False where its
-    seconds mean nothing; functions: those that it has.
+    parameters for; title: its name for people; tuned: what its defaults were chosen on; version: of the numbers it
+    gives; timed: False where its seconds mean nothing; functions: those that it has.
     """
 
     camera: bool = False
@@ -28,6 +28,7 @@ class Traits:
     follows: bool = False
     planes: bool = False
     form: frozenset[str] | None = None
+    title: str | None = None
     tuned: str | None = None
     version: int = 1
     timed: bool = True
@@ -43,13 +44,14 @@ FLAGS = tuple(item.name for item in fields(Traits) if item.name not in ("timed",
 """What any method may declare; only one that ships may say that it is not timed."""
 BOOLEANS = tuple(item.name for item in fields(Traits) if isinstance(item.default, bool) and item.name in FLAGS)
 
-WANTED = {"form": "a set of text", "tuned": "text in one line", "version": "a whole number from 0 up"}
+LINE = "text in one line"
+WANTED = {"form": "a set of text", "title": LINE, "tuned": LINE, "version": "a whole number from 0 up"}
 
 
 def _is_flag(flag: str, value: object) -> bool:
     if flag == "version":
         return type(value) is int and value >= 0
-    if flag == "tuned":
+    if flag in ("title", "tuned"):
         return value is None or (isinstance(value, str) and value.isprintable())
     if flag == "form":
         return value is None or (isinstance(value, Collection) and all(isinstance(each, str) for each in value))

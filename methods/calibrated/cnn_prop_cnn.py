@@ -80,6 +80,7 @@ class CNNPropCNN(Calibrated):
     training: LongerSchedule = LongerSchedule()
     width: Annotated[int, Interval(ge=2, le=256)] = 16
 
+    title: ClassVar[str] = "networks around the propagation"
     RATES: ClassVar[Rates] = Rates(model=5e-3)
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:

@@ -65,6 +65,7 @@ class HybridModel(Diagnosed, Calibrated):
     patterns: Annotated[int, Interval(ge=0, le=1000)] = 9  # and three dark ones
     width: Annotated[int, Interval(ge=2, le=256)] = 16
 
+    title: ClassVar[str] = "a physical model and a network"
     RATES: ClassVar[Rates] = Rates(model=3e-2, network=1e-3)
     version: ClassVar[int] = 4
     form: ClassVar[frozenset[str]] = FORM | {"fringes", "panel_dust", "roughness"}

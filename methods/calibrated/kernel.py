@@ -66,6 +66,7 @@ class LearnedKernel(Calibrated):
     training: OneRound = OneRound()
     patterns: Annotated[int, Interval(ge=0, le=1000)] = 0
 
+    title: ClassVar[str] = "a learned propagation kernel"
     RATES: ClassVar[Rates] = Rates(model=1e-2)
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:

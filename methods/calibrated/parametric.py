@@ -21,6 +21,7 @@ class ParametricModel(Diagnosed, Calibrated):
 
     patterns: Annotated[int, Interval(ge=0, le=1000)] = 9  # and three dark ones
 
+    title: ClassVar[str] = "a physical model"
     RATES: ClassVar[Rates] = Rates(model=3e-2)
     version: ClassVar[int] = 4
 

@@ -166,6 +166,8 @@ class WirtingerGamma(PhaseGamma):
 
     of: Wirtinger = Wirtinger()
 
+    title: ClassVar[str] = "Wirtinger holography through a phase gamma"
+
 
 @dataclass(frozen=True)
 class DoublePhaseGamma(PhaseGamma):
@@ -181,3 +183,5 @@ class DoublePhaseGamma(PhaseGamma):
     """
 
     of: DoublePhase = DoublePhase()
+
+    title: ClassVar[str] = "double-phase encoding through a phase gamma"

@@ -99,6 +99,7 @@ class Phases:
     order: Literal["rgb", "bgr"] = "rgb"
     encoder: Literal["double_phase", "phase_only"] = "double_phase"
 
+    title: ClassVar[str] = "phases from files"
     version: ClassVar[int] = 2
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False

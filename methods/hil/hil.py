@@ -66,6 +66,7 @@ class HIL:
     seed: int = 0
     fallback: bool = False
 
+    title: ClassVar[str] = "hardware in the loop, Chakravarthula 2020"
     tuned: ClassVar[str] = (
         "the network (a quarter of the paper's filters, 1,300 steps for 40,000), rates and steps were chosen on a "
         "trial display that resembles leto-hazy, with generated images"

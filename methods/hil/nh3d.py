@@ -60,6 +60,7 @@ class HILNH3D:
     seed: int = 0
     fallback: bool = False
 
+    title: ClassVar[str] = "hardware in the loop, as Choi 2021 compares"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True

@@ -61,6 +61,7 @@ class HILPlus(Diagnosed, ThroughModel):
     training: MostImages = MostImages()
     network: Network | None = None
 
+    title: ClassVar[str] = "hardware in the loop through a physical model"
     version: ClassVar[int] = 6
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:

@@ -59,6 +59,7 @@ class HILTerms(ThroughModel):
     start: Wirtinger = Wirtinger()
     network: Network = Network(name="unet")
 
+    title: ClassVar[str] = "hardware in the loop with image terms"
     version: ClassVar[int] = 1
     form: ClassVar[frozenset[str]] = frozenset({"stray_light"})
 

@@ -36,6 +36,7 @@ class HILTuned(HIL):
         and so nor does the network's input, but unmodulated light interferes with the image.
     """
 
+    title: ClassVar[str] = "hardware in the loop, tuned start"
     tuned: ClassVar[str] = "the start was chosen on captures of generated images, for a reason that came from Table 3"
 
     retrieval: PhaseRetrieval = PhaseRetrieval()

@@ -57,6 +57,7 @@ class OnlineCamera:
     start: CameraStart = CameraStart()
     checks: Annotated[int, Interval(ge=1, le=100)] = 3
 
+    title: ClassVar[str] = "camera in the loop"
     version: ClassVar[int] = 2
     camera: ClassVar[bool] = True
     privileged: ClassVar[bool] = False

@@ -78,6 +78,7 @@ class OnlineCameraNetwork:
     start: CameraStart = CameraStart()
     checks: Annotated[int, Interval(ge=1, le=100)] = 3
 
+    title: ClassVar[str] = "camera in the loop through a network"
     camera: ClassVar[bool] = True
     privileged: ClassVar[bool] = False
     version: ClassVar[int] = 2

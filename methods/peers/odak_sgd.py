@@ -45,6 +45,7 @@ class OdakSGD:
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
     learning_rate: Annotated[float, Interval(gt=0, le=10)] = 0.1
 
+    title: ClassVar[str] = "gradient descent of odak"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 

@@ -56,6 +56,7 @@ class TorchOpticsAdam:
     propagation: Literal["AUTO", "ASM", "DIM", "ASM_FRESNEL", "DIM_FRESNEL"] = "AUTO"
     padding: Annotated[float, Interval(ge=0, le=4)] = 0.5
 
+    title: ClassVar[str] = "Adam through TorchOptics"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 

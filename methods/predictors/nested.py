@@ -83,6 +83,8 @@ class NestedPrediction(ThroughModel):
 class ImageTermsModel(NestedPrediction):
     """A few numbers on the ideal intensity, learned from captures: shading, blur, haze and tone."""
 
+    title: ClassVar[str] = "image-domain terms"
+
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
         return SquaredErrorApproximator(IdealImage(spec), None, self.RATES, ImageTerms(spec))
@@ -91,6 +93,8 @@ class ImageTermsModel(NestedPrediction):
 @dataclass(frozen=True)
 class ImageNetwork(NestedPrediction):
     """A few numbers on the ideal intensity, and a U-Net that sees it and adds to what they predict."""
+
+    title: ClassVar[str] = "a network of the ideal image"
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """See the base."""
@@ -101,6 +105,7 @@ class ImageNetwork(NestedPrediction):
 class FieldNetwork(NestedPrediction):
     """A few numbers and a U-Net, both on a field that interferes: that of a physical model of the display."""
 
+    title: ClassVar[str] = "a field model and a network"
     form: ClassVar[frozenset[str]] = FORM
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:

@@ -51,6 +51,7 @@ class WirtingerVeil:
     step: Annotated[float, Interval(gt=0, le=10)] = 0.1
     offset: Offset = "centre"
 
+    title: ClassVar[str] = "Wirtinger holography through a veil of two numbers"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True

@@ -14,15 +14,10 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 PAGES = ("README.md",)
 BLOCK = re.compile(r"(<!-- board: (\S+): (.*?) -->\n).*?(<!-- /board -->)", re.DOTALL)
-NAMES = {  # of the methods that stand in such a table, in its order
-    "hybrid_model": "a physical model and a network",
-    "hil_plus": "hardware in the loop through a physical model",
-    "gerchberg_saxton, smooth start": "Gerchberg-Saxton from a smooth start",
-    "wirtinger": "Wirtinger holography",
-    "hil": "hardware in the loop, Chakravarthula 2020",
-    "wirtinger_veil": "Wirtinger holography through a veil of two numbers",
-    "double_phase": "double-phase encoding",
-}
+ROWS = (  # of the table, in its order
+    *("hybrid_model", "hil_plus", "gerchberg_saxton, smooth start", "wirtinger", "hil", "wirtinger_veil"),
+    "double_phase",
+)
 
 
 def drawn(text: str) -> str:
@@ -40,11 +35,12 @@ def table(study: str, displays: list[str]) -> str:
     heads = [f"`{name}` [{board['headline']['unit']}] | against Wirtinger" for name in displays]
     lines = ["| method (its name here) | photographs | " + " | ".join(heads) + " |"]
     lines.append("|---|---:|" + "---:|---:|" * len(displays))
-    for label, name in NAMES.items():
+    for label in ROWS:
         rows = [found[display].get(label) for display in displays]
+        title = next(row["title"] for row in rows if row)
         spent = next(row["photographs"] for row in rows if row)
         cells = " | ".join(cell for row in rows for cell in cells_of(row))
-        lines.append(f"| {name} (`{label.partition(',')[0]}`) | {spent:.0f} | {cells} |")
+        lines.append(f"| {f'{title} (`{label}`)' if title else label} | {spent:.0f} | {cells} |")
     return "\n".join(lines)
 
 

@@ -8,7 +8,7 @@ from ..data.board import GROUPS, Board, Display, Row
 from ..data.categories import ORACLE
 from ..data.phrases import verdict
 from ..data.text import FILES, number, words
-from ..markdown import Markdown, blocks, heading, table
+from ..markdown import Markdown, blocks, code, heading, table
 
 SIGNS = {"better": "", "worse": "", "not shown to differ": " (not shown)", "not tested": " (no test)"}
 
@@ -40,9 +40,10 @@ def display_table(board: Board, display: Display) -> Markdown:
 
 def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) -> list[object]:
     score, results = board.results.headline, board.results
-    named = ", ".join([row.label, *row.marks])
-    if row.scored < len(results.targets):
-        named += f", {row.scored} of {len(results.targets)} targets"
+    title, name = results.layout.titles.get(row.label), code(row.label)
+    marks = [*row.marks, *([f"{row.scored} of {len(results.targets)} targets"] * (row.scored < len(results.targets)))]
+    named = Markdown("{} ({})").format(title, name) if title else Markdown("{}").format(row.label)
+    named = Markdown(", ").join([named, *(Markdown("{}").format(mark) for mark in marks)])
     line: list[object] = [row.tier, named, score.number(row.score.mean)]
     if tested and row.test:
         sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]

@@ -104,6 +104,7 @@ class Board:
     def _row(self, row: Row) -> dict[str, Any]:
         return {
             "method": row.label,
+            "title": self.results.layout.titles.get(row.label),
             "registered": self.results.names[row.label],
             "tier": row.tier,
             "targets": row.scored,
