@@ -37,10 +37,9 @@ def table(study: str, displays: list[str]) -> str:
     lines.append("|---|---:|" + "---:|---:|" * len(displays))
     for label in ROWS:
         rows = [found[display].get(label) for display in displays]
-        title = next(row["title"] for row in rows if row)
-        spent = next(row["photographs"] for row in rows if row)
+        row = next(filter(None, rows))
         cells = " | ".join(cell for row in rows for cell in cells_of(row))
-        lines.append(f"| {f'{title} (`{label}`)' if title else label} | {spent:.0f} | {cells} |")
+        lines.append(f"| {row['title']} (`{row['registered']}`) | {row['photographs']:.0f} | {cells} |")
     return "\n".join(lines)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -85,8 +86,9 @@ class Layout:
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
     question: what the study asks (empty: what its kind asks); would_change: which result would change the answer;
-    about: what a method or a display is whose name does not say it, by label or condition; titles: names for people of
-    methods that go by their registered name, by label; tuned: on what the settings of methods were chosen, by label.
+    about: what a method or a display is whose name does not say it, by label or condition; titles: names for
+    people, by label, where it begins with the method's name; tuned: on what the settings of methods were chosen, by
+    label.
     note: a paragraph that the study wants among its limits. measure: that of the study, or ``files`` (pictures that
     were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
     holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
@@ -217,7 +219,6 @@ def layout_of(study: Study) -> Layout:
     }
     traits = {entry.label: isolation.traits(entry.name, study.folder) for entry in study.methods}
     trained = frozenset(label for label, method in traits.items() if method.trains)
-    named = {entry.label for entry in study.methods if entry.label == entry.name}
     return Layout(
         title=study.title,
         pairs=tuple(
@@ -238,7 +239,11 @@ def layout_of(study: Study) -> Layout:
         question=study.question,
         would_change=study.would_change,
         about=_about(study, profiles),
-        titles={label: traits[label].title or label for label in traits if label in named},
+        titles={
+            entry.label: f"{title}{entry.label.removeprefix(entry.name)}"
+            for entry in study.methods
+            if (title := traits[entry.label].title) and re.match(rf"{re.escape(entry.name)}(?!\w)", entry.label)
+        },
         tuned={label: method.tuned for label, method in traits.items() if method.tuned is not None},
         note=study.note,
         measure=study.measure,
