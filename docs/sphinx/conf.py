@@ -14,7 +14,7 @@ import torch
 from sphinx.application import Sphinx
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
-sys.path.insert(0, str(HERE))  # stages.py
+sys.path.insert(0, str(HERE))  # stages.py, formulas.py
 os.environ["COLUMNS"] = "100"  # of the tables that examples print
 SCRATCH = ROOT / "build" / "scratch"  # where examples write
 os.environ["XDG_CACHE_HOME"] = str(SCRATCH)
@@ -31,14 +31,17 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
     "stages",
+    "formulas",
 ]
 root_doc = "docs/start/index"
 include_patterns = ["CONTRIBUTING.md", "docs/**", "reports/*/report.md", "reports/*/details.md"]
-include_patterns += ["holobench_eval/report/page/vendor/README.md"]  # licences, which docs/results/page.md links to
 exclude_patterns = ["**/.*", "artifacts", "build", "methods", "datasets", "tests", "configs"]
 exclude_patterns += ["docs/gallery"]  # its pages are docs/examples, which the build writes
 
 myst_heading_anchors = 3
+myst_enable_extensions = ["dollarmath"]
+myst_update_mathjax = False
+html_math_renderer = "mathml"
 smartquotes_action = "D"  # dashes; quotes stay as they are
 
 autodoc_member_order = "bysource"

@@ -12,23 +12,23 @@ PAGE = Path(__file__).parents[2] / "docs" / "config.md"
 INTRODUCTION = """\
 # The config of a study
 
-A study is a YAML file: which methods, on which displays, for which targets.
-[configs/quick.yaml](../configs/quick.yaml) is the smallest one. Only `title`, `display`, `targets` and `methods` are
-needed. A mistake is one line with its place, and nothing is computed:
+A study is a YAML file: which methods, on which displays, for which targets. This page has every key of it, and says
+where paths start and which code a cell depends on. [configs/quick.yaml](../configs/quick.yaml) is the smallest one. A
+mistake is one line with its place, and nothing is computed:
 
 ```text
 holoeval: mine.yaml:4:14: unknown profile 'idel'; did you mean 'ideal'? allowed: ...
 ```
 
-The YAML is that of the core schema of YAML 1.2: `yes` is text, `1e-3` is a number, indents are spaces; there are no
-aliases and no duplicate keys. `null` stands for a value that is not there. `holoeval list` shows the names that a
-config may use, `holoeval list NAME` the parameters of a method or dataset, which `params` sets. `--set` gives a value
-of a run on the [command line](start/first-run.md#a-part-of-a-study-or-a-variant).
+The YAML is that of the core schema of YAML 1.2 (`yes` is text, `1e-3` a number) without aliases and duplicate keys.
+`null` stands for a value that is not there. `holoeval list` shows the names that a config may use,
+`holoeval list NAME` what `params` may set. `--set` gives a value of a run on the
+[command line](start/first-run.md#a-part-of-a-study-or-a-variant).
 
 ## A grid of parameters
 
-`grid` has lists of values of parameters, and gives a row for each combination. Its values end the row's label, which is
-the one that `baseline`, `question` and `--methods` name, such as `wirtinger, iterations 10, step 0.5`:
+`grid` gives a row for each combination of values. They end the row's label, which `baseline`, `question` and
+`--methods` name, such as `wirtinger, iterations 10, step 0.5`:
 
 ```yaml
 methods:
@@ -40,26 +40,24 @@ methods:
 - Code, `mine.py:Name`, and YAML files of profiles: in the folder of the config, and where it has none, in the working
   directory.
 - `display.bench` and `protocol.lpips_weights`: in the folder of the config.
-- What `params` hold, `path` and `manifest` of the dataset `folder`, folders in `scenes` of `focal_stacks`, `file` and
-  `amplitude` of the method `phases`: in the working directory, where `holoeval` is called.
-
-So a config that has its pictures or phases beside it is run from its own folder, or names them from where it is run.
+- What `params` hold, such as `path` of the dataset `folder` or `file` of the method `phases`: in the working
+  directory, where `holoeval` is called.
 
 ## Code of your own
 
-The code of `mine.py:Name` is the file, and what it imports from its own folder or below: `import helper` or `from
-.losses import l1`, also inside a function. No `PYTHONPATH` is needed. A module of Python's own library goes before a
-file of the same name, an installed package after it. A change of any byte of these files, comments included, or of a
-file that is read while they are imported, has the method's cells computed and its training made again. A `version` of
-your class is a label for people.
+The code of `mine.py:Name` is the file, and what it imports from its own folder or below. No `PYTHONPATH` is needed. A
+module of Python's own library goes before a file of the same name, an installed package after it. A change of any
+byte of these files, or of a file that is read while they are imported, has the method's cells computed and its
+training made again. A `version` of your class is a label for people.
 
-What a method opens in `prepare`, `solve` or `predict`, and a dataset for its images, is part of the cells by its
-digest where it lies in the folder of the config, or where a parameter names it or a folder above it. Other files are
-listed as not covered. Of an installed package all files count, and of this package the versions of the methods that
-yours imports.
-Not seen is what C code opens by itself (h5py, pyarrow, safetensors, `cv2.FileStorage`), unless a parameter names the
+Files that a method opens in `prepare`, `solve` or `predict`, and a dataset for its images, are part of the cells by
+their digest where they lie in the folder of the config, or where a parameter names them or a folder above them. Other
+files are listed as not covered. Of an installed package all files count, and of this package the versions of the
+methods that yours imports.
+
+Not seen is what C code opens by itself (h5py, pyarrow, safetensors, `cv2.FileStorage`) where no parameter names the
 file; what other programs and processes read; a listing of a folder, or the question whether a file is there; an
-environment variable. With `isolation: none`, a module that stays in memory from an earlier call is not seen either.
+environment variable; and with `isolation: none`, a module that stays in memory from an earlier call.
 
 ## In an editor
 
@@ -75,9 +73,8 @@ holoeval schema > holoeval.schema.json
 title: "My study"
 ```
 
-It knows the parameters of all installed methods and datasets. What is about several values at once (a baseline that
-is the label of no method, a panel too small for registration, a file that does not exist) is found by `holoeval plan`
-alone.
+It knows the parameters of all installed methods and datasets. What is about several values at once, such as a
+baseline that is the label of no method, is found by `holoeval plan` alone.
 
 <!-- What follows is written by: python -m tests.docs.config_page -->
 """
