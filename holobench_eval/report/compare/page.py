@@ -115,8 +115,8 @@ def _targets(comparison: Comparison) -> Part:
     score, most = comparison.score, comparison.moved(TARGETS)
     headings = ("target", "method", "display", "A", "B", "B - A")
     rows = (
-        (m.target, m.row.method, m.row.display, score.number(m.a), score.number(m.b), _change(score, m.b - m.a))
-        for m in most
+        (target, row.method, row.display, score.number(a), score.number(b), _change(score, b - a))
+        for row, target, a, b in most
     )
     sentence = f"The {len(most)} largest changes of a target." if most else "No target has changed."
     return Part("Targets that changed most", sentence, headings, tuple(rows))

@@ -63,16 +63,6 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Moved:
-    """A target of a row with its scores in A and B."""
-
-    row: Row
-    target: str
-    a: float
-    b: float
-
-
-@dataclass(frozen=True)
 class Unpaired:
     """Cells of a method on a display that have a score in one run alone.
 
@@ -103,15 +93,15 @@ class Comparison:
     cells: int
     unchanged: int
 
-    def moved(self, count: int) -> list[Moved]:
-        """The targets with the largest changes, largest first; none that did not change."""
+    def moved(self, count: int) -> list[tuple[Row, str, float, float]]:
+        """(row, target, score in A, in B) where they differ most, largest change first."""
         each = [
-            Moved(row, target, float(a), float(b))
+            (row, target, float(a), float(b))
             for row in self.rows
             for target, a, b in zip(row.targets, row.a, row.b, strict=True)
             if a != b
         ]
-        return sorted(each, key=lambda moved: -abs(moved.b - moved.a))[:count]
+        return sorted(each, key=lambda moved: -abs(moved[3] - moved[2]))[:count]
 
     def regressions(self, limit: float) -> list[Row]:
         """Rows whose mean is worse by more than ``limit``, in the unit of the score, with an interval clear of zero."""

@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from matplotlib import colormaps
+
 from ..charts.look.methods import looks
 from ..data.board import GROUPS, board
 from ..data.columns import costs
-from ..data.phrases import counted
+from ..data.phrases import counted, tested, verdict
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Estimate
@@ -23,69 +25,44 @@ TIER, GAIN, P = "tier", "gain", "p"
 
 def page_data(report: Report) -> Json:
     """Everything that the page draws, ready for JSON: no NaN, and numbers rounded as in table.csv."""
-    results = report.results
+    results, text = report.results, report.results.layout.text
     changed = [name for name in dict.fromkeys(results.table["condition"]) if name in results.layout.changed]
-    conditions = [*results.conditions, *changed]
-    drawn = board(results)
-    tiers = {name: dict[str, str]() for name in conditions}
-    tiers |= {display.name: {row.label: row.tier for row in display.rows} for display in drawn.displays}
+    tiers = {display.name: {row.label: row.tier for row in display.rows} for display in board(results).displays}
+    tiers |= {name: dict.fromkeys(results.methods(name), "") for name in changed}
+    colours = looks(results.names)
     return {
-        "study": results.layout.title,
         "headline": _score(results.headline),
         "baseline": results.layout.baseline,
-        "words": {"scored": results.layout.text.scored, "truth": results.layout.text.truth},
+        "words": {"scored": text.scored, "truth": text.truth},
         "displays": results.conditions,
         "changed": changed,
         "columns": list(_columns(results)),
         "scores": [_score(score) for score in results.leading],
-        "methods": {name: _method(results, name) for name in _labels(results, conditions)},
-        "targets": [
-            {"name": target, "cluster": str(cluster)}
-            for target, cluster in zip(results.targets, results.clusters, strict=True)
-        ],
+        "methods": {
+            label: {
+                "registered": results.names[label],
+                "group": GROUPS[results.layout.category(label)],
+                "oracle": label in results.layout.privileged,
+                "colour": colours[label].colour,  # the same as in the figures
+            }
+            for label in dict.fromkeys(label for labels in tiers.values() for label in labels)
+        },
+        "targets": results.targets,
         "rows": {
-            name: [_row(results, label, name, tiers[name].get(label, "")) for label in _ordered(results, name, tiers)]
-            for name in conditions
+            name: [_row(results, label, name, tier) for label, tier in labels.items()] for name, labels in tiers.items()
         },
         "values": {
-            name: {label: _by_target(results, label, name) for label in results.methods(name)} for name in conditions
+            name: {label: _by_target(results, label, name) for label in labels} for name, labels in tiers.items()
         },
         "floors": {
             name: [
-                {
-                    "name": results.layout.text.floor_name(floor),
-                    "mean": _number(results.row(floor, results.reference(name))[column]),
-                }
+                {"name": text.floor_name(floor), "mean": _number(results.values(floor, results.reference(name)).mean())}
                 for floor in results.floors
                 if results.has_pictures(name)
             ]
-            for column in [results.headline.column]
             for name in results.conditions
         },
-    }
-
-
-def colour(results: Results, label: str) -> str:
-    """The colour of a method, ``#rrggbb``, the same as in the figures of the report."""
-    return looks(results.names)[label].colour
-
-
-def _labels(results: Results, conditions: list[str]) -> list[str]:
-    return list(dict.fromkeys(label for name in conditions for label in results.methods(name)))
-
-
-def _ordered(results: Results, condition: str, tiers: dict[str, dict[str, str]]) -> list[str]:
-    """Labels in the order of the board, where the condition has one."""
-    return list(dict.fromkeys([*tiers[condition], *results.methods(condition)]))
-
-
-def _method(results: Results, label: str) -> Json:
-    registered = results.names[label]
-    return {
-        "registered": registered,
-        "group": GROUPS[results.layout.category(label)],
-        "oracle": label in results.layout.privileged,
-        "colour": colour(results, label),
+        "magma": colormaps["magma"](range(256), bytes=True)[:, :3].tolist(),
     }
 
 
@@ -115,21 +92,19 @@ def _columns(results: Results) -> Iterator[Json]:
 
 def _row(results: Results, label: str, condition: str, tier: str) -> Json:
     """A row of the table: of every column the value, the interval where there is one, and the text."""
-    row = results.row(label, condition)
+    row, gain = results.row(label, condition), results.gain(label, condition)
+    test = tested(results, label, condition)
     cells = {TIER: _cell(tier, float(ord(tier)))} if tier else {}
     cells |= {score.key: _estimate(score, score.of(row)) for score in results.leading}
-    gain = results.gain(label, condition)
     if gain is not None and label != results.layout.baseline:
         cells[GAIN] = _estimate(results.headline, gain, signed=True)
-        for test in results.against_baseline:
-            if (test.condition, test.second) == (condition, label) and not math.isnan(test.p):
-                cells[P] = _cell(p_value(test.p).removeprefix("p ").removeprefix("= "), test.p)
+    if test and not math.isnan(test.p):
+        cells[P] = _cell(p_value(test.p).removeprefix("p ").removeprefix("= "), test.p)
     cells |= {key: _cell(number(row[key]), row[key]) for key in costs(results.table, "")}
     return {
         "method": label,
         "marked": counted(results, label, condition),
-        "n": int(row["n"]),
-        "failed": int(row["failed"]),
+        "verdict": verdict(results.headline, test) if test else "",
         "cells": cells,
     }
 

@@ -1,7 +1,7 @@
 """The file itself: data as JSON, pictures as base64, scripts and styles inline and named by their hashes.
 
 What comes from files cannot become markup: numbers and names are JSON in which ``<``, ``>`` and ``&`` are escaped, the
-scripts write text nodes only, and the few sentences written here are escaped. The content security policy lets no
+scripts write text nodes only, and the template escapes what stands in it. The content security policy lets no
 request leave the page and no script run but those of this package.
 """
 
@@ -13,13 +13,13 @@ import json
 import re
 from collections.abc import Iterator
 from fnmatch import fnmatch
-from html import escape
 from importlib.resources import files
 from pathlib import Path
-from string import Template
 from typing import Any
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
+from markupsafe import Markup
 
 from ...core.io import write_atomically
 from ..markdown import FIGURE, blocks
@@ -33,23 +33,17 @@ from .pictures import pictures
 MOST_BYTES = 24_000_000  # of the whole page
 OWN = 200_000  # bytes that the template, the policy and the provenance may take beside scripts, data and pictures
 TOP, BOTTOM = "answer", "limits"  # sections of report.md that stand first and last
-# Figures of the report that the page has: those of numbers but the paired differences, which it draws itself.
-CHARTS = ("quality-[!p]*", "error-budget*", "sweep-*", "training-*", "stages-*")
-VENDORED = ("d3.min.js", "plot.umd.min.js")
-SCRIPTS = (
-    "dom.js",
-    "state.js",
-    "table.js",
-    "copy.js",
-    "plots.js",
-    "pixels.js",
-    "flip.js",
-    "viewer.js",
-    "strip.js",
-    "main.js",
-)
+CHARTS = ("quality-*", "error-budget*", "sweep-*", "training-*", "stages-*")  # figures of the report that the page has
+SCRIPTS = ("dom", "state", "pixels", "flip", "table", "viewer", "strip", "main")
 
+_LINK = re.compile(r"\[([^\]]+)(?<!\\)\]\(([^)#]+)[^)]*\)")  # in Markdown whose names are escaped
 _JSON = str.maketrans({char: f"\\u{ord(char):04x}" for char in "<>&\u2028\u2029"})
+
+
+def templates(package: str, folder: str) -> Environment:
+    """The templates in a folder of a package: every text in them is escaped, and none may be missing."""
+    loader = PackageLoader(package, folder)
+    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
 
 
 def write_page(report: Report) -> Path:
@@ -61,26 +55,26 @@ def write_page(report: Report) -> Path:
 
 def page(report: Report) -> str:
     """The text of the page, at most ``MOST_BYTES`` of UTF-8 where the numbers alone do not take more."""
-    style, scripts, data = _asset("page.css"), list(_scripts()), page_data(report)
-    charts = "".join(_charts(report))
-    taken = [style, *scripts, json_text(data), charts]
+    style, data, charts = asset("page.css"), page_data(report), list(_charts(report))
+    scripts = [f'"use strict";\n{asset(f"{name}.js")}' for name in SCRIPTS]
+    taken = [style, *scripts, json_text(data), *(text for chart in charts for text in chart)]
     held, shown = pictures(report, MOST_BYTES - OWN - sum(len(text.encode()) for text in taken))
     data |= {"pictures": shown}
-    encoded = [base64.b64encode(content).decode() for content in held.contents]
-    return Template(_asset("page.html")).substitute(
-        title=escape(report.layout.title),
+    template = templates("holobench_eval.report.page", "assets").get_template("page.html")
+    return template.render(
+        title=report.layout.title,
         policy=policy(scripts, style),
-        style=style,
-        counts=escape(counts(report.results)),
+        style=Markup(style),
+        counts=counts(report.results),
         top=section_html(report, TOP),
         limits=section_html(report, BOTTOM),
         charts=charts,
-        provenance=_provenance(report),
-        data=json_text(data),
-        scripts="\n".join(f"<script>{script}</script>" for script in scripts),
-        pictures="\n".join(
-            f'<script type="text/plain" id="picture-{number}">{text}</script>' for number, text in enumerate(encoded)
-        ),
+        environment=environment(report.provenance),  # times and revisions stand in provenance.json
+        description=report.description,
+        data=data,
+        json=Markup(json_text(data)),
+        scripts=map(Markup, scripts),
+        contents=(base64.b64encode(content).decode() for content in held.contents),
     )
 
 
@@ -98,62 +92,40 @@ def policy(scripts: list[str], style: str) -> str:
     )
 
 
-def section_html(report: Report, name: str) -> str:
-    """A section of report.md as HTML; links and pictures, which would be loaded, stay text.
+def section_html(report: Report, name: str) -> Markup:
+    """A section of report.md as HTML; links, which lead out of the page, are a text and a name in brackets.
 
     Columns of numbers get a class, since the policy takes no style of an element.
     """
     chosen = [section for section in sections() if section.name == name and section.applies(report)]
     text = blocks(block for section in chosen for block in section.render(report, []))
     reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["link", "image", "autolink"])
-    tokens = reader.parse(str(text))
+    tokens = reader.parse(_LINK.sub(r"\1 (\2)", str(text)))
     for token in tokens:
         if token.attrs.pop("style", None):
             token.attrs["class"] = "number"
-    return str(reader.renderer.render(tokens, reader.options, {}))
+    return Markup(reader.renderer.render(tokens, reader.options, {}))
+
+
+def asset(name: str) -> str:
+    """A style sheet or a script of the page."""
+    return (files(__package__) / "assets" / name).read_text(encoding="utf-8")
+
+
+def plain(markdown: str) -> str:
+    """What Markdown of one line shows."""
+    return re.sub(r"\\(?=[\\`*|~$_\]])|`", "", markdown)
 
 
 def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def _asset(name: str, folder: str = "assets") -> str:
-    return (files(__package__) / folder / name).read_text(encoding="utf-8")
-
-
-def _scripts() -> Iterator[str]:
-    yield from (_asset(name, "vendor") for name in VENDORED)
-    yield from (f'"use strict";\n{_asset(name)}' for name in SCRIPTS)
-
-
-def _charts(report: Report) -> Iterator[str]:
-    """The charts of the report with their captions, as far as they are there."""
+def _charts(report: Report) -> Iterator[tuple[str, str]]:
+    """(address, caption) of the charts of the report, as far as they are there."""
     paths = [path for name in ("report.md", "details.md") if (path := report.output / name).is_file()]
     for name, caption in FIGURE.findall("\n".join(path.read_text(encoding="utf-8") for path in paths)):
         path = report.figures / name
         if any(fnmatch(name, f"{pattern}.*") for pattern in CHARTS) and path.is_file():
-            text = escape(_plain(caption))
-            encoded = base64.b64encode(path.read_bytes()).decode()
             kind = "jpeg" if path.suffix == ".jpg" else "png"
-            yield f'<figure><img alt="{text}" src="data:image/{kind};base64,{encoded}">'
-            yield f"<figcaption>{text}</figcaption></figure>"
-
-
-def _plain(markdown: str) -> str:
-    """What Markdown of one line shows."""
-    return re.sub(r"\\(?=[\\`*|~$_\]])|`", "", markdown)
-
-
-def _provenance(report: Report) -> str:
-    """What was run and on what; as in report.md without times and revisions, which provenance.json has."""
-    rows = environment(report.provenance)
-    lines = "".join(f"<tr><th scope=row>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
-    config = report.description.config_text
-    named = escape(report.description.config_file)
-    text = f"<details><summary>Config {named}</summary><pre tabindex=0>{escape(config)}</pre></details>"
-    displays = "".join(
-        f"<details><summary>Display {escape(display.name)}</summary><p>{escape(display.heading)}</p><ul>"
-        f"{''.join(f'<li>{escape(line)}</li>' for line in display.lines)}</ul></details>"
-        for display in report.description.displays
-    )
-    return f"<table>{lines}</table>{displays}{text if config else ''}"
+            yield f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode()}", plain(caption)

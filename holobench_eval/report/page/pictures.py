@@ -59,19 +59,14 @@ def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
 
 
 def _numbers(report: Report, found: Pictures) -> Json:
-    targets = report.results.targets
-    cells: dict[str, dict[str, list[int | None]]] = {}
-    for (label, condition, target), number in found.numbers.items():
-        if label:
-            holes: list[int | None] = [None] * len(targets)
-            cells.setdefault(condition, {}).setdefault(label, holes)[targets.index(target)] = number
-    held = Counter(target for *_, target in found.numbers)
+    results, displays, number = report.results, [*_pictured(report), *_changed(report)], found.numbers.get
+    targets, held = results.targets, Counter(target for *_, target in found.numbers)
     return {
-        "targets": {
-            name: [found.numbers.get(("", report.results.reference(name), target)) for target in targets]
-            for name in (*_pictured(report), *_changed(report))
+        "targets": {name: [number(("", results.reference(name), target)) for target in targets] for name in displays},
+        "cells": {
+            name: {label: [number((label, name, target)) for target in targets] for label in results.methods(name)}
+            for name in displays
         },
-        "cells": cells,
         "first": max(targets, key=lambda target: held[target]),  # the first of those with most pictures
     }
 

@@ -6,18 +6,19 @@ names the files of both, the earlier and the new one, so that the same command g
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from ...core.errors import StorageError, UserError
 from ...core.io import TEMPORARY, write_atomically
+from ..page.html import asset
 from .checks import folded
 from .html import page, slug
 from .intake import Source, folders, read
-from .pages import Study, about, cards, facts, places, slugs
-from .pictures import figures, sheet, thumbnails
+from .pages import about, cards, places, studies
+from .pictures import Picture
 
 MARK = "files-of-the-site.txt"
 
@@ -47,17 +48,16 @@ def _earlier(output: Path, found: Sequence[Path]) -> set[str]:
         raise UserError(f"--output {output}: not a folder; expected a new one, or that of an earlier site")
     mark, present = output / MARK, set[str]()
     listed = set(mark.read_text("utf-8", "replace").splitlines()) if mark.is_file() and not mark.is_symlink() else set()
-    for folder, inside, names in os.walk(output):
-        for path in (Path(folder, name) for name in sorted((*inside, *names))):
-            name = path.relative_to(output).as_posix()
-            known = name in listed or name == MARK or path.name.startswith(TEMPORARY)
-            if path.is_symlink() or not (path.is_dir() or known):
-                raise UserError(
-                    f"--output {output}: holds {name!r}, which is no file of a site; expected a new folder, or an "
-                    "earlier site and nothing else"
-                )
-            if not path.is_dir():
-                present.add(name)
+    for path in sorted(output.rglob("*")):
+        name = path.relative_to(output).as_posix()
+        known = name in listed or name == MARK or path.name.startswith(TEMPORARY)
+        if path.is_symlink() or not (path.is_dir() or known):
+            raise UserError(
+                f"--output {output}: holds {name!r}, which is no file of a site; expected a new folder, or an "
+                "earlier site and nothing else"
+            )
+        if not path.is_dir():
+            present.add(name)
     for report in found:
         if output.resolve().is_relative_to(report.resolve()) or report.resolve().is_relative_to(output.resolve()):
             raise UserError(f"--output {output}: overlaps with {report}; expected another folder")
@@ -102,76 +102,32 @@ def _whole(contents: Iterable[tuple[str, bytes]]) -> dict[str, bytes]:
 
 def _contents(sources: Sequence[Source], without: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
     """(path below the site, bytes) of every file."""
-    studies = [_study(source, name) for source, name in zip(sources, slugs(sources), strict=True)]
-    yield "assets/page.css", (files("holobench_eval.report.page") / "assets" / "page.css").read_bytes()
+    found = studies(sources)
+    names = sorted({name for study in found for name in study.source.results.names.values()})
+    displays, methods = cards(found), {name: rows for name in names if (rows := places(found, name))}
+    yield "assets/page.css", asset("page.css").encode()
     yield "assets/site.css", (files(__package__) / "assets" / "site.css").read_bytes()
-    shown, methods = (
-        cards(studies),
-        dict.fromkeys(row for study in studies for row in study.source.results.names.values()),
-    )
-    found = [(title, slug(title), own) for title, own in shown.items()]
-    yield (
-        "index.html",
-        page(
-            "index",
-            title="Which phase-retrieval method, on which display?",
-            displays=[
-                {
-                    "title": title,
-                    "slug": name,
-                    "about": own[0]["about"],
-                    "verdict": own[0]["verdict"],
-                    "pictures": own[0]["pictures"],
-                }
-                for title, name, own in found
-            ],
-            studies=[
-                {"slug": each.slug, "name": each.source.name, "whose": each.whose, "question": each.question}
-                for each in studies
-            ],
-            methods=[{"name": name, "about": about(name)} for name in sorted(methods) if not name.startswith("floor_")],
-            without=without,
-        ),
-    )
-    for title, name, own in found:
-        sheets = [each["sheet"] for each in own if each["sheet"]][:1]
-        text = page("display", 1, title=f"Display {title}", about=own[0]["about"], boards=own, sheets=sheets)
-        yield f"displays/{name}.html", text
-    for method in methods:
-        pictures = [placed for study in studies for placed in study.thumbnails if placed[1].of == method]
-        if found_places := places(studies, method):
-            text = page("method", 1, title=method, about=about(method), places=found_places, pictures=pictures)
-            yield f"methods/{slug(method)}.html", text
-    for study in studies:
-        yield f"studies/{study.slug}.html", _study_page(study)
-        placed = (*study.figures, *study.thumbnails, *study.sheets.values())
-        yield from ((path, picture.content) for path, picture in placed)
-
-
-def _study(source: Source, name: str) -> Study:
-    taken, count = figures(source)
-    sheets = {display: drawn for display in source.results.conditions if (drawn := sheet(source, display))}
-    return Study(
-        source,
-        name,
-        [(f"pictures/{name}/{picture.name}", picture) for picture in taken],
-        [(f"pictures/{name}/{picture.name}", picture) for picture in thumbnails(source)],
-        count - len(taken),
-        {display: (f"pictures/{name}/{picture.name}", picture) for display, picture in sheets.items()},
-    )
-
-
-def _study_page(study: Study) -> bytes:
-    source = study.source
-    notes = [f"{study.left} more figures are in its folder."] if study.left else []
-    notes += [f"{source.changed} conditions are changes of a display, and not shown."] if source.changed else []
-    return page(
-        "study",
-        1,
-        title=f"{source.name}{study.whose}",
-        question=study.question,
-        boards=study.boards,
-        pictures=study.figures,
-        notes=" ".join(notes),
-        facts=facts(source),
-    )
+    values: dict[str, Any] = {"displays": displays, "studies": found, "methods": methods, "without": without}
+    title = "Which phase-retrieval method, on which display?"
+    yield "index.html", page("index", up="", title=title, about=about, **values)
+    for name, own in displays.items():
+        headed = [(f"{each['of'].source.name}{each['of'].whose}", each) for each in own]
+        sheets: list[Picture] = next((each["sheets"] for each in own if each["sheets"]), [])
+        values = {"about": own[0]["about"], "boards": headed, "pictures": sheets, "notes": "", "facts": []}
+        yield f"displays/{slug(name)}.html", page("boards", title=f"Display {name}", **values)
+    for name, rows in methods.items():
+        pictures = [picture for study in found for picture in study.thumbnails if picture.of == name]
+        text = page("method", title=name, about=about(name), places=rows, pictures=pictures)
+        yield f"methods/{slug(name)}.html", text
+    for study in found:
+        shown = [picture.path for each in study.boards for picture in each["pictures"]]
+        values = {
+            "about": study.question,
+            "boards": [(each["title"], each) for each in study.boards],
+            "pictures": [picture for picture in study.figures if picture.path not in shown],
+            "notes": study.notes,
+            "facts": study.facts,
+        }
+        yield f"studies/{study.slug}.html", page("boards", title=f"{study.source.name}{study.whose}", **values)
+        placed = (*study.figures, *study.thumbnails, *study.sheets)
+        yield from ((picture.path, picture.content) for picture in placed)

@@ -104,6 +104,8 @@ def check_rows(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame) -> None:
         if wrong:
             named = ", ".join(word or "nothing" for word in allowed)
             raise UserError(f"{path}: {name} {wrong[0]!r}; expected one of {named}")
+    if len(measures := sorted(set(frame["measure"]))) > 1:
+        raise UserError(f"{path}: measures {' and '.join(measures)}; expected one study a folder")
     for name in [*score_columns(frame), *(name for name in COUNTS if name in frame)]:
         _check_numbers(path, raw, frame, name)
     for side in ("panel_height_px", "panel_width_px"):
@@ -111,18 +113,14 @@ def check_rows(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame) -> None:
         if wrong:
             raise UserError(f"{path}: {side} {wrong[0]!r}; expected a number of pixels from 1 to 99999")
     spent = frame[[name for name in CAPTURES if name in frame]].gt(0).any(axis=1)
-    contradicting = frame[spent & (frame["category"] == OPEN_LOOP)]
-    if len(contradicting):
-        raise UserError(
-            f"{path}: {_named(contradicting)} is {OPEN_LOOP} and has captures; expected none, or another category"
-        )
-    done, scores = frame["state"] == DONE, frame[score_columns(frame)].notna()
+    done, scored = frame["state"] == DONE, frame[score_columns(frame)].notna().any(axis=1)
     for rows, what in (
-        (frame[done & ~scores.any(axis=1)], "is done and has no score"),
-        (frame[~done & scores.any(axis=1)], "is not done and has a score"),
+        (spent & (frame["category"] == OPEN_LOOP), f"{OPEN_LOOP} and has captures; expected none, or another category"),
+        (done & ~scored, "done and has no score; expected a score of done cells alone"),
+        (~done & scored, "not done and has a score; expected a score of done cells alone"),
     ):
-        if len(rows):
-            raise UserError(f"{path}: {_named(rows)} {what}; expected a score of done cells alone")
+        if rows.any():
+            raise UserError(f"{path}: {_named(frame[rows])} is {what}")
 
 
 def _check_numbers(path: Path, raw: pd.DataFrame, frame: pd.DataFrame, name: str) -> None:
@@ -147,10 +145,10 @@ def _named(rows: pd.DataFrame) -> str:
     return ", ".join(str(rows.iloc[0][name])[:60] for name in ("label", "condition", "target"))
 
 
-def check_displays(folder: Path, known: Mapping[str, Any], frame: pd.DataFrame, measure: str) -> None:
+def check_displays(folder: Path, known: Mapping[str, Any], frame: pd.DataFrame) -> None:
     """UserError: a display of the records is not in the provenance."""
     unknown = sorted(set(frame["display"]) - {*known.get("profiles", {})})
-    if unknown and measure != FILES:
+    if unknown and not (frame["measure"] == FILES).all():
         raise UserError(
             f"{folder / provenance.FILE}: no digest of the display {unknown[0]!r} of {RECORDS}; copy the "
             "provenance.json that 'holoeval run' wrote with it"

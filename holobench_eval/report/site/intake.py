@@ -25,33 +25,33 @@ from ..data.results import Results
 from ..data.scores import METRICS, Score, parse
 from ..data.tables import GUARDED, clusters_in, records_text, score_columns
 from . import checks
-from .checks import LONGEST, NAMES, RECORDS, folded
+from .checks import LONGEST, RECORDS, folded
 
 TABLE: Final = "table.csv"
 TESTS: Final = "tests.csv"
 BY = "by"  # the key of a provenance that says whose results they are
 OWN = "own"  # how the site calls results of whoever makes it
-TEXTS = ("measure", "parameters", *NAMES)
+MOST_FILE = 8_000_000  # bytes of a picture or a text
 
 
 @dataclass(frozen=True)
 class Source:
     """A folder that was taken in.
 
-    name: of the study; by: whose results they are (empty: of whoever makes the site); results: its numbers without
-    changed displays; measure: what was scored; panels: rows x columns of each display (empty: not recorded);
-    known: its provenance; parameters: of every label, as JSON; changed: conditions that are a change of a display.
+    by: whose results they are (empty: of whoever makes the site); results: its numbers without changed displays; known:
+    its provenance; changed: conditions that are a change of a display.
     """
 
     folder: Path
-    name: str
     by: str
     results: Results
-    measure: str
-    panels: Mapping[str, str]
     known: Mapping[str, Any]
-    parameters: Mapping[str, str]
     changed: int
+
+    @property
+    def name(self) -> str:
+        """Of the study."""
+        return self.folder.resolve().name
 
     @property
     def processor(self) -> str:
@@ -66,19 +66,16 @@ def folders(given: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     for folder in given:
         if not folder.is_dir():
             raise UserError(f"{folder}: no such folder; expected a report, or a folder of reports")
-        inside = [folder]
-        if not _is_report(folder):
-            inside = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-            without += [path for path in inside if not _is_report(path)]
-            inside = [path for path in inside if _is_report(path)]
-            if links := [path for path in inside if path.is_symlink()]:
-                raise UserError(f"{links[0]}: a link; expected a folder, or name the report itself")
-        if not inside:
+        below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+        reports = [folder] if _is_report(folder) else [path for path in below if _is_report(path)]
+        if links := [path for path in reports if path.is_symlink() and path != folder]:
+            raise UserError(f"{links[0]}: a link; expected a folder, or name the report itself")
+        if not reports:
             raise UserError(
                 f"{folder}: no report in it; expected {RECORDS} and {provenance.FILE}, here or a level below"
             )
-        for path in inside:
-            found.setdefault(path.resolve(), path)
+        without += [path for path in below if path not in reports and reports != [folder]]
+        found |= {path.resolve(): path for path in reports if path.resolve() not in found}
     return list(found.values()), without
 
 
@@ -90,29 +87,32 @@ def read(folder: Path, own: Path) -> Source:
     """Take in a folder. own: below it are own reports. UserError: what is wrong, and what would be right."""
     _check_file(folder / RECORDS)
     _check_file(folder / provenance.FILE)
-    known, text = _known(folder), records_text(folder / RECORDS)
-    raw = _raw(folder / RECORDS, text)
+    known, raw = _known(folder), _texts(folder / RECORDS)
     by = _whose(folder, known, own)
     checks.check_names(folder, raw)
-    frame = records_of(folder, text)
+    frame = records_of(folder, records_text(folder / RECORDS))
     checks.check_provenance(folder, known, strict=bool(by))
     checks.check_columns(folder, frame)
     checks.check_rows(folder, raw, frame)
-    measure = _measure(folder, frame)
-    nominal = frame[(frame["category"] == FLOOR) | frame["condition"].isin(_nominal(frame))].reset_index(drop=True)
-    if (nominal["category"] == FLOOR).all():
+    displays = frame.loc[(frame["condition"] == frame["display"]) & (frame["category"] != FLOOR), "condition"]
+    nominal = frame[(frame["category"] == FLOOR) | frame["condition"].isin(displays)].reset_index(drop=True)
+    if displays.empty:
         raise UserError(
             f"{folder / RECORDS}: no row of an unchanged display; expected rows whose condition is a display"
         )
-    checks.check_displays(folder, known, nominal, measure)
+    checks.check_displays(folder, known, nominal)
     headline, baseline = _tested(folder, nominal)
-    parameters = _parameters(folder)
-    results = Results(nominal, _layout(folder, parameters, nominal, measure, headline.key, baseline))
-    if measure != "error_budget":  # which is made of further scores than those that a site shows
+    results = Results(nominal, _layout(folder, nominal, headline.key, baseline))
+    if results.layout.measure != "error_budget":  # which is made of further scores than those that a site shows
         kept = {score.column for score in (headline, *results.beside)}
         results = replace(results, frame=nominal.drop(columns=[*{*score_columns(nominal)} - kept]))
-    changed = frame["condition"].nunique() - nominal["condition"].nunique()
-    return Source(folder, folder.resolve().name, by, results, measure, _panels(frame), known, parameters, changed)
+    return Source(folder, by, results, known, frame["condition"].nunique() - nominal["condition"].nunique())
+
+
+def text_of(path: Path) -> str:
+    """The text of a file of a folder; empty where there is none, or a link, or too large a one."""
+    is_readable = path.is_file() and not path.is_symlink() and path.stat().st_size <= MOST_FILE
+    return path.read_text(encoding="utf-8", errors="replace") if is_readable else ""
 
 
 def _check_file(path: Path) -> None:
@@ -131,18 +131,14 @@ def _known(folder: Path) -> dict[str, Any]:
     return known
 
 
-def _raw(path: Path, text: str) -> pd.DataFrame:
-    """Every cell of a file of numbers as text, under the names of the file, without the apostrophes before formulas."""
+def _texts(path: Path) -> pd.DataFrame:
+    """Every cell of a file of numbers as text, without the apostrophes before formulas."""
     try:
-        frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+        frame = pd.read_csv(io.StringIO(records_text(path)), dtype=str, keep_default_na=False)
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise UserError(f"{path}: not a table ({reason}); write it with 'holoeval report'") from None
-    if frame.empty:
-        raise UserError(f"{path}: no rows; write it with 'holoeval report'")
-    texts = [name for name in TEXTS if name in frame]
-    frame[texts] = frame[texts].replace(GUARDED, r"\1", regex=True)
-    return frame
+    return frame.replace(GUARDED, r"\1", regex=True)
 
 
 def _whose(folder: Path, known: Mapping[str, Any], own: Path) -> str:
@@ -160,49 +156,29 @@ def _whose(folder: Path, known: Mapping[str, Any], own: Path) -> str:
     return by
 
 
-def _measure(folder: Path, frame: pd.DataFrame) -> str:
-    """What was scored."""
-    found = sorted(set(frame["measure"]))
-    if len(found) > 1:
-        raise UserError(f"{folder / RECORDS}: measures {' and '.join(found)}; expected one study a folder")
-    return str(found[0])
-
-
-def _nominal(frame: pd.DataFrame) -> list[str]:
-    """The conditions that are displays as they were calibrated."""
-    own = frame[(frame["condition"] == frame["display"]) & (frame["category"] != FLOOR)]
-    return [str(name) for name in own["condition"].unique()]
-
-
 def _tested(folder: Path, frame: pd.DataFrame) -> tuple[Score, str | None]:
     """Score and baseline of the study's paired tests; without tests.csv the first score, and no baseline."""
     scores, path = [parse(name) for name in score_columns(frame)], folder / TESTS
-    first = next(score for score in scores if score.metric in METRICS)
-    if not path.exists():
-        return first, None
-    _check_file(path)
-    try:
-        tests = pd.read_csv(io.StringIO(records_text(path)), dtype=str, keep_default_na=False)
-        tests = tests.replace(GUARDED, r"\1", regex=True)
-        pairs = {(str(a), str(b)) for a, b in zip(tests["metric"], tests["baseline"], strict=True)}
-    except (ValueError, KeyError) as error:
-        raise UserError(f"{path}: not the table of tests ({error}); write it with 'holoeval report'") from None
+    tests = pd.DataFrame(columns=["metric", "baseline"])
+    if path.exists():
+        _check_file(path)
+        tests = _texts(path)
+    if not {"metric", "baseline"} <= set(tests):
+        raise UserError(f"{path}: not the table of tests; write it with 'holoeval report'")
+    pairs = set(zip(tests["metric"], tests["baseline"], strict=True))
     if not pairs:
-        return first, None
-    metric, baseline = sorted(pairs)[0]
+        return next(score for score in scores if score.metric in METRICS), None
+    metric, baseline = min(pairs)
     tested = next((score for score in scores if score.column == metric), None)
     if len(pairs) > 1 or tested is None or baseline not in set(frame["label"]):
         raise UserError(f"{path}: its metric or baseline is not in {RECORDS}; write both with 'holoeval report'")
-    return tested, baseline
+    return tested, str(baseline)
 
 
-def _layout(
-    folder: Path, parameters: Mapping[str, str], frame: pd.DataFrame, measure: str, headline: str, baseline: str | None
-) -> Layout:
+def _layout(folder: Path, frame: pd.DataFrame, headline: str, baseline: str | None) -> Layout:
     """What the tables need of the study, from its records alone."""
     shown = frame[frame["category"] != FLOOR]
     by_category = {name: frozenset(shown.loc[shown["category"] == name, "label"]) for name in CATEGORIES}
-    identities = [label for label, text in parameters.items() if _network(text) == "identity"]
     return Layout(
         title=folder.resolve().name,
         pairs=tuple(dict.fromkeys(zip(shown["label"], shown["condition"], strict=True))),
@@ -212,11 +188,22 @@ def _layout(
         privileged=by_category[ORACLE],
         trained=by_category[CALIBRATED],
         camera=by_category[ONLINE],
-        identities=frozenset(identities),
-        measure=measure,
+        identities=_identities(folder / TABLE),
+        measure=str(frame["measure"].iloc[0]),
         clusters=clusters_in(frame),
         study=folder.resolve().name,
     )
+
+
+def _identities(path: Path) -> frozenset[str]:
+    """Labels whose network is the identity, from table.csv, which folders of others may lack."""
+    if not path.exists():
+        return frozenset()
+    _check_file(path)
+    table = _texts(path)
+    if not {"label", "parameters"} <= set(table):
+        return frozenset()
+    return frozenset(str(row["label"]) for _, row in table.iterrows() if _network(row["parameters"]) == "identity")
 
 
 def _network(parameters: str) -> str:
@@ -224,21 +211,3 @@ def _network(parameters: str) -> str:
         return network_of(json.loads(parameters or "{}"))
     except ValueError:
         return ""
-
-
-def _panels(frame: pd.DataFrame) -> dict[str, str]:
-    rows = frame.drop_duplicates("display").dropna(subset=["panel_height_px", "panel_width_px"])
-    sides = zip(rows["display"], rows["panel_height_px"], rows["panel_width_px"], strict=True)
-    return {str(name): f"{height:.0f} x {width:.0f}" for name, height, width in sides}
-
-
-def _parameters(folder: Path) -> dict[str, str]:
-    """Parameters of every label as JSON, from table.csv, which folders of others may lack."""
-    path = folder / TABLE
-    if not path.exists():
-        return {}
-    _check_file(path)
-    table = _raw(path, records_text(path))
-    if not {"label", "parameters"} <= set(table):
-        return {}
-    return {str(label): str(text) for label, text in zip(table["label"], table["parameters"], strict=True)}

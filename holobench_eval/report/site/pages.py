@@ -4,43 +4,40 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from inspect import getdoc
-from pathlib import Path
 from typing import Any
 
 from ...core import plugins
-from ...display.simulated.profile import Profile, load_profile, names
+from ...display.simulated.profile import load_profile, names
 from ..answers.comparison import of_display
 from ..data import board as boards
 from ..data.phrases import verdict
 from ..data.statistics import Estimate
 from ..data.text import number
 from .html import slug
-from .intake import Source
-from .pictures import Picture
+from .intake import Source, text_of
+from .pictures import STAGES, Picture, figures, thumbnails
 
 BOARD = "board"  # the key of a provenance that says whether a study enters the pages of displays
-WIDTH, EDGE = 200, 6  # of a row's drawing
 FACTS = ("by", "package", "harness", "revision", "dirty", "command", "config_sha256", "python", "platform", "cpu",
          "gpu", "device", "threads", "workers", "started", "ended")  # fmt: skip
 
-Placed = tuple[str, Picture]  # path below the site
 Shown = dict[str, Any]  # the board of a display in a study
 
 
 @dataclass(frozen=True)
 class Study:
-    """A source with its pictures. slug: of its page; figures, thumbnails: with their paths; left: figures left out."""
+    """A source with its pictures. slug: of its page; sheets: of the stages of its displays; left: figures left out."""
 
     source: Source
     slug: str
-    figures: Sequence[Placed]
-    thumbnails: Sequence[Placed]
+    thumbnails: list[Picture]
+    figures: list[Picture]
+    sheets: list[Picture]
     left: int
-    sheets: Mapping[str, Placed] = field(default_factory=dict)
 
     @property
     def enters(self) -> bool:
@@ -55,72 +52,88 @@ class Study:
     @property
     def question(self) -> str:
         """What report.md of an own study asks; of others what they have named."""
-        text = "" if self.source.by else _text(self.source.folder / "board.json")
         try:
-            return str(json.loads(text)["question"]) if text else ""
+            return "" if self.source.by else str(json.loads(text_of(self.source.folder / "board.json"))["question"])
         except (ValueError, KeyError, TypeError, RecursionError):
             return ""
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """What the provenance says of it."""
+        known = self.source.known
+        return [(name, str(known[name])) for name in FACTS if known.get(name) not in (None, "")]
+
+    @property
+    def notes(self) -> str:
+        """What its page leaves out."""
+        changed = self.source.changed
+        notes = [f"{self.left} more figures are in its folder."] if self.left else []
+        return " ".join([*notes, *([f"{changed} conditions are changes of a display, and not shown."] * bool(changed))])
 
     @cached_property
     def boards(self) -> list[Shown]:
         """Of its displays."""
         whole = boards.board(self.source.results)
-        return [shown(self, whole, display) for display in whole.displays]
+        return [_shown(self, whole, display) for display in whole.displays]
 
 
-def shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
+def studies(sources: Sequence[Source]) -> list[Study]:
+    """The studies with their pictures; folders of one name are numbered."""
+    found: dict[str, Study] = {}
+    for source in sources:
+        name, count = slug(source.name), 1
+        while name in found:
+            count += 1
+            name = f"{slug(source.name)}-{count}"
+        found[name] = Study(source, name, thumbnails(source, name), *figures(source, name))
+    return list(found.values())
+
+
+def _shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
     """The board of a display in a study, as templates take it."""
     source, results, score = study.source, study.source.results, study.source.results.headline
-    profile, digest = _profile(source, display.name), _digest(source, display.name)
-    panel = source.panels.get(display.name, "")
     count, clusters = len(results.targets), len(set(results.clusters))
-    place, kind = _places(display), _kind(source, display.name)
-    other = ", ".join(filter(None, (kind if kind != "simulated" else "", digest[:8] or source.by or source.name)))
+    panels = results.frame.loc[results.frame["display"] == display.name, ["panel_height_px", "panel_width_px"]].dropna()
+    sides = [f", panel of {height:.0f} x {width:.0f} pixels" for height, width in panels.head(1).to_numpy()]
+    title, about = _identity(source, display.name)
+    drawn = [estimate for row in display.rows if (estimate := _drawn(row))]
+    ends = [0.0, *(end for estimate in drawn for end in (estimate.low, estimate.high))]
+    answers = [picture for picture in study.figures if picture.of == "answer-pictures"]
     return {
-        "name": display.name,
-        # another display or version than that of the package has the beginning of its digest, or its lab
-        "title": display.name if profile else f"{display.name} ({other})",
-        "about": profile.description
-        if profile
-        else "Another display, or another version of one, than in this package.",
-        "heading": f"{score.heading}{f', panel of {panel} pixels' if panel else ''}",
+        "title": title,
+        "about": about,
+        "heading": "".join([score.heading, *sides]),
         "score": score,
         "baseline": results.layout.baseline,
         "beside": whole.beside,
         "floor": "" if display.floor is None else f" A gray picture scores {score.with_unit(display.floor)}.",
         "counted": f"{count} targets{f' in {clusters} clusters' if clusters < count else ''}.",
-        "verdict": of_display(results, display) if source.measure == "picture" else "",
-        "zero": place(0.0),
+        "verdict": of_display(results, display) if results.layout.measure == "picture" else "",
+        "left": min(ends),  # of the drawings
+        "width": max(ends) - min(ends) or 1.0,
         "groups": [
-            {"name": boards.GROUPS[group], "rows": [_row(study, whole, row, place) for row in rows]}
+            {"name": boards.GROUPS[group], "rows": [_row(study, whole, row) for row in rows]}
             for group, rows in display.groups
         ],
-        "pictures": [
-            placed
-            for placed in study.figures
-            if display.name == results.conditions[0] and placed[1].of == "answer-pictures"
-        ],
-        "sheet": study.sheets.get(display.name),
+        "pictures": answers if display.name == results.conditions[0] else [],
+        "sheets": [picture for picture in study.sheets if picture.of == f"{STAGES}{display.name}"],
         "of": study,
     }
 
 
-def _digest(source: Source, name: str) -> str:
-    known = dict(source.known.get("profiles") or {}).get(name)
-    return str(known.get("sha256", "")) if isinstance(known, Mapping) else ""
+def _identity(source: Source, name: str) -> tuple[str, str]:
+    """Title and description of a display: those of the package, where it has one of this kind and digest.
 
-
-def _kind(source: Source, name: str) -> str:
-    """Simulated, real or learned, as its folder says."""
-    return str(dict(source.known.get("displays") or {}).get(name, "simulated"))
-
-
-def _profile(source: Source, name: str) -> Profile | None:
-    """That of the package, where a simulated display has its digest."""
-    if _kind(source, name) != "simulated" or name not in {*names(), *names(family=True)}:
-        return None
-    profile = load_profile(name)
-    return profile if profile.digest == _digest(source, name) else None
+    Another display or version has the beginning of its digest beside its name, or its lab.
+    """
+    kind = source.known.get("displays", {}).get(name, "simulated")
+    digest = source.known.get("profiles", {}).get(name, {}).get("sha256", "")
+    if kind == "simulated" and name in {*names(), *names(family=True)}:
+        profile = load_profile(name)
+        if profile.digest == digest:
+            return name, profile.description
+    other = ", ".join(filter(None, (kind if kind != "simulated" else "", digest[:8] or source.by or source.name)))
+    return f"{name} ({other})", "Another display, or another version of one, than in this package."
 
 
 def _drawn(row: boards.Row) -> Estimate | None:
@@ -128,16 +141,8 @@ def _drawn(row: boards.Row) -> Estimate | None:
     return row.test.estimate if row.test and math.isfinite(row.test.estimate.low) else None
 
 
-def _places(display: boards.Display) -> Callable[[float], float]:
-    """Where a difference stands in the drawings of a display [px]."""
-    found = [estimate for row in display.rows if (estimate := _drawn(row))]
-    ends = [0.0, *(end for estimate in found for end in (estimate.low, estimate.high))]
-    low, scale = min(ends), (WIDTH - 2 * EDGE) / (max(ends) - min(ends) or 1.0)
-    return lambda value: round(EDGE + (value - low) * scale, 2)
-
-
-def _row(study: Study, whole: boards.Board, row: boards.Row, place: Callable[[float], float]) -> dict[str, Any]:
-    results, test, drawn = study.source.results, row.test, _drawn(row)
+def _row(study: Study, whole: boards.Board, row: boards.Row) -> dict[str, Any]:
+    results, test = study.source.results, row.test
     score, total = results.headline, len(results.targets)
     lacks = [f"{row.scored} of {total} targets"] if row.scored < total else []
     found = verdict(score, test) if test else ""
@@ -148,18 +153,18 @@ def _row(study: Study, whole: boards.Board, row: boards.Row, place: Callable[[fl
         "score": score.number(row.score.mean),
         "difference": score.estimate(test.estimate, signed=True) if test else "",
         "verdict": found if found in ("better", "worse") else "same",
-        "mark": {end: place(getattr(drawn, end)) for end in ("low", "mean", "high")} if drawn else None,
+        "drawn": _drawn(row),
         "beside": [each.number(value) for each, value in zip(whole.beside, row.beside, strict=True)],
         "photographs": number(math.nan if row.photographs is None else row.photographs),
         "seconds": number(math.nan if row.seconds is None else row.seconds),
     }
 
 
-def places(studies: Sequence[Study], method: str) -> list[dict[str, Any]]:
+def places(found: Sequence[Study], method: str) -> list[dict[str, Any]]:
     """The rows of a method on every display of every study."""
     return [
         {**row, "display": shown["title"], "baseline": shown["baseline"], "of": study, "unit": shown["score"].unit}
-        for study in studies
+        for study in found
         for shown in study.boards
         for group in shown["groups"]
         for row in group["rows"]
@@ -175,32 +180,10 @@ def about(method: str) -> str:
     return " ".join((getdoc(plugins.find("methods", method)) or "").partition("\n\n")[0].replace("`", "").split())
 
 
-def facts(source: Source) -> list[tuple[str, str]]:
-    """What the provenance says of a study."""
-    return [(name, str(source.known[name])) for name in FACTS if source.known.get(name) not in (None, "")]
-
-
-def cards(studies: Sequence[Study]) -> dict[str, list[Shown]]:
+def cards(found: Sequence[Study]) -> dict[str, list[Shown]]:
     """The boards that enter, by the title of their display, own ones first."""
-    found: dict[str, list[Shown]] = {}
-    for study in sorted(studies, key=lambda study: bool(study.source.by)):
-        for shown in study.boards if study.enters else ():
-            found.setdefault(shown["title"], []).append(shown)
-    return found
-
-
-def _text(path: Path) -> str:
-    readable = path.is_file() and not path.is_symlink() and path.stat().st_size < 10_000_000
-    return path.read_text(encoding="utf-8", errors="replace") if readable else ""
-
-
-def slugs(sources: Sequence[Source]) -> list[str]:
-    """The name of each study's page; folders of one name are numbered."""
-    found: list[str] = []
-    for source in sources:
-        name, count = slug(source.name), 1
-        while name in found or name == "displays":
-            count += 1
-            name = f"{slug(source.name)}-{count}"
-        found.append(name)
-    return found
+    shown: dict[str, list[Shown]] = {}
+    for study in sorted(found, key=lambda study: bool(study.source.by)):
+        for each in study.boards if study.enters else ():
+            shown.setdefault(each["title"], []).append(each)
+    return shown

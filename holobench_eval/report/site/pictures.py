@@ -6,9 +6,8 @@ A picture written anew holds pixels and nothing else: no metadata, and nothing b
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from PIL import Image, UnidentifiedImageError
@@ -16,13 +15,13 @@ from PIL import Image, UnidentifiedImageError
 from ...core.errors import UserError
 from ..data.tables import DONE
 from ..markdown import FIGURE
+from ..page.html import plain
 from .html import slug
-from .intake import Source
+from .intake import MOST_FILE, Source, text_of
 
 FIGURES, THUMBNAILS = "figures", "thumbnails"
 SUFFIXES = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
 MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "CMYK")  # of 8 bits a channel
-MOST_FILE = 8_000_000  # bytes
 MOST_PIXELS = 40_000_000
 LONGEST_THUMBNAIL = 1024  # pixels
 MOST_THUMBNAILS = 400  # of a folder
@@ -31,15 +30,13 @@ ROOM = 1_200_000  # bytes of the figures of a study; the others stay in its fold
 ORDER = ("answer-*", "error-budget*", "quality-paired-*", "quality-*", "*")
 STAGES = "stages-"
 
-_MARKDOWN = re.compile(r"\\(?=[\\`*|~$_\]])|`")
-
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of the site. name: its file, below the folder of its study; caption: what it shows, as text; of: the
-    name of the method whose capture it is, or a figure's name in its folder."""
+    """A picture of the site. path: below the site; caption: what it shows, as text; of: the name of the method whose
+    capture it is, or a figure's name in its folder."""
 
-    name: str
+    path: str
     caption: str
     content: bytes
     width: int
@@ -47,8 +44,11 @@ class Picture:
     of: str
 
 
-def thumbnails(source: Source) -> list[Picture]:
-    """The captures that a folder shows: ``thumbnails/CELL.png``, CELL as in records.csv, captioned by its row."""
+def thumbnails(source: Source, study: str) -> list[Picture]:
+    """The captures that a folder shows: ``thumbnails/CELL.png``, CELL as in records.csv, captioned by its row.
+
+    study: the name of its page.
+    """
     folder = source.folder / THUMBNAILS
     files = list(_files(folder))
     if len(files) > MOST_THUMBNAILS:
@@ -63,31 +63,27 @@ def thumbnails(source: Source) -> list[Picture]:
                 f"{path}: no such cell; a thumbnail is named by the column 'cell' of a done row of records.csv"
             )
         caption = f"{row['label']} on {row['condition']}, {row['target']}"
-        taken = _picture(path, caption, LONGEST_THUMBNAIL, anew=True)
-        found.append(replace(taken, name=f"captures/{taken.name}", of=str(row["method"])))
+        found.append(_picture(path, f"{study}/captures", caption, str(row["method"]), LONGEST_THUMBNAIL, anew=True))
     return found
 
 
-def figures(source: Source) -> tuple[list[Picture], int]:
-    """The figures of a folder that fit ``ROOM``, without stage sheets, and how many there are."""
-    files = [path for path in _files(source.folder / FIGURES) if not path.name.startswith(STAGES)]
-    ordered = list(dict.fromkeys(path for pattern in ORDER for path in files if path.match(pattern)))
-    captions, taken, room = _captions(source.folder), list[Picture](), ROOM
-    for path in ordered:
+def figures(source: Source, study: str) -> tuple[list[Picture], list[Picture], int]:
+    """The figures of a folder that fit ``ROOM``, the stage sheets of its displays, and how many figures are left."""
+    files = list(_files(source.folder / FIGURES))
+    charts = [path for path in files if not path.name.startswith(STAGES)]
+    sheets = [path for path in files if path.name in {f"{STAGES}{name}.png" for name in source.results.conditions}]
+    texts = "\n".join(text_of(source.folder / name) for name in ("report.md", "details.md"))
+    captions = {name: plain(caption) for name, caption in FIGURE.findall(texts)}
+    taken, room = list[Path](), ROOM
+    for path in dict.fromkeys(path for pattern in ORDER for path in charts if path.match(pattern)):
         if path.stat().st_size <= room:
-            caption = captions.get(path.name, path.stem.replace("-", " "))
-            taken.append(_picture(path, caption, None, anew=bool(source.by)))
+            taken.append(path)
             room -= path.stat().st_size
-    return taken, len(files)
-
-
-def sheet(source: Source, display: str) -> Picture | None:
-    """The stage sheet of a display, where the folder has it."""
-    wanted = f"{STAGES}{display}.png"
-    path = next((path for path in _files(source.folder / FIGURES) if path.name == wanted), None)
-    if path is None:
-        return None
-    return _picture(path, f"Stages of the simulated bench {display}", None, anew=bool(source.by))
+    made = [
+        _picture(path, study, captions.get(path.name, path.stem.replace("-", " ")), path.stem, None, bool(source.by))
+        for path in (*taken, *sheets)
+    ]
+    return made[: len(taken)], made[len(taken) :], len(charts) - len(taken)
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -106,7 +102,7 @@ def _files(folder: Path) -> Iterator[Path]:
         yield path
 
 
-def _picture(path: Path, caption: str, longest: int | None, anew: bool) -> Picture:
+def _picture(path: Path, study: str, caption: str, of: str, longest: int | None, anew: bool) -> Picture:
     """A decoded picture. longest: of its sides [px]; anew: whether it is written again."""
     form = SUFFIXES[path.suffix.lower()]
     try:
@@ -121,7 +117,7 @@ def _picture(path: Path, caption: str, longest: int | None, anew: bool) -> Pictu
             content = _written(picture, form) if anew else path.read_bytes()
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise UserError(f"{path}: not a whole {form} ({error}); save it again") from None
-    return Picture(f"{slug(path.stem)}{path.suffix.lower()}", caption, content, width, height, path.stem)
+    return Picture(f"pictures/{study}/{slug(path.stem)}{path.suffix.lower()}", caption, content, width, height, of)
 
 
 def _written(picture: Image.Image, form: str) -> bytes:
@@ -130,14 +126,3 @@ def _written(picture: Image.Image, form: str) -> bytes:
     plain.info.clear()
     plain.save(text, format=form, **({"quality": 92} if form == "JPEG" else {"optimize": False}))
     return text.getvalue()
-
-
-def _captions(folder: Path) -> dict[str, str]:
-    """What report.md and details.md say below each figure, as plain text."""
-    paths = [folder / name for name in ("report.md", "details.md")]
-    texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths if _is_text(path)]
-    return {name: _MARKDOWN.sub("", caption) for name, caption in FIGURE.findall("\n".join(texts))}
-
-
-def _is_text(path: Path) -> bool:
-    return path.is_file() and not path.is_symlink() and path.stat().st_size <= MOST_FILE

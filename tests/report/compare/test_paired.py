@@ -115,7 +115,7 @@ def test_a_target_that_only_one_run_has_is_listed(tmp_path: Path) -> None:
 
 def test_the_targets_that_changed_most_come_first(tmp_path: Path) -> None:
     comparison = compared(tmp_path, {("m", "d"): BASE}, {("m", "d"): [20.0, 21.5, 19.0, 23.1]})
-    assert [(moved.target, moved.a, moved.b) for moved in comparison.moved(2)] == [("t2", 22, 19), ("t1", 21, 21.5)]
+    assert [moved[1:] for moved in comparison.moved(2)] == [("t2", 22, 19), ("t1", 21, 21.5)]
     assert len(comparison.moved(10)) == 3
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ class Reader:
         self.page.goto("about:blank")
         self.asked.clear()
         self.page.goto(f"{self.file.as_uri()}{view}")
-        self.page.wait_for_function("() => document.getElementById('canvas').getAttribute('aria-label')")
+        self.page.wait_for_function("() => document.getElementById('panes').getAttribute('aria-label')")
         return self
 
     def methods(self) -> list[str]:
@@ -40,9 +39,8 @@ class Reader:
         return list(map(str, found))
 
     def canvas(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
-        """The pixels of the viewer, ``(h, w, 4)``."""
-        address = self.page.evaluate("() => document.getElementById('canvas').toDataURL()")
-        return np.asarray(Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))))
+        """The pixels of the viewer as they are seen, ``(h, w, channels)``."""
+        return np.asarray(Image.open(io.BytesIO(self.page.locator("#panes").screenshot())))
 
     def view(self) -> str:
         self.page.wait_for_timeout(DELAY)

@@ -47,12 +47,12 @@ def test_a_heading_sorts_and_says_so(reader: Reader, written: Written) -> None:
     assert heading.locator("..").get_attribute("aria-sort") == "ascending"
 
 
-def test_a_filter_leaves_the_same_methods_in_the_table_and_in_the_plot(reader: Reader) -> None:
+def test_a_filter_leaves_methods_whose_name_or_group_has_its_words(reader: Reader) -> None:
     reader.page.fill("#filter", "calib")
     assert reader.methods() == []
     reader.page.fill("#filter", "double")
     assert reader.methods() == ["Double phase"]
-    assert reader.page.locator("#paired-plot .mean > *").count() == 1
+    assert "1 of 6 methods" in reader.page.inner_text("#table-note")
 
 
 def test_another_display_has_its_own_rows(reader: Reader, written: Written) -> None:
@@ -71,11 +71,13 @@ def test_a_row_opens_to_its_targets_and_leads_to_a_picture(reader: Reader) -> No
     assert reader.page.locator("table.targets").count() == 0
 
 
-def test_a_mean_in_the_plot_is_reached_and_read_out_by_keys(reader: Reader, written: Written) -> None:
-    mark = reader.page.locator("#paired-plot .mean > *").first
-    mark.focus()
-    row = next(row for row in written.data["rows"]["leto-aged"] if row["method"] == "Oracle")
-    assert row["cells"]["gain"]["text"] in reader.page.inner_text("#paired-plot .readout")
+def test_a_difference_is_drawn_between_the_ends_of_its_interval(reader: Reader) -> None:
+    marks = reader.page.locator("#rows span.forest")
+    ends = "['zero', 'low', 'mean', 'high'].map(name => parseFloat(one.style.getPropertyValue(`--${name}`)))"
+    places = marks.evaluate_all(f"all => all.map(one => {ends})")
+    assert len(places) == 4
+    assert all(0 <= low <= mean <= high <= 100 for _, low, mean, high in places)
+    assert len({zero for zero, *_ in places}) == 1
 
 
 def test_the_slider_uncovers_the_other_picture_pixel_for_pixel(reader: Reader) -> None:
@@ -104,7 +106,7 @@ def test_the_strip_has_the_target_and_the_methods_of_the_filter_and_a_click_comp
 
 
 def test_arrow_keys_move_the_slider(reader: Reader) -> None:
-    reader.page.focus("#canvas")
+    reader.page.focus("#panes")
     reader.page.keyboard.press("ArrowRight")
     assert reader.page.input_value("#split") == "52"
     reader.page.focus("#split")
@@ -114,7 +116,7 @@ def test_arrow_keys_move_the_slider(reader: Reader) -> None:
 
 def test_a_zoomed_picture_shows_stored_pixels_as_squares(reader: Reader) -> None:
     reader.page.select_option("#mode", "side")
-    reader.page.focus("#canvas")
+    reader.page.focus("#panes")
     for _ in range(3):
         reader.page.keyboard.press("+")
     half = reader.canvas().shape[1] // 2
@@ -164,8 +166,8 @@ def test_pointing_at_a_pixel_tells_the_stored_levels(reader: Reader, written: Wr
 
     from holobench_eval.study.store import Store
 
-    box = reader.page.locator("#canvas").bounding_box()
-    reader.page.locator("#canvas").hover(position={"x": box["width"] / 2 + 1, "y": box["height"] / 4 + 1})
+    box = reader.page.locator("#panes").bounding_box()
+    reader.page.locator("#panes").hover(position={"x": box["width"] / 2 + 1, "y": box["height"] / 4 + 1})
     levels = ", ".join(map(str, imread(Store(written.folder).target_thumbnail("astronaut"))[12, 24]))
     assert f"Column 24, row 12: Target {levels};" in reader.page.inner_text("#pixel")
 
@@ -181,12 +183,12 @@ def test_a_link_leads_to_the_same_view(reader: Reader) -> None:
     page.select_option("#values", "linear")
     page.click("#closer")
     view, methods = reader.view(), reader.methods()
-    shown = page.evaluate("() => document.getElementById('canvas').getAttribute('aria-label')")
+    shown = page.evaluate("() => document.getElementById('panes').getAttribute('aria-label')")
     before = reader.canvas()
     reader.open(view)
     page.wait_for_timeout(300)
     assert reader.methods() == methods
-    assert page.evaluate("() => document.getElementById('canvas').getAttribute('aria-label')") == shown
+    assert page.evaluate("() => document.getElementById('panes').getAttribute('aria-label')") == shown
     np.testing.assert_array_equal(reader.canvas(), before)
 
 
@@ -202,28 +204,6 @@ def test_a_link_within_the_page_keeps_the_view(reader: Reader) -> None:
     assert "display=ideal" in reader.view()
 
 
-@pytest.mark.parametrize(
-    ("button", "expected"), [("latex", "\\toprule"), ("markdown", "| --- |"), ("csv", "psnr_linear")]
-)
-def test_the_table_is_copied_as_text(reader: Reader, button: str, expected: str) -> None:
-    reader.page.click(f"#copy-{button}")
-    text = reader.page.input_value("#copied-text")
-    assert expected in text
-    line = next(line for line in text.splitlines() if "cmd" in line)
-    assert {"latex": "\\& `\\_*", "markdown": "&lt;/script>", "csv": '"\'=cmd|""</script>'}[button] in line
-    reader.page.keyboard.press("Escape")
-    assert not reader.page.evaluate("() => document.getElementById('copied').open")
-
-
-def test_copied_numbers_are_those_of_the_page(reader: Reader, written: Written) -> None:
-    reader.page.click("#copy-csv")
-    header, *lines = (line.split(",") for line in reader.page.input_value("#copied-text").splitlines())
-    row = next(row for row in written.data["rows"]["leto-aged"] if row["method"] == "HIL")
-    copied = dict(zip(header, next(line for line in lines if line[0] == "HIL"), strict=True))
-    assert float(copied["psnr_linear"]) == row["cells"]["psnr_linear"]["value"]
-    assert float(copied["psnr_linear_lo"]) == row["cells"]["psnr_linear"]["low"]
-
-
 def test_every_control_is_reached_by_tab_and_has_a_name(reader: Reader) -> None:
     reader.page.focus("a.skip")
     reached, last = set(), ""
@@ -231,15 +211,28 @@ def test_every_control_is_reached_by_tab_and_has_a_name(reader: Reader) -> None:
         reader.page.keyboard.press("Tab")
         last = reader.page.evaluate("() => document.activeElement.id || document.activeElement.textContent")
         reached.add(last)
-    wanted = {"display", "filter", "copy-latex", "target", "left", "right", "mode", "canvas", "split", "enlarge"}
+    wanted = {"display", "filter", "target", "left", "right", "mode", "panes", "split", "enlarge"}
     assert wanted <= reached
 
 
-def test_the_window_is_filled_and_left_by_escape(reader: Reader) -> None:
-    reader.page.click("#enlarge")
-    assert reader.page.evaluate("() => document.getElementById('stage').clientWidth") == 1000
-    reader.page.keyboard.press("Escape")
-    assert reader.page.evaluate("() => document.getElementById('stage').clientWidth") < 1000
+def test_the_pictures_take_the_whole_screen_and_give_it_back(reader: Reader) -> None:
+    for expected in ("stage", None):
+        reader.page.click("#enlarge")
+        reader.page.wait_for_function("id => (document.fullscreenElement?.id ?? null) === id", arg=expected)
+
+
+def test_in_alternation_one_side_is_seen_at_a_time_with_its_caption(browser: Any, written: Written) -> None:
+    page = browser.new_page(viewport={"width": 1000, "height": 800})
+    reader = Reader(page, written.folder / "report.html").open("#mode=flicker&right=capture%3AHIL")
+    hidden = """time => {
+        document.getAnimations().forEach(one => { one.pause(); one.currentTime = time; });
+        const parts = ['.pane:last-child', '#caption-left', '#caption-right'];
+        return parts.map(part => getComputedStyle(document.querySelector(part)).visibility);
+    }"""
+    assert page.evaluate(hidden, 100) == ["visible", "hidden", "visible"]
+    assert page.evaluate(hidden, 700) == ["hidden", "visible", "hidden"]
+    assert not reader.wrong
+    page.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -26,7 +26,6 @@ def test_every_number_of_the_table_is_that_of_table_csv(written: Written) -> Non
     for condition, found in written.data["rows"].items():
         for row in found:
             expected = rows.pop((row["method"], condition))
-            assert row["n"] == int(expected["n"])
             for key, cell in row["cells"].items():
                 score = parse(key)
                 if score.column in expected:
@@ -39,7 +38,7 @@ def test_every_number_of_the_table_is_that_of_table_csv(written: Written) -> Non
 
 
 def test_the_value_of_every_target_is_that_of_records_csv(written: Written) -> None:
-    names = [target["name"] for target in written.data["targets"]]
+    names = written.data["targets"]
     compared = 0
     for row in table(written, "records.csv"):
         if row["condition"] in written.data["values"]:
@@ -61,7 +60,7 @@ def test_means_and_differences_are_those_of_the_board(written: Written) -> None:
 
 
 def test_a_method_that_lacks_a_target_has_no_difference(written: Written) -> None:
-    rows = {row["method"]: row for row in written.data["rows"]["leto-aged"] if row["failed"]}
+    rows = {row["method"]: row for row in written.data["rows"]["leto-aged"] if "3 of 4 targets" in row["marked"]}
     assert len(rows) == 1
     assert all("gain" not in row["cells"] for row in rows.values())
 

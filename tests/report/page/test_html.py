@@ -7,13 +7,11 @@ import hashlib
 import json
 import re
 from html.parser import HTMLParser
-from importlib.resources import files
-from pathlib import Path
 
 import pytest
 
 from holobench_eval.report import Description, Results, read_records
-from holobench_eval.report.markdown import table
+from holobench_eval.report.markdown import Markdown, table
 from holobench_eval.report.page import html
 from holobench_eval.report.page.html import BOTTOM, MOST_BYTES, TOP, json_text
 from holobench_eval.report.section import Report, Section
@@ -21,7 +19,7 @@ from holobench_eval.report.sections import sections
 
 from .conftest import HOSTILE, TITLE, Written
 
-VENDOR = Path(str(files("holobench_eval.report.page") / "vendor"))
+MORE = Markdown("[5 more](details.md#limits)")
 
 
 class Elements(HTMLParser):
@@ -59,13 +57,13 @@ def test_names_from_files_open_no_element(written: Written, elements: Elements) 
     assert not [attributes for _, attributes in elements.found if any(name.startswith("on") for name in attributes)]
     assert "alert(" in written.text
     running = [text for attributes, text in elements.scripts if "type" not in attributes]
-    assert len(running) == len(html.VENDORED) + len(html.SCRIPTS)
+    assert len(running) == len(html.SCRIPTS)
     assert not [text for text in running if "alert(" in text]
 
 
 def test_a_name_is_the_same_text_in_the_data(written: Written) -> None:
     assert HOSTILE in written.data["methods"]
-    assert written.data["study"] == TITLE
+    assert written.data["displays"] == ["leto-aged", "ideal"]
 
 
 @pytest.mark.parametrize("text", ["</script>", "<!--", "a & b", "\u2028\u2029", "]]>"])
@@ -96,13 +94,6 @@ def test_the_policy_names_the_hash_of_every_script_and_of_the_style(written: Wri
         assert f"'sha256-{digest}'" in policy
 
 
-def test_vendored_files_are_those_that_the_readme_lists() -> None:
-    listed = dict(re.findall(r"^\| `(\S+?)` .*\| (\w{64}) \|$", (VENDOR / "README.md").read_text(), re.MULTILINE))
-    assert set(listed) == set(html.VENDORED)
-    for name, digest in listed.items():
-        assert hashlib.sha256((VENDOR / name).read_bytes()).hexdigest() == digest
-
-
 def test_the_page_begins_with_sections_that_exist(written: Written) -> None:
     assert {section.name for section in sections()} >= {TOP, BOTTOM}
     assert "<h2>Answer</h2>" in written.text
@@ -112,7 +103,9 @@ def test_a_page_stays_below_its_size(written: Written) -> None:
     assert (written.folder / "report.html").stat().st_size < MOST_BYTES
 
 
-def test_tables_at_the_top_have_no_style_of_their_own(written: Written, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_at_the_top_have_no_style_of_their_own_and_links_are_texts(
+    written: Written, monkeypatch: pytest.MonkeyPatch
+) -> None:
     report = Report(
         Results(read_records((written.folder / "records.csv").read_text()), written.layout),
         [],
@@ -120,9 +113,10 @@ def test_tables_at_the_top_have_no_style_of_their_own(written: Written, monkeypa
         {},
         Description(),
     )
-    section = Section(TOP, 1, lambda report, figures: [table(["method", "dB"], [["<b>|", "1.0"]])])
+    section = Section(TOP, 1, lambda report, figures: [table(["method", "dB"], [["<b>|", "1.0"]]), MORE])
     monkeypatch.setattr(html, "sections", lambda: [section])
     text = html.section_html(report, TOP)
     assert '<td class="number">1.0</td>' in text
     assert "&lt;b&gt;|" in text
+    assert "<p>5 more (details.md)</p>" in text
     assert "style" not in text

@@ -124,7 +124,7 @@ def test_a_board_has_methods_in_groups_best_first_with_letters_and_differences(s
     places = [page.index(text) for text in order]
     assert places == sorted(places)
     assert "GS, 3 of 4 targets" in page
-    assert "<circle cx=" in page
+    assert '<path class="mean"' in page
     assert "4 targets." in page
     assert "Study <a" in page
 

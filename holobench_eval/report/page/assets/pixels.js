@@ -3,12 +3,13 @@
 const decoded = new Map(); // number of a picture: a promise of its ImageData
 const MOST_DECODED = 24;
 
+const targetIndex = () => data.targets.indexOf(state.target);
+
 /** The number of a picture in this page, or null; option: "truth", or a kind and a method, "capture:METHOD". */
-function pictureOf(option, target) {
-  const index = data.targets.findIndex((item) => item.name === target);
-  if (option === "truth") return data.pictures.targets[state.display]?.[index] ?? null;
-  const label = option.slice(option.indexOf(":") + 1);
-  return data.pictures.cells[state.display]?.[label]?.[index] ?? null;
+function pictureOf(option, target = state.target) {
+  const { targets, cells } = data.pictures;
+  const numbers = option === "truth" ? targets[state.display] : cells[state.display]?.[option.slice(option.indexOf(":") + 1)];
+  return numbers?.[data.targets.indexOf(target)] ?? null;
 }
 
 /** The pixels of a picture as they are stored. */
@@ -22,11 +23,18 @@ function pixelsOf(number) {
 
 async function decode(base64) {
   const bytes = Uint8Array.from(atob(base64), (char) => char.charCodeAt(0));
-  const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }), { colorSpaceConversion: "none" });
-  const canvas = element("canvas", { width: String(bitmap.width), height: String(bitmap.height) });
-  const context = canvas.getContext("2d", { willReadFrequently: true });
+  const bitmap = await createImageBitmap(new Blob([bytes]), { colorSpaceConversion: "none" });
+  const context = element("canvas", { width: bitmap.width, height: bitmap.height }).getContext("2d", { willReadFrequently: true });
   context.drawImage(bitmap, 0, 0);
   return context.getImageData(0, 0, bitmap.width, bitmap.height);
+}
+
+/** Show an image on a canvas, pixel for pixel; nothing where there is none. */
+function put(canvas, image) {
+  canvas.hidden = !image;
+  if (!image) return;
+  [canvas.width, canvas.height] = [image.width, image.height];
+  canvas.getContext("2d").putImageData(image, 0, 0);
 }
 
 // IEC 61966-2-1: sRGB value to linear light
@@ -38,42 +46,30 @@ const LINEAR = Float32Array.from({ length: 256 }, (_, level) => {
 /** A stored level in [0, 255] as the value in [0, 1] that is looked at. */
 const valueOf = (level) => (state.values === "linear" ? LINEAR[level] : level / 255);
 
+/** The colours that are looked at: all, or one of them. */
+const colours = () => (state.channel === "all" ? [0, 1, 2] : [Number(state.channel)]);
+
 /** The picture as it is seen: one colour in gray, and linear light in levels of its own. */
 function seen(pixels) {
   const made = new ImageData(pixels.width, pixels.height);
-  const one = state.channel === "all" ? null : Number(state.channel);
+  const shown = colours();
   for (let at = 0; at < pixels.data.length; at += 4) {
-    for (let c = 0; c < 3; c++) {
-      const level = pixels.data[at + (one ?? c)];
-      made.data[at + c] = state.values === "linear" ? Math.round(255 * LINEAR[level]) : level;
-    }
+    for (let c = 0; c < 3; c++) made.data[at + c] = Math.round(255 * valueOf(pixels.data[at + shown[c % shown.length]]));
     made.data[at + 3] = 255;
   }
   return made;
 }
 
-/** Absolute difference at a pixel in the values looked at: of one colour, or the mean over all. */
-function errorAt(capture, truth, at) {
-  if (state.channel !== "all") {
-    const one = at + Number(state.channel);
-    return Math.abs(valueOf(capture.data[one]) - valueOf(truth.data[one]));
-  }
-  let sum = 0;
-  for (let c = 0; c < 3; c++) sum += Math.abs(valueOf(capture.data[at + c]) - valueOf(truth.data[at + c]));
-  return sum / 3;
+/** Absolute difference at every pixel in the values looked at: of one colour, or the mean over all. */
+function absoluteErrors(capture, truth) {
+  const shown = colours();
+  const difference = (at) => Math.abs(valueOf(capture.data[at]) - valueOf(truth.data[at]));
+  return Float64Array.from({ length: truth.width * truth.height }, (_, index) => sum(shown.map((c) => difference(4 * index + c))) / shown.length);
 }
-
-const MAGMA = Array.from({ length: 256 }, (_, index) => d3.rgb(d3.interpolateMagma(index / 255)));
 
 /** An error map `(width * height)`, magma from 0 to `most`. */
 function coloured(errors, width, height, most) {
   const made = new ImageData(width, height);
-  errors.forEach((error, index) => {
-    const colour = MAGMA[Math.min(255, Math.round((255 * error) / most))];
-    made.data.set([colour.r, colour.g, colour.b, 255], 4 * index);
-  });
+  errors.forEach((error, index) => made.data.set([...data.magma[Math.min(255, Math.round((255 * error) / most))], 255], 4 * index));
   return made;
 }
-
-/** The absolute error of a capture at every pixel; both pictures have one size. */
-const absoluteErrors = (capture, truth) => Float64Array.from({ length: truth.width * truth.height }, (_, index) => errorAt(capture, truth, 4 * index));

@@ -8,7 +8,7 @@ const DEFAULTS = {
   open: "", // the method whose targets are listed
   target: data.pictures.first,
   left: "truth",
-  right: "", // "capture:METHOD" or "error:METHOD"; empty: the best method that has a picture
+  right: "", // "capture:METHOD", "error:METHOD" or "flip:METHOD"; empty: the best method that has a picture
   mode: "slider",
   split: "50", // [%] of the width
   zoom: "", // screen pixels a pixel; empty: the whole picture
@@ -18,80 +18,67 @@ const DEFAULTS = {
   channel: "all",
   scale: "0.5", // errors from 0 to here have colours of their own
 };
+const CONTROLS = ["display", "filter", "target", "mode", "values", "channel", "scale", "split"]; // with the value of the view
+const LISTS = { open: Object.keys(data.methods), order: ["best", "worst"], sort: ["method", ...data.columns.map(({ key }) => key)] };
+const ADDRESS_DELAY = 200; // ms
 
 let state = { ...DEFAULTS };
 const listeners = [];
-const ADDRESS_DELAY = 200; // ms
 let addressTimer = 0;
 
-/** Call `listener(changed)` now and at every change; `changed` is a set of names. */
-function watch(listener) {
-  listeners.push(listener);
-  listener(new Set(Object.keys(DEFAULTS)));
+/** Call `listener()` now, and whenever one of the names changes. */
+function watch(names, listener) {
+  listeners.push({ names, listener });
+  listener();
 }
 
 /** Change what is shown, and the address with it. */
 function update(changes) {
-  const changed = new Set(Object.keys(changes).filter((key) => state[key] !== String(changes[key])));
-  if (!changed.size) return;
+  const changed = Object.keys(changes).filter((key) => state[key] !== String(changes[key]));
+  if (!changed.length) return;
   for (const key of changed) state[key] = String(changes[key]);
   clearTimeout(addressTimer); // browsers refuse an address that changes at every move of a pointer
-  addressTimer = setTimeout(() => history.replaceState(null, "", `#${link()}`), ADDRESS_DELAY);
-  for (const listener of listeners) listener(changed);
+  addressTimer = setTimeout(writeAddress, ADDRESS_DELAY);
+  for (const { names, listener } of listeners) if (names.some((name) => changed.includes(name))) listener();
 }
 
-/** The part of the address that stands for this view. */
-function link() {
+function writeAddress() {
   const chosen = Object.entries(state).filter(([key, value]) => value !== DEFAULTS[key]);
-  return new URLSearchParams(chosen).toString();
+  history.replaceState(null, "", `#${new URLSearchParams(chosen)}`);
 }
 
 /** Take the view from the address; what it does not name, or names wrongly, is as at the start. */
 function readAddress() {
-  const found = new URLSearchParams(location.hash.slice(1));
-  const known = [...found].filter(([key, value]) => key in DEFAULTS && isPossible(key, value));
-  return known.length || !location.hash || location.hash.includes("=") ? { ...DEFAULTS, ...Object.fromEntries(known) } : null;
+  const named = [...new URLSearchParams(location.hash.slice(1))];
+  return { ...DEFAULTS, ...Object.fromEntries(named.filter(([key, value]) => Object.hasOwn(DEFAULTS, key) && isPossible(key, value))) };
 }
 
 function isPossible(key, value) {
-  const choices = {
-    display: [...data.displays, ...data.changed],
-    target: data.targets.map((target) => target.name),
-    open: Object.keys(data.methods),
-    order: ["best", "worst"],
-    sort: ["method", ...data.columns.map((column) => column.key)],
-    mode: ["slider", "side", "flicker"],
-    values: ["srgb", "linear"],
-    channel: ["all", "0", "1", "2"],
-  };
-  if (key in choices) return choices[key].includes(value);
-  if (["split", "zoom", "x", "y", "scale"].includes(key)) return value !== "" && Number.isFinite(Number(value));
-  return true;
+  if (["split", "zoom", "x", "y"].includes(key)) return value !== "" && Number.isFinite(Number(value));
+  const choices = LISTS[key] ?? (CONTROLS.includes(key) && byId(key).options && [...byId(key).options].map((option) => option.value));
+  return !choices || choices.includes(value);
 }
 
-state = readAddress() ?? state;
+state = readAddress();
 window.addEventListener("hashchange", () => {
-  const wanted = readAddress();
-  if (wanted) update(wanted);
-  else if (link()) history.replaceState(null, "", `#${link()}`); // a link within the page keeps the view
+  if (location.hash.includes("=")) update(readAddress());
+  else writeAddress(); // a link within the page keeps the view
 });
+for (const key of CONTROLS) byId(key).addEventListener("input", (event) => update({ [key]: event.target.value }));
+watch(CONTROLS, () => CONTROLS.forEach((key) => (byId(key).value = state[key])));
 
 /** The rows of the display that pass the filter, sorted. */
 function shownRows() {
-  const words = state.filter.toLowerCase().split(/\s+/).filter(Boolean);
-  const rows = (data.rows[state.display] ?? []).filter((row) => {
-    const method = data.methods[row.method];
-    const text = `${row.marked} ${method.registered} ${method.group}`.toLowerCase();
+  const words = state.filter.toLowerCase().split(/\s+/);
+  const rows = data.rows[state.display].filter((row) => {
+    const { registered, group } = data.methods[row.method];
+    const text = `${row.marked} ${registered} ${group}`.toLowerCase();
     return words.every((word) => text.includes(word));
   });
   if (!state.sort) return rows;
-  const column = data.columns.find((item) => item.key === state.sort);
-  const sign = (state.order === "best" ? 1 : -1) * (column && column.higher ? -1 : 1);
-  if (!column) return rows.slice().sort((a, b) => sign * a.marked.localeCompare(b.marked, "en"));
-  const value = (row) => row.cells[column.key]?.value ?? null;
-  return rows.slice().sort((a, b) => {
-    const [first, second] = [value(a), value(b)];
-    if (first === null || second === null) return (first === null) - (second === null); // holes stay below
-    return sign * (first - second);
-  });
+  const column = data.columns.find(({ key }) => key === state.sort);
+  const sign = (state.order === "best" ? 1 : -1) * (column?.higher ? -1 : 1);
+  if (!column) return rows.sort((a, b) => sign * a.marked.localeCompare(b.marked, "en"));
+  const value = (row) => row.cells[column.key]?.value ?? sign * Infinity; // holes stay below
+  return rows.sort((a, b) => (value(a) === value(b) ? 0 : sign * (value(a) - value(b))));
 }
