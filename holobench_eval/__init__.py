@@ -4,21 +4,13 @@ From Python: ``open_display``, ``open_bench``, ``score``, ``picture``, ``compare
 ``load_records``, see ``interactive``.
 """
 
+# ruff: noqa: F403, F405 (the list below says which names there are)
 from typing import TYPE_CHECKING, Any
 
 from .core.installed import __version__
 
 if TYPE_CHECKING:
-    from .interactive import (
-        OpenDisplay,
-        compare,
-        load_records,
-        open_bench,
-        open_display,
-        picture,
-        save_levels,
-        score,
-    )
+    from .interactive import *
 
 __all__ = [
     "OpenDisplay",

@@ -137,8 +137,7 @@ def _either(what: str, found: str | None, otherwise: str, remedy: str, state: St
 
 def _python() -> Iterator[Finding]:
     text = f"{platform.python_version()} ({sys.executable}), {platform.system()} {platform.machine()}"
-    recent = sys.version_info >= (3, 11)
-    yield Finding("Python", "ok" if recent else "missing", text, "" if recent else "Python 3.11 or newer", core=True)
+    yield Finding("Python", "ok", text, core=True)
 
 
 def _packages() -> Iterator[Finding]:

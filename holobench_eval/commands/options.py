@@ -80,6 +80,17 @@ def output_folder(study: Study, output: Path | None) -> Path:
     return folder
 
 
+def planned(config: Path, output: Path | None) -> tuple[Study, Path, Plan]:
+    """A study as it was run into its folder, that folder, and the plan."""
+    from ..study import provenance
+    from ..study.changes import recorded
+    from ..study.config import load_study
+    from ..study.plan import plan
+
+    study = load_study(config, recorded(provenance.read(output)) if output else None)
+    return study, output_folder(study, output), plan(study)
+
+
 def thread_count(threads: int | None, workers: int, study: Study) -> int:
     """Torch threads of a worker: as asked for, else one, or all for a single worker on large panels."""
     import torch

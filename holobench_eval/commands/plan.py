@@ -15,22 +15,7 @@ from rich.table import Table
 
 from ..core.errors import listed
 from ..core.panels import is_small
-from .options import (
-    ARTIFACTS,
-    Config,
-    Device,
-    Learned,
-    Limit,
-    Methods,
-    Output,
-    Targets,
-    Threads,
-    Values,
-    changes_of,
-    learned_folder,
-    output_folder,
-    thread_count,
-)
+from . import options
 from .output import console as open_console
 
 if TYPE_CHECKING:
@@ -44,15 +29,15 @@ LOOK: dict[str, Any] = {"box": box.SIMPLE_HEAD, "padding": 0, "show_edge": False
 
 
 def plan(
-    config: Config,
-    output: Output = None,
-    methods: Methods = None,
-    targets: Targets = None,
-    limit: Limit = None,
-    values: Values = None,
-    threads: Threads = None,
-    device: Device = "auto",
-    artifacts: Learned = ARTIFACTS,
+    config: options.Config,
+    output: options.Output = None,
+    methods: options.Methods = None,
+    targets: options.Targets = None,
+    limit: options.Limit = None,
+    values: options.Values = None,
+    threads: options.Threads = None,
+    device: options.Device = "auto",
+    artifacts: options.Learned = options.ARTIFACTS,
 ) -> None:
     """Show what a study would compute, and what of it is done; compute nothing."""
     from ..core.device import find, gpu_name, gpus
@@ -63,11 +48,11 @@ def plan(
     from ..study.store import Store
 
     console = open_console()
-    study = load_study(config, changes_of(methods, targets, limit, values))
-    folder = output_folder(study, output)
+    study = load_study(config, options.changes_of(methods, targets, limit, values))
+    folder = options.output_folder(study, output)
     workers = executor("auto", None, is_small(study.display.panel), gpus=gpus(device)).workers
-    grid, many = plan_cells(study), thread_count(threads, workers, study)
-    artifacts = learned_folder(artifacts, grid)
+    grid, many = plan_cells(study), options.thread_count(threads, workers, study)
+    artifacts = options.learned_folder(artifacts, grid)
     networks = Artifacts(artifacts).networks(grid.preparations().values())
     rows = preview(study, grid, Store(folder), many, workers, gpu_name(find(device)), networks)
     console.print(table(study, rows))

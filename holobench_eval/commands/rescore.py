@@ -8,7 +8,7 @@ import typer
 
 from ..core.errors import UserError, suggest
 from ..core.panels import is_small
-from .options import ARTIFACTS, Config, Output, Threads, output_folder, thread_count
+from .options import ARTIFACTS, Config, Output, Threads, planned, thread_count
 from .output import console as open_console
 from .output import write_report
 
@@ -17,18 +17,13 @@ Metrics = Annotated[list[str] | None, typer.Option("--metric", metavar="NAME", h
 
 def rescore(config: Config, output: Output = None, metric: Metrics = None, threads: Threads = None) -> None:
     """Score kept captures by the metrics that their records lack. Nothing is solved, and no photograph is taken."""
-    from ..study import executors, provenance
-    from ..study.changes import recorded
-    from ..study.config import load_study
-    from ..study.plan import plan
+    from ..study import executors
     from ..study.progress import watching
     from ..study.run import run as compute
     from ..study.store import Store
 
     console = open_console()
-    changes = recorded(provenance.read(output)) if output else None
-    study = load_study(config, changes)
-    folder, grid = output_folder(study, output), plan(study)
+    study, folder, grid = planned(config, output)
     if not Store(folder).folder.is_dir():
         raise UserError(f"{folder} has no captures; holoeval run {config} takes them")
     for name in metric or ():

@@ -25,24 +25,7 @@ from ..core.errors import UserError, one_line
 from ..core.files import read_regular
 from ..core.panels import is_small
 from ..core.yaml_source import LARGEST_BYTES
-from .options import (
-    ARTIFACTS,
-    RESULTS,
-    RETRAIN,
-    Config,
-    Device,
-    Learned,
-    Limit,
-    Methods,
-    Output,
-    Targets,
-    Threads,
-    Values,
-    changes_of,
-    learned_folder,
-    output_folder,
-    thread_count,
-)
+from . import options
 from .output import console as open_console
 from .output import write_report
 
@@ -55,29 +38,29 @@ INTERRUPTED = 130
 
 
 def run(
-    config: Config,
-    output: Output = None,
-    methods: Methods = None,
-    targets: Targets = None,
-    limit: Limit = None,
-    values: Values = None,
+    config: options.Config,
+    output: options.Output = None,
+    methods: options.Methods = None,
+    targets: options.Targets = None,
+    limit: options.Limit = None,
+    values: options.Values = None,
     executor: Annotated[
         str, typer.Option(help="Where to compute: serial, local (worker processes), slurm, address, or auto.")
     ] = "auto",
     workers: Annotated[int | None, typer.Option(help="Worker processes of the local executor, or SLURM jobs.")] = None,
-    threads: Threads = None,
+    threads: options.Threads = None,
     address: Annotated[str | None, typer.Option(help="Of a running Dask scheduler, for --executor address.")] = None,
-    device: Device = "auto",
+    device: options.Device = "auto",
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cells again.")] = False,
-    retrain: Annotated[bool, RETRAIN] = False,
+    retrain: Annotated[bool, options.RETRAIN] = False,
     train: Annotated[bool, typer.Option("--train/--no-train", help="Train what is not trained, or refuse it.")] = True,
-    artifacts: Learned = ARTIFACTS,
+    artifacts: options.Learned = options.ARTIFACTS,
 ) -> None:
     """Compute what is missing of a study and write its report. A stopped run goes on with the same command.
 
     With --methods, --targets, --limit or --set, a part or a variant of the study is run, and its report says so.
     """
-    changes = changes_of(methods, targets, limit, values)
+    changes = options.changes_of(methods, targets, limit, values)
     with _resumable():
         if changes or retrain or retry_failed or not _is_finished(config, output):
             from ..study.executors import begin
@@ -94,20 +77,20 @@ def run(
         device, where = _where(study, device, executor, workers, address)
         if study.display.real:
             open_displays(study)
-        folder, grid = output_folder(study, output), plan(study)
-        artifacts = learned_folder(artifacts, grid)
+        folder, grid = options.output_folder(study, output), plan(study)
+        artifacts = options.learned_folder(artifacts, grid)
         if word := replaced(study, folder):
             console.print(word, markup=False, highlight=False, soft_wrap=True)
-        many = thread_count(threads, where.workers, study)
-        options: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": device}
+        many = options.thread_count(threads, where.workers, study)
+        how: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": device}
         drawings = sheets(study, folder)
         beside = drawings if where.workers > 1 else []
         if where.workers > 1:  # meanwhile this process only waits
             Thread(target=import_module, args=("holobench_eval.report",), daemon=True).start()
         with watching(console) as watch:
-            outcome = compute(study, grid, folder, where, watch, many, artifacts, drawings=beside, **options)
+            outcome = compute(study, grid, folder, where, watch, many, artifacts, drawings=beside, **how)
         keep_training_records(grid, Artifacts(artifacts), folder)
-        draw_sheets(drawings, thread_count(threads, 1, study))
+        draw_sheets(drawings, options.thread_count(threads, 1, study))
         write_report(console, study, outcome.records, folder, outcome.provenance)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
@@ -127,7 +110,7 @@ def _panel(config: Path) -> tuple[int, int] | None:
 def _is_finished(config: Path, output: Path | None) -> bool:
     """Whether the last run of a config, as it stands, ended: there is probably nothing to compute."""
     try:
-        known = (output or RESULTS / config.stem) / "provenance.json"
+        known = (output or options.RESULTS / config.stem) / "provenance.json"
         described = json.loads(read_regular(known, 2 * LARGEST_BYTES))
         text = hashlib.sha256(read_regular(config, LARGEST_BYTES)).hexdigest()
         return bool(described["ended"] and described["config_sha256"] == text)
@@ -216,7 +199,7 @@ class Sheet:
 def sheets(study: Study, output: Path) -> list[Sheet]:
     """The sheet of every display of a study that has stages, of many the first; learned and real ones have none."""
     from ..display import load_profile
-    from ..report.data.over_displays import FEWEST_DISPLAYS
+    from ..report.data.causes import FEWEST_DISPLAYS
     from ..study.displays import condition
 
     panel, folder, profiles = study.display.panel, study.folder, study.display.profiles

@@ -233,18 +233,19 @@ class _Ground:
     def cell(self, phase: Mapping[str, Any], shown_on: Condition | None, display: Condition, **further: Any) -> Cell:
         """A cell; ``display``: gives the size of the scored region, also of a floor image that needs no display."""
         study = self.study
-        given: dict[str, Any] = {
-            "dataset": study.targets.dataset,
-            "dataset_params": study.targets.params,
-            "profile": display.name,
-            "profile_version": display.version,
-            "panel": display.spec.shape,
-            "seed": study.seed,
-            "protocol": study.protocol.version,
-            "exposure": study.display.exposure,
-            "measure": study.measure,
-        }
-        return Cell(phase, shown_on, **(given | further))
+        return Cell(
+            phase,
+            shown_on,
+            dataset=study.targets.dataset,
+            dataset_params=study.targets.params,
+            profile=display.name,
+            profile_version=display.version,
+            panel=display.spec.shape,
+            seed=study.seed,
+            protocol=study.protocol.version,
+            measure=study.measure,
+            **further,
+        )
 
     def solutions(self, entry: MethodEntry, entry_displays: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
@@ -252,11 +253,23 @@ class _Ground:
         read = read_files.of(entry, study.folder, cls, (name for name, _ in targets))
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
-            own = preparation(study, entry.name, entry.params, conditions[0].nominal)
+            first = conditions[0].nominal if study.measure == "focus" else conditions[0]
+            own = preparation(study, entry.name, entry.params, first.nominal)
             for repeat in range(study.repeats):
                 cells = (
                     self.cell(
-                        self._phase(cls, entry, showing, target, repeat, own, read[target[0]]),
+                        self._phase(
+                            cls,
+                            entry.params,
+                            showing[0][0],
+                            first,
+                            repeat,
+                            learned=own.id if own else "",
+                            files=read[target[0]],
+                            planes=self._planes(cls, showing, first),
+                            captures=entry.captures,
+                            predicts=self._holograms(first, target, repeat).get("phase"),
+                        ),
                         display,
                         display,
                         method=entry.name,
@@ -264,7 +277,7 @@ class _Ground:
                         params=entry.params,
                         target=target[0],
                         target_sha256=target[1],
-                        condition=self._condition(display),
+                        condition=display.name if study.measure == "focus" else display.title,  # planes share a row
                         repeat=repeat,
                         prepared=_ids(own, display.learned),
                         captures=entry.captures,
@@ -277,50 +290,33 @@ class _Ground:
                 yield Task(entry.label, tuple(cells), conditions, own)
 
     def _phase(
-        self,
-        cls: type[Any],
-        entry: MethodEntry,
-        showing: Showing,
-        target: Target,
-        repeat: int,
-        own: Preparation | None,
-        files: Mapping[str, str],
+        self, cls: type[Any], params: Mapping[str, Any], target: Target, display: Condition, repeat: int, **further: Any
     ) -> dict[str, Any]:
-        """The description of the phase of a solution: that of its first target and display, or of a whole stack."""
-        first = showing[0][1] if self.study.measure != "focus" else showing[0][1].nominal
-        traits = traits_of(cls)
-        many = self.study.measure == "focus" and traits.planes
-        named, sha256 = showing[0][0] if many else target
-        changes = {sha256: dict([at.change] if at.change else []) for (_, sha256), at in showing if many}
+        """The description of a method's phase of a target on a display. further: see ``identity.phase``."""
         return identity.phase(
             method_version(cls),
-            entry.params,
-            self.source | {"sha256": sha256},
-            first.spec,
-            (self.study.seed, named, repeat),
-            learned=own.id if own else "",
-            files=files,
-            planes=[[sha256, offset(first, change)] for sha256, change in changes.items()],
-            display=identity.seen(first) if traits.sees else {},
-            captures=entry.captures,
-            predicts=self._holograms(first, target, repeat).get("phase"),
+            params,
+            self.source | {"sha256": target[1]},
+            display.spec,
+            (self.study.seed, target[0], repeat),
+            display=identity.seen(display) if traits_of(cls).sees else {},
+            **further,
         )
+
+    def _planes(self, cls: type[Any], showing: Showing, display: Condition) -> list[list[Any]]:
+        """The targets of a phase for a whole stack, each with its distance from the plane of the display."""
+        if self.study.measure != "focus" or not traits_of(cls).planes:
+            return []
+        changes = {sha256: dict([at.change] if at.change else []) for (_, sha256), at in showing}
+        return [[sha256, offset(display, change)] for sha256, change in changes.items()]
 
     def _holograms(self, display: Condition, target: Target, repeat: int) -> dict[str, Any]:
         """The method whose captures are predicted, and the description of its phase; empty for pictures."""
-        study, probe = self.study, self.study.holograms
-        if not study.predicts:
+        probe = self.study.holograms
+        if not self.study.predicts:
             return {}
         cls, files = type(self.probe), read_files.digests(self.probe, target[0])
-        phase = identity.phase(
-            method_version(cls),
-            probe.params,
-            self.source | {"sha256": target[1]},
-            display.spec,
-            (study.seed, target[0], repeat),
-            files=files,
-            display=identity.seen(display) if traits_of(cls).sees else {},
-        )
+        phase = self._phase(cls, probe.params, target, display, repeat, files=files)
         return {"name": probe.name, "params": probe.params, "code": method_version(cls), "files": files, "phase": phase}
 
     def _showings(self, cls: type[Any], entry_displays: list[Condition], targets: list[Target]) -> Iterator[Showing]:
@@ -333,10 +329,6 @@ class _Ground:
                 yield from showings(cls, group, targets, self.planes)
             else:
                 yield from ([(target, display) for display in group] for target in targets)
-
-    def _condition(self, display: Condition) -> str:
-        """The name of a display in tables; the planes of a focal stack share a row."""
-        return display.name if self.study.measure == "focus" else display.title
 
     def floor(self, display: Condition, condition: str, target: Target, wrong: Target) -> Task:
         """The references of a target; ``wrong``: the target whose picture is scored as the wrong one."""
@@ -362,6 +354,7 @@ class _Ground:
                 target_sha256=target[1],
                 condition=condition,
                 repeat=0,
+                exposure=study.display.exposure,
                 prepared=_ids(display.learned),
                 holograms=holograms | ({"wrong": self._holograms(display, wrong, 0)} if own and holograms else {}),
             )

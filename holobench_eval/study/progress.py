@@ -12,9 +12,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TaskID, TextColumn
-from rich.progress import Task as RichTask
-from rich.text import Text
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
 from .artifacts import read_log
 from .plan import Task
@@ -129,7 +127,7 @@ class Lines:
         if now - self.last >= SECONDS_BETWEEN_LINES:
             self.last = now
             training = len(self.follower.folders)
-            left = f", {self.time_left()} left" if self.time_left() else ""
+            left = f", {self.time_left} left" if self.time_left else ""
             left += f" besides the {training} in training" * bool(left and training)
             self.write(f"{self.done}/{self.total} cells, {self.failures} failed{left}; now {_name(task)}")
 
@@ -141,6 +139,7 @@ class Lines:
                 self.failures += 1
                 self.say(f"failed: {record.label} · {record.condition} · {record.target}: {record.reason}", True)
 
+    @property
     def time_left(self) -> str:
         """The time left in words; empty where nothing is known, also where less than a second is a lower limit."""
         seconds, is_whole = self.seconds_left(), self.is_whole()
@@ -163,6 +162,11 @@ class Bar(Lines):
 
     progress: Progress = field(kw_only=True)
     bar: TaskID = field(default=TaskID(0), kw_only=True)
+
+    @property
+    def failed(self) -> str:
+        """The number of failures in words; empty for none."""
+        return f"{self.failures} failed" * bool(self.failures)
 
     def planned(self, cells: int, missing: int, floors: int) -> None:
         """Set the bar to the number of missing cells."""
@@ -205,17 +209,6 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 99.5 * 60 else f"{seconds / 3600:.1f} h"
 
 
-class _OfWatch(ProgressColumn):
-    """What the watch of a bar says, of the time left or of failures."""
-
-    def __init__(self, text: Callable[[Lines], Text]) -> None:
-        super().__init__()
-        self.text = text
-
-    def render(self, task: RichTask) -> Text:
-        return self.text(task.fields["watch"])
-
-
 @contextmanager
 def watching(console: Console) -> Iterator[Lines]:
     """The watch that suits a console."""
@@ -230,8 +223,8 @@ def watching(console: Console) -> Iterator[Lines]:
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        _OfWatch(lambda watch: Text(watch.time_left(), style="progress.remaining")),
-        _OfWatch(lambda watch: Text(f"{watch.failures} failed" * bool(watch.failures), style="red")),
+        TextColumn("{task.fields[watch].time_left}", style="progress.remaining"),
+        TextColumn("{task.fields[watch].failed}", style="red"),
     )
     with Progress(*columns, console=console) as progress:
         yield Bar(write, progress=progress)

@@ -110,36 +110,27 @@ def run(
     UserError
         The folder is in use by another run, or holds a damaged record.
     """
-    store, phases = Store(output), phases_of(output, study.folder)
+    store, learned = Store(output), Artifacts(artifacts)
     with store.locked():
         if retrain:
             refuse_unscored(study)
             refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
-            forget(plan, store, phases, Artifacts(artifacts))
-        timed = cost.timed(study, plan)
+            forget(plan, store, phases_of(output, study.folder), learned)
         metrics = {name: plan.metrics[name] for name in rescore or plan.metrics}
-        networks = Artifacts(artifacts).networks(plan.preparations().values())
-        states = store.states(plan.cells, timed, metrics, study.folder, networks)
-        again = ("missing", "untimed", *(("failed",) if retry_failed else ()))
-        missing = frozenset(name for name, state in states.items() if state in again and not rescore)
-        missing, outdated = starts.affected(plan, missing, states, phases)
-        unscored = {cell.id: cell for cell in plan.cells if states[cell.id] == "unscored" and cell.id not in missing}
-        scorable = frozenset(
-            name for name, cell in unscored.items() if _is_scorable(cell, store, phases, metrics, not rescore)
-        )
-        if missing or scorable:
+        left = _left(study, plan, store, learned, metrics, retry_failed, solves=not rescore)
+        if left.wanted:
             refuse_unscored(study)
-        refuse_unavailable(plan, missing, study.folder)
+        refuse_unavailable(plan, left.missing, study.folder)
         if not trains:
-            refuse_untrained(plan, missing, Artifacts(artifacts))
-        store.remove(outdated)  # at once, so that a run that is killed does not take them for new
-        watch.planned(len(plan.cells), len(missing | scorable), plan.floors)
+            refuse_untrained(plan, left.missing, learned)
+        store.remove(left.outdated)  # at once, so that a run that is killed does not take them for new
+        watch.planned(len(plan.cells), len(left.wanted), plan.floors)
         described = provenance.read(output)
-        if missing or described.get("config_sha256") != provenance.text_digest(study.text):
+        if left.missing or described.get("config_sha256") != provenance.text_digest(study.text):
             gpu = gpu_name(find(device)) if isinstance(executor, Serial | Local) else ""  # else it is another machine's
             described = provenance.describe(study, plan, output, threads, executor.workers, device, gpu)
-            described = provenance.begin(output, described, resumed=len(missing) < len(plan.cells))
-        elif scorable:
+            described = provenance.begin(output, described, resumed=len(left.missing) < len(plan.cells))
+        elif left.scorable:
             described = provenance.restate(output, study, plan)
         setting = Setting(
             output=output,
@@ -154,14 +145,54 @@ def run(
             isolation=study.isolation,
             limits=study.limits,
         )
-        solved = 0
-        if missing or scorable:  # else no worker need be started
-            solved = _compute(plan, missing, scorable, timed, setting, executor, watch, drawings)
+        # With nothing to do no worker need be started.
+        solved = _compute(plan, left, setting, executor, watch, drawings) if left.wanted else 0
         if described.get("ended") is None:
             described = provenance.end(output, described)
-        left = store.states(tuple(unscored.values()), metrics=metrics, folder=study.folder)
-        rescored = sum(state != "unscored" for state in left.values())
-        return Outcome(store.load(plan), described, len(missing), solved, rescored, len(unscored) - rescored)
+        states = store.states(tuple(left.unscored.values()), metrics=metrics, folder=study.folder)
+        rescored = sum(state != "unscored" for state in states.values())
+        return Outcome(store.load(plan), described, len(left.missing), solved, rescored, len(states) - rescored)
+
+
+@dataclass(frozen=True)
+class _Left:
+    """The cells of a plan that are left, by id.
+
+    missing: to be computed; outdated: whose records hold no longer; unscored: captured, and lacking a score alone;
+    scorable: those of them that can be scored again; timed: to be solved with nothing beside it.
+    """
+
+    missing: frozenset[str]
+    outdated: frozenset[str]
+    unscored: Mapping[str, Cell]
+    scorable: frozenset[str]
+    timed: frozenset[str]
+
+    @property
+    def wanted(self) -> frozenset[str]:
+        """Those that a run can do something about."""
+        return self.missing | self.scorable
+
+
+def _left(
+    study: Study,
+    plan: Plan,
+    store: Store,
+    artifacts: Artifacts,
+    metrics: Mapping[str, str],
+    retry_failed: bool,
+    solves: bool,
+) -> _Left:
+    """What is left of a plan. metrics: versions of those that are wanted; solves: whether anything may be solved."""
+    phases, timed = phases_of(store.output, study.folder), cost.timed(study, plan)
+    networks = artifacts.networks(plan.preparations().values())
+    states = store.states(plan.cells, timed, metrics, study.folder, networks)
+    again = ("missing", "untimed", *(("failed",) if retry_failed else ()))
+    missing = frozenset(name for name, state in states.items() if state in again and solves)
+    missing, outdated = starts.affected(plan, missing, states, phases)
+    unscored = {cell.id: cell for cell in plan.cells if states[cell.id] == "unscored" and cell.id not in missing}
+    scorable = (name for name, cell in unscored.items() if _is_scorable(cell, store, phases, metrics, solves))
+    return _Left(missing, outdated, unscored, frozenset(scorable), timed)
 
 
 def _is_scorable(cell: Cell, store: Store, phases: Phases, metrics: Mapping[str, str], solves: bool) -> bool:
@@ -180,35 +211,25 @@ def _is_scorable(cell: Cell, store: Store, phases: Phases, metrics: Mapping[str,
 
 
 def _compute(
-    plan: Plan,
-    missing: frozenset[str],
-    unscored: frozenset[str],
-    timed: frozenset[str],
-    setting: Setting,
-    executor: Executor,
-    watch: Lines,
-    drawings: Sequence[Drawing],
+    plan: Plan, left: _Left, setting: Setting, executor: Executor, watch: Lines, drawings: Sequence[Drawing]
 ) -> int:
-    """Train what the missing cells still need, then compute and score; the cells of ``timed`` run alone.
-
-    Returns the number of phases that were solved.
-    """
+    """Train what the missing cells still need, then compute and score. Returns how many phases were solved."""
     artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
-    untrained = _untrained(plan, missing, artifacts)
+    untrained = _untrained(plan, left.missing, artifacts)
     if untrained:
         names = [(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained]
         anew = {preparation.name: artifacts.outdated(preparation) for preparation in untrained}
         watch.training(names, [f"{name} is trained anew: {reason}" for name, reason in anew.items() if reason])
     trainings = [TrainingJob(preparation, setting) for preparation in untrained]
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
-    jobs = list(_jobs(plan, missing, unscored, timed, single, setting))
+    jobs = list(_jobs(plan, left, single, setting))
     if single:  # one of each method first, so that the time left is known soon
         first = {job.task.label: job for job in reversed(jobs)}
         jobs.sort(key=lambda job: first[job.task.label] is not job)
     known = _known(jobs) if isinstance(executor, Serial | Local) else {}  # else other machines compute
     remaining = Remaining(((job.kind, job.alone) for job in jobs), known, executor.workers)
     watch.expects(remaining.seconds, remaining.is_whole)
-    queue = Queue(trainings, jobs, missing, drawings)
+    queue = Queue(trainings, jobs, left.missing, drawings)
     results: Iterator[tuple[Step, Result | Exception]] = executor.map(step, _watched(queue, remaining, watch))
     solved = 0
     for job, result in results:
@@ -224,9 +245,8 @@ def _compute(
             remaining.ends(id(job))
             records = result if isinstance(result, list) else _lost(job, _error(result), store)
             _refuse_unseen(records, store)
-            solved += any(
-                not record.reused and record.seconds is not None for record in records if record.id in missing
-            )
+            own = [record for record in records if record.id in left.missing]
+            solved += any(not record.reused and record.seconds is not None for record in own)
             watch.finished(records)
         else:
             queue.ends(job)
@@ -262,15 +282,13 @@ def _untrained(plan: Plan, missing: frozenset[str], artifacts: Artifacts) -> lis
     return waiting
 
 
-def _jobs(
-    plan: Plan, missing: frozenset[str], unscored: frozenset[str], timed: frozenset[str], single: bool, setting: Setting
-) -> Iterator[Job]:
-    """The tasks with cells to compute or to score; those of ``timed``, and of a ``single`` worker all, run alone."""
+def _jobs(plan: Plan, left: _Left, single: bool, setting: Setting) -> Iterator[Job]:
+    """The tasks with cells to compute or to score; those that are timed, and of a ``single`` worker all, run alone."""
     for task in plan.tasks:
         ids = frozenset(cell.id for cell in task.cells)
-        if wanted := ids & (missing | unscored):
-            is_timed = not timed.isdisjoint(ids & missing)
-            yield Job(task, wanted, setting, single or is_timed, is_timed, ids & unscored)
+        if wanted := ids & left.wanted:
+            is_timed = not left.timed.isdisjoint(ids & left.missing)
+            yield Job(task, wanted, setting, single or is_timed, is_timed, ids & left.scorable)
 
 
 def _known(jobs: Iterable[Job]) -> dict[Kind, float]:
@@ -330,7 +348,14 @@ def refuse_unavailable(plan: Plan, missing: frozenset[str], folder: Path) -> Non
     wanted = [task for task in plan.tasks if not (task.is_floor or missing.isdisjoint(cell.id for cell in task.cells))]
     used = {canonical(list(each)): each for task in wanted for each in _used(task.cells[0])}
     for name, params in used.values():
-        if reason := _reason(name, params, folder):
+        method = isolation.build(name, params, folder)
+        if "available" not in traits_of(method, name).functions:
+            continue
+        try:
+            reason = method.available()
+        except Exception as error:  # a stranger's code
+            reason = one_line(error)
+        if reason:
             raise UserError(f"method '{name}' cannot run here: {reason}")
 
 
@@ -346,14 +371,3 @@ def _used(cell: Cell) -> list[tuple[str, dict[str, Any]]]:
     """Names and parameters of a cell's method and of the one whose holograms it predicts."""
     used = [(cell.method, dict(cell.params))]
     return [*used, (cell.holograms["name"], dict(cell.holograms["params"]))] if cell.holograms else used
-
-
-def _reason(name: str, params: dict[str, Any], folder: Path) -> str | None:
-    method: Any = isolation.build(name, params, folder)
-    if "available" not in traits_of(method, name).functions:
-        return None
-    try:
-        reason: str | None = method.available()
-    except Exception as error:  # a stranger's code
-        return one_line(error)
-    return reason

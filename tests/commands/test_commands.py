@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.metadata import version
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
@@ -16,6 +17,7 @@ from holobench_eval import commands
 from holobench_eval.commands import main, options
 from holobench_eval.report.charts import sheet
 
+Call = Callable[..., tuple[int, str, str]]
 PLUGINS = """
 import hashlib
 from dataclasses import dataclass
@@ -76,46 +78,42 @@ def holoeval(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 
 
 @pytest.mark.parametrize("by", ["numpy", "torch"])
-def test_memory_that_is_used_up_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], by: str
-) -> None:
+def test_memory_that_is_used_up_is_one_line(monkeypatch: pytest.MonkeyPatch, call: Call, by: str) -> None:
     def full() -> None:
         np.empty(2**60, np.uint8) if by == "numpy" else torch.empty(2**60, dtype=torch.uint8)
 
     monkeypatch.setattr("holobench_eval.commands.app", full)
-    assert holoeval(monkeypatch, "list") == 2
-    assert (
-        capsys.readouterr().err == "holoeval: out of memory; what is finished is kept, run the same command with more\n"
-    )
+    line = "holoeval: out of memory; what is finished is kept, run the same command with more\n"
+    assert call("list") == (2, "", line)
 
 
 def test_a_plan_without_a_folder_of_trained_methods_says_where_a_clone_has_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call
 ) -> None:
+    def is_said(method: str) -> bool:
+        code, printed, _ = call("plan", "table3", "--methods", method)
+        assert code == 0
+        return "A clone of the repository has what the shipped studies need in its folder artifacts" in printed
+
     monkeypatch.chdir(tmp_path)
-    said = "A clone of the repository has what the shipped studies need in its folder artifacts"
-    assert holoeval(monkeypatch, "plan", "table3", "--methods", "hil") == 0
-    assert said not in capsys.readouterr().out  # these tests run in one
+    assert not is_said("hil")  # these tests run in one
     monkeypatch.setattr(options, "clone", lambda: None)
-    assert holoeval(monkeypatch, "plan", "table3", "--methods", "hil") == 0
-    assert said in capsys.readouterr().out
-    assert holoeval(monkeypatch, "plan", "table3", "--methods", "wirtinger") == 0
-    assert said not in capsys.readouterr().out
+    assert is_said("hil")
+    assert not is_said("wirtinger")
 
 
 @pytest.mark.slow
-def test_a_study_from_run_to_check(
-    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert holoeval(monkeypatch, "plan", config) == 0
+def test_a_study_from_run_to_check(config: Path, call: Call) -> None:
+    code, printed, _ = call("plan", config)
+    assert code == 0
     assert not Path("holoeval-results").exists()
-    assert "missing" in capsys.readouterr().out
+    assert "missing" in printed
 
-    assert holoeval(monkeypatch, "run", config, "--executor", "serial", "--threads", 1) == 1
-    shown = capsys.readouterr().out
-    assert "1 cell failed" in shown
-    assert "Flat" in shown
-    assert "1 failed (Blind on ideal): " in shown
+    code, printed, _ = call("run", config, "--executor", "serial", "--threads", 1)
+    assert code == 1
+    assert "1 cell failed" in printed
+    assert "Flat" in printed
+    assert "1 failed (Blind on ideal): " in printed
     assert Path("holoeval-results/toy/report.md").exists()
     tables = [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")]
     assert b"Blind,open loop,{},,,,,0,1," in tables[0]
@@ -123,22 +121,24 @@ def test_a_study_from_run_to_check(
     assert b"values that are NaN or infinite" in tables[1]
 
     shutil.rmtree("holoeval-results/toy/figures", ignore_errors=True)
-    assert holoeval(monkeypatch, "report", config) == 0
+    assert call("report", config)[0] == 0
     assert [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
 
-    assert holoeval(monkeypatch, "figure", config, "--for", "column", "--into", "printed") == 0
+    assert call("figure", config, "--for", "column", "--into", "printed")[0] == 0
     assert not Path("printed").exists()  # no method has a difference to draw
 
     another = config.with_name("another.yaml")
     another.write_text(f"{config.read_text()}\nseed: 99\n")
-    assert holoeval(monkeypatch, "report", another, "--output", "holoeval-results/toy") == 2
-    assert "no cell of this study has a record here" in capsys.readouterr().err
+    code, _, error = call("report", another, "--output", "holoeval-results/toy")
+    assert code == 2
+    assert "no cell of this study has a record here" in error
     assert [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")] == tables
 
-    assert holoeval(monkeypatch, "check", "holoeval-results") == 0
+    assert call("check", "holoeval-results")[0] == 0
     Path("holoeval-results/toy/table.csv").write_text("changed")
-    assert holoeval(monkeypatch, "check", "holoeval-results") == 1
-    assert "1 report, 1 problem" in capsys.readouterr().out
+    code, printed, _ = call("check", "holoeval-results")
+    assert code == 1
+    assert "1 report, 1 problem" in printed
 
 
 @pytest.mark.parametrize(
@@ -154,49 +154,33 @@ def test_a_study_from_run_to_check(
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(
-    config: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    arguments: tuple[str, ...],
-    message: str,
+    config: Path, call: Call, arguments: tuple[str, ...], message: str
 ) -> None:
-    assert holoeval(monkeypatch, *arguments) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
+    code, out, err = call(*arguments)
+    assert (code, out) == (2, "")
     assert err.startswith("holoeval: ")
     assert message in err
     assert err.count("\n") == 1
 
 
-def test_a_mistake_in_a_config_leaves_nothing_behind(
-    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mistake_in_a_config_leaves_nothing_behind(config: Path, call: Call) -> None:
     config.write_text(CONFIG.replace("panel", "pannel"))
-    assert holoeval(monkeypatch, "run", config) == 2
-    assert f"{config}:2:30: unknown key 'pannel' in display; did you mean 'panel'?" in capsys.readouterr().err
+    code, _, error = call("run", config)
+    assert code == 2
+    assert f"{config}:2:30: unknown key 'pannel' in display; did you mean 'panel'?" in error
     assert not Path("holoeval-results").exists()
 
 
 @pytest.mark.parametrize("option", ["--threads", "--workers"])
-def test_no_workers_and_no_threads_are_refused(config: Path, monkeypatch: pytest.MonkeyPatch, option: str) -> None:
-    assert holoeval(monkeypatch, "run", config, "--executor", "local", option, "0") == 2
+def test_no_workers_and_no_threads_are_refused(config: Path, call: Call, option: str) -> None:
+    assert call("run", config, "--executor", "local", option, "0")[0] == 2
 
 
-def test_everything_that_a_config_may_name_is_listed(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert holoeval(monkeypatch, "list") == 0
-    shown = capsys.readouterr().out
-    for word in ("wirtinger", "gerchberg_saxton", "photographs", "ideal", "ssim", "higher is better"):
-        assert word in shown
-
-
-def test_a_new_method_is_written_and_named(
-    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert holoeval(monkeypatch, "new-method", "quiet_phase", "--folder", "mine") == 0
-    assert "mine/quiet_phase.py:QuietPhase" in capsys.readouterr().out
-    assert holoeval(monkeypatch, "new-method", "quiet_phase", "--folder", "mine") == 2
+def test_a_new_method_is_written_and_named(config: Path, call: Call) -> None:
+    code, printed, _ = call("new-method", "quiet_phase", "--folder", "mine")
+    assert code == 0
+    assert "mine/quiet_phase.py:QuietPhase" in printed
+    assert call("new-method", "quiet_phase", "--folder", "mine")[0] == 2
 
 
 def test_a_new_command_is_one_file_and_one_line(tmp_path: Path) -> None:
@@ -220,12 +204,11 @@ def test_a_new_command_is_one_file_and_one_line(tmp_path: Path) -> None:
     assert output("greet-all") == "hello\n"
 
 
-def test_the_help_lists_commands_in_the_order_of_work_a_line_each(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_help_lists_commands_in_the_order_of_work_a_line_each(monkeypatch: pytest.MonkeyPatch, call: Call) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    assert holoeval(monkeypatch, "-h") == 0
-    lines = capsys.readouterr().out.partition("A study:\n")[2].splitlines()
+    code, printed, _ = call("-h")
+    assert code == 0
+    lines = printed.partition("A study:\n")[2].splitlines()
     entries = [line.split(maxsplit=1) for line in lines[:-1] if line.startswith("  ")]
     names = [words[0] for words in entries]
     assert names[:4] == ["configs", "list", "plan", "run"]
@@ -240,19 +223,15 @@ def every_command() -> list[str]:
 
 
 @pytest.mark.parametrize("command", [*every_command(), "session export"])
-def test_every_command_explains_itself(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    assert holoeval(monkeypatch, *command.split(), "-h") == 0
-    assert f"Usage: holoeval {command}" in capsys.readouterr().out
+def test_every_command_explains_itself(call: Call, command: str) -> None:
+    code, printed, _ = call(*command.split(), "-h")
+    assert code == 0
+    assert f"Usage: holoeval {command}" in printed
 
 
 @pytest.mark.parametrize("arguments", [(), ("run",), ("session", "export")])
-def test_the_version_is_that_of_the_package(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]
-) -> None:
-    assert holoeval(monkeypatch, *arguments, "--version") == 0
-    assert capsys.readouterr().out == f"holoeval {version('holobench_eval')}\n"
+def test_the_version_is_that_of_the_package(call: Call, arguments: tuple[str, ...]) -> None:
+    assert call(*arguments, "--version")[:2] == (0, f"holoeval {version('holobench_eval')}\n")
 
 
 def test_help_needs_no_heavy_import() -> None:
@@ -263,11 +242,12 @@ def test_help_needs_no_heavy_import() -> None:
 
 
 def test_a_display_is_shown_with_its_effects_and_what_the_parametric_model_lacks(
-    config: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    config: Path, monkeypatch: pytest.MonkeyPatch, call: Call
 ) -> None:
     monkeypatch.setattr(sheet, "draw_sheet", lambda *_: Path("stages.png"))
-    assert holoeval(monkeypatch, "show", "leto-dusty") == 0
-    shown = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if line.startswith("│")}
+    code, table, _ = call("show", "leto-dusty")
+    assert code == 0
+    shown = {line.split()[1]: line for line in table.splitlines() if line.startswith("│")}
     assert "has it" in shown["look_up_table"]
     assert "lacks it" in shown["plane_dust"]
 

@@ -8,9 +8,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
 from holobench_eval.commands.reports.check import problems_in
 from holobench_eval.commands.reports.report import report as write_again
 from holobench_eval.core.errors import UserError
@@ -40,9 +38,7 @@ def _one_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def rescored(*arguments: object) -> tuple[str, str]:
     """What the command says, and its error."""
-    done = CliRunner().invoke(app, ["rescore", *map(str, arguments)])
-    assert done.exit_code == 0 or isinstance(done.exception, UserError), (done.output, done.exception)
-    return done.output, str(done.exception or "")
+    return sessions.run("rescore", *arguments)
 
 
 @pytest.fixture

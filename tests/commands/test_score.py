@@ -309,16 +309,6 @@ def test_bad_input_is_one_line(tmp_path, spoil, line):
     assert "expected" in str(error.value) or "allowed" in str(error.value) or ";" in str(error.value)
 
 
-@pytest.mark.parametrize(("lit", "names"), [((1, 0, 0), ["red"]), ((0, 1, 1), ["green and blue"]), ((1, 1, 1), [])])
-def test_that_light_in_a_colour_which_the_target_lacks_is_an_error_is_noted(tmp_path, lit, names):
-    small = photograph("coffee", (48, 64))
-    save(tmp_path / "captures" / "m" / "coffee.png", small[:, ::-1])
-    save(tmp_path / "targets" / "coffee.png", small * np.array(lit)[:, None, None])
-    notes = read_folders(tmp_path / "captures", tmp_path / "targets").notes
-    said = "Scored in three colours, where light that the target has not is an error: coffee has light in {} alone."
-    assert list(notes) == [said.format(name) for name in names]
-
-
 def test_what_is_suspicious_is_noted(tmp_path):
     small = photograph("coffee", (48, 64))
     for place in ("captures/a/coffee.png", "captures/b/coffee.jpg", "targets/coffee.png", "targets/unseen.png"):
@@ -329,15 +319,6 @@ def test_what_is_suspicious_is_noted(tmp_path):
     assert "the capture is the target itself" in found.pairings["a", "coffee"].refused
     assert found.pairings["b", "coffee"].refused == ""
     assert "Without any capture: unseen" in notes
-
-
-def test_sixteen_bits_are_read_over_their_own_full_scale(tmp_path):
-    levels = (np.arange(48 * 64).reshape(48, 64) * 20).astype(np.uint16)
-    for place in ("captures/a/ramp.tif", "targets/ramp.png"):
-        (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
-        cv2.imwrite(str(tmp_path / place), levels)
-    picture = read_folders(tmp_path / "captures", tmp_path / "targets").captures["a", "ramp"]
-    assert picture.load() == pytest.approx(levels[None] / 65535, abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -8,10 +9,9 @@ import torch
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import run
+from holobench_eval.study.run import Outcome
+from tests.study.test_run import compute
 from tests.support.fake_study import solves, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
@@ -30,31 +30,26 @@ class Needy(Toy):
 '''
 
 
-def needy(tmp_path: Path) -> Callable[[], None]:
+def needy(tmp_path: Path) -> Callable[[], Outcome]:
     config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy"))
     plugins = tmp_path / "plugins.py"
     plugins.write_text(plugins.read_text() + NEEDY)
 
-    def compute() -> None:
-        study = load_study(config)
-        run(study, plan(study), tmp_path / "out", Serial(), Lines(lambda _: None), 1, tmp_path / "artifacts")
-
-    return compute
+    return partial(compute, config, tmp_path / "out")
 
 
 def test_a_method_that_cannot_run_here_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
-    compute = needy(tmp_path)
     with pytest.raises(UserError, match=r"^method 'plugins.py:Needy' cannot run here: no lens; buy one$"):
-        compute()
+        needy(tmp_path)()
     assert solves(tmp_path) == []
 
 
 def test_what_was_computed_needs_no_method_any_more(tmp_path: Path) -> None:
-    compute = needy(tmp_path)
+    run = needy(tmp_path)
     (tmp_path / "here").touch()
-    compute()
+    run()
     (tmp_path / "here").unlink()
-    compute()
+    run()
     assert len(solves(tmp_path)) == 6
 
 
@@ -65,8 +60,7 @@ def test_a_metric_without_its_weights_is_refused_by_a_run_and_not_by_reading_the
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path / "hub"))
     config = write_config(tmp_path)
     config.write_text(f"{config.read_text()}\n{asked}\n")
-    study = load_study(config)
-    assert plan(study).metrics["lpips_alex"] == "v2, 0.1"  # the same column on a machine that has the weights
+    assert plan(load_study(config)).metrics["lpips_alex"] == "v2, 0.1"  # as with the weights
     with pytest.raises(UserError, match="metric 'lpips_alex' cannot be computed here: no trunk weights"):
-        run(study, plan(study), tmp_path / "out", Serial(), Lines(lambda _: None), 1, tmp_path / "artifacts")
+        compute(config, tmp_path / "out")
     assert not solves(tmp_path)

@@ -8,10 +8,8 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import run
+from tests.study.test_run import compute
 from tests.support.fake_study import write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
@@ -91,9 +89,7 @@ def study_of(folder: Path, *methods: str) -> Path:
 
 
 def records(config: Path, output: Path) -> list[dict[str, Any]]:
-    study = load_study(config)
-    made = run(study, plan(study), output, Serial(), Lines(lambda line: None), threads=1, artifacts=output / "a")
-    return [record for record in made.records if record["cell"]["condition"] != "reference"]
+    return [record for record in compute(config, output).records if record["cell"]["condition"] != "reference"]
 
 
 def test_a_method_over_its_budget_is_stopped_and_its_best_hologram_so_far_is_scored(tmp_path: Path) -> None:
@@ -149,8 +145,3 @@ def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path: Path, met
     (tmp_path / "camera.py").write_text(METHODS)
     with pytest.raises(UserError, match=message):
         load_study(write_config(tmp_path, (f"{{name: {method}}}",), count=1))
-
-
-def test_one_method_with_the_same_budget_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="remove one"):
-        load_study(study_of(tmp_path, "Modest, captures: 2", "Modest, label: again, captures: 2"))

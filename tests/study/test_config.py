@@ -7,6 +7,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.changes import Changes
 from holobench_eval.study.config import load_study
+from tests.study.studies import assert_refused
 
 DATASETS = """
 from dataclasses import dataclass
@@ -159,11 +160,7 @@ CHANGES = [
 @pytest.mark.parametrize(("old", "new", "message"), CHANGES)
 def test_a_mistake_is_one_line_at_its_place(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in FULL
-    path = write(tmp_path, FULL.replace(old, new, 1))
-    with pytest.raises(UserError) as caught:
-        load_study(path)
-    assert str(caught.value).startswith(f"{path}:{message}")
-    assert "\n" not in str(caught.value)
+    assert_refused(write(tmp_path, FULL.replace(old, new, 1)), message)
 
 
 def test_one_method_twice_with_the_same_parameters_is_refused(tmp_path: Path) -> None:

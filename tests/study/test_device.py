@@ -17,6 +17,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial, executor
 from holobench_eval.study.executors.local import one_gpu
 from holobench_eval.study.plan import plan
+from tests.study.studies import write_study
 from tests.study.test_run import compute
 from tests.support import trained_study
 from tests.support.fake_study import write_config
@@ -112,19 +113,11 @@ def test_no_cell_and_no_artifact_depends_on_the_device(tmp_path: Path) -> None:
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
 @pytest.mark.slow
 def test_a_study_on_a_gpu_has_the_scores_of_the_cpu(tmp_path: Path) -> None:
-    from holobench_eval.study.progress import Lines
-    from holobench_eval.study.run import run
-
-    text = (
-        'title: "GPU"\ndisplay: {profiles: [leto-aged], panel: [192, 192]}\n'
-        "targets: {dataset: photographs, params: {count: 1}}\n"
-        "methods: [wirtinger, oracle, {name: online_camera, params: {captures: 40}}]\n"
-    )
-    (tmp_path / "study.yaml").write_text(text)
-    study, scores = load_study(tmp_path / "study.yaml"), {}
+    methods = ("wirtinger", "oracle", "{name: online_camera, params: {captures: 40}}")
+    config = write_study(tmp_path / "study.yaml", *methods, display="{profiles: [leto-aged], panel: [192, 192]}")
+    scores = {}
     for device in ("cpu", "cuda"):
-        watch, output = Lines(lambda line: None), tmp_path / device
-        outcome = run(study, plan(study), output, Serial(), watch, 1, tmp_path / "artifacts", device=device)
+        outcome = compute(config, tmp_path / device, device=device)
         assert outcome.failed == 0
         scores[device] = [record["scores"]["psnr_linear"] for record in outcome.records]
         assert outcome.provenance["device"] == device

@@ -14,18 +14,14 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import executors
 from holobench_eval.study import run as running
-from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Local, Serial, executor
-from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
+from tests.study import test_run
 from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 from tests.support.patience import PATIENCE
 
 
 def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:
-    study = load_study(config)
-    watch, artifacts = Lines(lambda line: None), output.parent / "artifacts"
-    return running.run(study, plan(study), output, chosen, watch, threads=1, artifacts=artifacts, **options).records
+    return test_run.compute(config, output, executor=chosen, **options).records
 
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -11,32 +11,16 @@ from PIL import Image
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import Plan, plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import run
+from tests.study.studies import TWO, write_study
+from tests.study.test_run import compute
 
-STUDY = """
-title: "Files"
-display: {profiles: [leto-aged], panel: [128, 128]}
-targets: {dataset: photographs, params: {count: 2}}
-protocol: {metrics: [psnr]}
-methods: [%s]
-save: {phases: true}
-"""
+IDEAL = "{profiles: [ideal], panel: [128, 128]}"
+AGED = "{profiles: [leto-aged], panel: [128, 128]}"
 
 
 def config(folder: Path, name: str, methods: str) -> Path:
-    path = folder / f"{name}.yaml"
-    path.write_text(STUDY % methods)
-    return path
-
-
-def compute(path: Path, output: Path, grid: Plan | None = None) -> list[dict[str, Any]]:
-    study, artifacts = load_study(path), output.parent / "artifacts"
-    return run(
-        study, grid or plan(study), output, Serial(), Lines(lambda line: None), threads=1, artifacts=artifacts
-    ).records
+    return write_study(folder / f"{name}.yaml", methods, display=AGED, targets=TWO, save="{phases: true}")
 
 
 def scores(records: list[dict[str, Any]], label: str) -> list[tuple[str, dict[str, float]]]:
@@ -45,11 +29,11 @@ def scores(records: list[dict[str, Any]], label: str) -> list[tuple[str, dict[st
 
 @pytest.mark.slow
 def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_path: Path) -> None:
-    made = compute(config(tmp_path, "made", "double_phase"), tmp_path / "made")
+    made = compute(config(tmp_path, "made", "double_phase"), tmp_path / "made").records
     saved = tmp_path / "made" / "phases" / "double_phase" / "leto-aged"
     read = f'{{name: phases, label: read, params: {{file: "{saved}/{{target}}.npy"}}}}'
     levels = f'{{name: phases, label: levels, params: {{file: "{saved}/{{target}}.png"}}}}'
-    again = compute(config(tmp_path, "read", f"{read}, {levels}"), tmp_path / "read")
+    again = compute(config(tmp_path, "read", f"{read}, {levels}"), tmp_path / "read").records
     assert scores(again, "read") == scores(made, "double_phase")
     assert scores(again, "levels") == scores(made, "double_phase")  # 8 bits are what this panel shows
     assert {record["seconds"] is None for record in again if record["label"] in ("read", "levels")} == {True}
@@ -92,19 +76,10 @@ def test_a_file_that_changed_after_planning_is_not_taken_for_the_planned_one(
     np.save(tmp_path / "all.npy", np.zeros((3, 128, 128)))
     grid = planned(path)
     np.save(tmp_path / "all.npy", np.ones((3, 128, 128)))
-    found = compute(path, tmp_path / "out", grid=grid)
+    found = compute(path, tmp_path / "out", grid=grid).records
     reasons = {record["reason"] for record in found if record["label"] == "phases"}
     assert len(reasons) == 1
     assert "has changed since the study was planned" in reasons.pop()
-
-
-FOLDER = """
-title: "Names"
-display: {profiles: [ideal], panel: [128, 128]}
-targets: {dataset: folder, params: {path: pictures}}
-protocol: {metrics: [psnr]}
-methods: [%s]
-"""
 
 
 @pytest.fixture
@@ -119,9 +94,9 @@ def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def named(pictures: Path, file: str, amplitude: str = "") -> Path:
-    path = pictures.parent / "names.yaml"
-    path.write_text(FOLDER % f'{{name: phases, params: {{file: "{file}", amplitude: "{amplitude}"}}}}')
-    return path
+    method = f'{{name: phases, params: {{file: "{file}", amplitude: "{amplitude}"}}}}'
+    folder = "{dataset: folder, params: {path: pictures}}"
+    return write_study(pictures.parent / "names.yaml", method, display=IDEAL, targets=folder)
 
 
 @pytest.mark.parametrize("files", [("{stem}.npy",), ("{target}.npy", "{stem}.npy"), ("{stem}-{channel}.npy",)])
@@ -172,5 +147,5 @@ def test_a_method_of_a_file_says_which_files_it_reads(tmp_path: Path, monkeypatc
         found = {cell.files["mine.npy"] for label, cell in grid.labelled() if label == "mine"}
         assert len(found) == 1
         assert "absent" not in found
-    records = compute(path, tmp_path / "out", grid=grid)
+    records = compute(path, tmp_path / "out", grid=grid).records
     assert {record["state"] for record in records} == {"done"}

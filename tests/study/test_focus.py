@@ -8,11 +8,12 @@ from typing import Any
 import pytest
 import torch
 
-from holobench_eval.core.errors import CellError, UserError
+from holobench_eval.core.errors import CellError
 from holobench_eval.metrics import score
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE, Task, plan
 from holobench_eval.study.scoring.scores import in_focus
+from tests.study.studies import assert_refused, exchanged
 from tests.support.trained_study import compute
 
 CONFIG = """\
@@ -48,12 +49,8 @@ class Middle(Wirtinger):
 
 def write(folder: Path, *changes: tuple[str, str]) -> Path:
     (folder / "middle.py").write_text(MIDDLE)
-    text = CONFIG
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
     path = folder / "study.yaml"
-    path.write_text(text)
+    path.write_text(exchanged(CONFIG, *changes))
     return path
 
 
@@ -204,8 +201,4 @@ REFUSED = [
 
 @pytest.mark.parametrize(("change", "message"), REFUSED)
 def test_what_has_no_planes_is_refused_at_its_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
-    config = write(tmp_path, change)
-    with pytest.raises(UserError) as refused:
-        load_study(config)
-    assert str(refused.value).startswith(f"{config}:{message}")
-    assert "\n" not in str(refused.value)
+    assert_refused(write(tmp_path, change), message)

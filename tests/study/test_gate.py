@@ -11,14 +11,11 @@ from holobench_eval.core.errors import CellError
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import run
 from holobench_eval.study.versions import gate
+from tests.study.test_run import compute
 from tests.support.trained_study import write
 
-PREDICTION = "seed: 3\nmeasure: prediction\nholograms: {name: 'other.py:Even'}"
 METHODS = 'methods: ["trained.py:Gain"]'
 OTHER = (METHODS, METHODS.replace("trained", "other"))  # in a file beside that of the images
 
@@ -26,12 +23,9 @@ OTHER = (METHODS, METHODS.replace("trained", "other"))  # in a file beside that 
 def reasons(config: Path, edit: Callable[[str], str], file: str = "other.py") -> set[str]:
     """Why a study's methods fail where a file is edited between plan and run; ``other.py`` is a copy of the first."""
     (config.parent / "other.py").write_text((config.parent / "trained.py").read_text())
-    study = load_study(config)
-    planned = plan(study)
-    path = config.parent / file
+    planned, path = plan(load_study(config)), config.parent / file
     path.write_text(edit(path.read_text()))
-    watch, folder = Lines(lambda line: None), config.parent
-    records = run(study, planned, folder / "out", Serial(), watch, threads=1, artifacts=folder / "artifacts").records
+    records = compute(config, config.parent / "out", grid=planned).records
     return {record["reason"] for record in records if not record["label"].startswith("floor")}
 
 
@@ -48,22 +42,21 @@ def test_code_that_was_edited_is_not_trained(tmp_path: Path, isolation: str) -> 
     assert not list((tmp_path / "artifacts").rglob("learned.pt"))
 
 
-@pytest.mark.parametrize("isolation", ["files", "none"])
-def test_code_that_was_edited_solves_nothing(tmp_path: Path, isolation: str) -> None:
-    config = write(tmp_path, (METHODS, 'methods: ["other.py:Even"]'), ("seed: 3", f"isolation: {isolation}"))
-    (why,) = reasons(config, edited)
-    assert "the code of other.py:Even has changed since the study was planned" in why
+EVEN, PREDICTING = (METHODS, 'methods: ["other.py:Even"]'), "seed: 3\nmeasure: prediction"
+AT_WORK = {
+    "solves": (EVEN, ("seed: 3", "isolation: files")),
+    "solves inside": (EVEN, ("seed: 3", "isolation: none")),
+    "predicts": (EVEN, ("seed: 3", PREDICTING)),
+    "gives a hologram": (
+        (METHODS, 'methods: ["trained.py:Even"]'),
+        ("seed: 3", f"{PREDICTING}\nholograms: {{name: 'other.py:Even'}}"),
+    ),
+}
 
 
-def test_code_that_was_edited_predicts_nothing(tmp_path: Path) -> None:
-    even = (METHODS, 'methods: ["other.py:Even"]')
-    (why,) = reasons(write(tmp_path, even, ("seed: 3", PREDICTION.partition("\nholograms")[0])), edited)
-    assert "the code of other.py:Even has changed since the study was planned" in why
-
-
-def test_code_that_was_edited_gives_no_hologram_to_predict(tmp_path: Path) -> None:
-    config = write(tmp_path, (METHODS, 'methods: ["trained.py:Even"]'), ("seed: 3", PREDICTION))
-    (why,) = reasons(config, edited)
+@pytest.mark.parametrize("changes", AT_WORK.values(), ids=AT_WORK)
+def test_code_that_was_edited_does_nothing(tmp_path: Path, changes: tuple[tuple[str, str], ...]) -> None:
+    (why,) = reasons(write(tmp_path, *changes), edited)
     assert "the code of other.py:Even has changed since the study was planned" in why
 
 

@@ -16,6 +16,7 @@ from holobench_eval.study import identity
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.versions import GIVEN, GIVEN_GRAY
+from tests.study.studies import exchanged
 from tests.support import another_metric
 
 CONFIG = """\
@@ -33,21 +34,14 @@ BLIND, CAMERA, PRIVILEGED, TRAINED = METHODS = ("wirtinger", "online_camera", "o
 def write_profile(folder: Path, file: str = "mine.yaml", *changes: tuple[str, str]) -> None:
     """The ideal profile in a file, with pieces exchanged."""
     text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / file).write_text(text)
+    (folder / file).write_text(exchanged(text, *changes))
 
 
 def grid(folder: Path, method: str = BLIND, *changes: tuple[str, str]) -> Plan:
     """The plan of a study of one method, with pieces of its config exchanged."""
     if not (folder / "mine.yaml").exists():
         write_profile(folder)
-    text = CONFIG.replace("METHOD", method)
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    (folder / "study.yaml").write_text(text)
+    (folder / "study.yaml").write_text(exchanged(CONFIG.replace("METHOD", method), *changes))
     planned = plan(load_study(folder / "study.yaml"))
     assert all(cell.id and cell.phase_id for cell in planned.cells)  # now, and not after the test has changed something
     return planned

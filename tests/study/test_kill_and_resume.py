@@ -11,10 +11,7 @@ import pytest
 
 from holobench_eval.report import build_report
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Serial
-from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import run
+from tests.study.test_run import compute
 from tests.support import fake_study
 from tests.support.fake_study import held, solves, untimed_table, write_config
 from tests.support.patience import PATIENCE
@@ -46,6 +43,15 @@ def wait_for(process: subprocess.Popen[str]) -> tuple[int, str, str]:
     return process.returncode, out, err
 
 
+def assert_tables_of_a_whole_run(config: Path, output: Path) -> None:
+    """The tables in a folder are those of a run that nothing has stopped."""
+    other = output.with_name("whole")
+    whole = compute(config, other)
+    build_report(load_study(config), whole.records, other, whole.provenance)
+    for name in ("table.csv", "records.csv"):
+        assert untimed_table(output / name) == untimed_table(other / name)
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
 def test_a_run_that_was_killed_and_interrupted_gives_the_bytes_of_one_that_was_not(tmp_path: Path) -> None:
@@ -74,10 +80,4 @@ def test_a_run_that_was_killed_and_interrupted_gives_the_bytes_of_one_that_was_n
     # Every solution was made once, but for the two that were cut short.
     assert len(solves(tmp_path)) == TARGETS + 2
 
-    study = load_study(config)
-    grid = plan(study)
-    watch, artifacts = Lines(lambda line: None), tmp_path / "artifacts"
-    whole = run(study, grid, tmp_path / "whole", Serial(), watch, threads=1, artifacts=artifacts)
-    build_report(study, whole.records, tmp_path / "whole", whole.provenance)
-    for name in ("table.csv", "records.csv"):
-        assert untimed_table(output / name) == untimed_table(tmp_path / "whole" / name)
+    assert_tables_of_a_whole_run(config, output)

@@ -9,6 +9,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import displays
 from holobench_eval.study.plan import plan
+from tests.study.studies import assert_refused
 from tests.support.trained_study import compute, needs, rounds, write
 
 LEARNED = ("profiles: [ideal]", 'learned: {method: "trained.py:Gain", profile: ideal, params: {rounds: 3}}')
@@ -77,11 +78,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("display", "message"), REFUSED)
 def test_what_is_no_learned_display_is_refused_at_its_place(tmp_path: Path, display: str, message: str) -> None:
-    config = write(tmp_path, ("profiles: [ideal]", display))
-    with pytest.raises(UserError) as refused:
-        load_study(config)
-    assert str(refused.value).startswith(f"{config}:{message}")
-    assert "\n" not in str(refused.value)
+    assert_refused(write(tmp_path, ("profiles: [ideal]", display)), message)
 
 
 def test_a_learned_display_is_a_prediction_and_does_not_measure_others(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from holobench_eval.study.phases import RESULTS, Phases, Solution, phases_of
 from holobench_eval.study.plan import plan
 from holobench_eval.study.run import Outcome
 from holobench_eval.study.store import Store
+from tests.study.studies import exchanged
 from tests.study.test_identity import write_profile
 from tests.study.test_run import TWO, compute
 from tests.support import trained_study
@@ -53,10 +54,7 @@ def write_study(folder: Path, displays: int = 1, *changes: tuple[str, str]) -> P
     for name in names:
         write_profile(folder, f"{name}.yaml", ("name: ideal", f"name: {name}"))
     text = CONFIG.replace("PROFILES", ", ".join(f"{name}.yaml" for name in names))
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "study.yaml").write_text(text)
+    (folder / "study.yaml").write_text(exchanged(text, *changes))
     return folder / "study.yaml"
 
 
@@ -89,21 +87,6 @@ def test_only_studies_of_a_folder_of_results_share_their_phases() -> None:
     first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
     assert first == second == Phases(Path("here", RESULTS, "solved").absolute())
     assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
-
-
-OTHERS = {
-    "dataset": ("[tv_lines, gray_ramp]", "[tv_lines, siemens_star]"),
-    "seed": ("seed: 3", "seed: 4"),
-    "panel": ("panel: [128, 128]", "panel: [128, 160]"),
-}
-
-
-@pytest.mark.usefixtures("no_physics")
-@pytest.mark.parametrize("change", OTHERS.values(), ids=OTHERS)
-def test_a_study_of_other_inputs_solves_its_own(tmp_path: Path, found: list[str], change: tuple[str, str]) -> None:
-    compute(write_study(tmp_path), tmp_path / RESULTS / "a")
-    assert compute(write_study(tmp_path, 1, change), tmp_path / RESULTS / "b").solved == 2
-    assert len(found) == 4
 
 
 @pytest.mark.usefixtures("no_physics")

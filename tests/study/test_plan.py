@@ -70,38 +70,6 @@ def test_training_images_are_never_targets(tmp_path: Path) -> None:
         load_study(config)
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("seed: 3", "seed: 4"),
-        ("panel: [128, 160]", "panel: [128, 128]"),
-        ("panel: [128, 160]", "panel: [128, 160], exposure: matched"),
-        ("- plugins.py:Toy", '- {name: "plugins.py:Toy", params: {value: 2}}'),
-    ],
-)
-def test_what_changes_a_number_changes_its_cell(tmp_path: Path, old: str, new: str) -> None:
-    config = write_config(tmp_path)
-    before = {cell.id for cell in plan(load_study(config)).cells if cell.condition != REFERENCE}
-    assert old in config.read_text()
-    config.write_text(config.read_text().replace(old, new))
-    assert before.isdisjoint(cell.id for cell in plan(load_study(config)).cells)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('title: "Fake"', 'title: "Other"'),
-        ("seed: 3", "seed: 3\nrepeats: 2"),
-        ("seed: 3", "seed: 3\nquestion: Is Toy better?\nwould_change: Another seed."),
-    ],
-)
-def test_what_changes_no_number_keeps_its_cell(tmp_path: Path, old: str, new: str) -> None:
-    config = write_config(tmp_path)
-    before = {cell.id for cell in plan(load_study(config)).cells}
-    config.write_text(config.read_text().replace(old, new))
-    assert before <= {cell.id for cell in plan(load_study(config)).cells}
-
-
 def test_a_row_may_have_an_exposure_of_its_own(tmp_path: Path) -> None:
     rows = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: matched, exposure: matched}')
     alone, both = plan(study_in(tmp_path, rows[:1])), plan(study_in(tmp_path, rows))

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.core.errors import UserError
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
+from tests.study.studies import assert_refused
 from tests.support import fake_trained
 from tests.support.trained_study import CONFIG, compute, write
 
@@ -102,10 +102,7 @@ def test_what_cannot_be_predicted_is_refused_at_its_place(
     tmp_path: Path, line: str, methods: str, message: str
 ) -> None:
     config = write(tmp_path, ("seed: 3", f"seed: 3\n{line}"), ('["trained.py:Gain"]', methods))
-    with pytest.raises(UserError) as refused:
-        load_study(config)
-    assert str(refused.value).startswith(f"{config}:{message}")
-    assert "\n" not in str(refused.value)
+    assert_refused(config, message)
 
 
 def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path: Path, no_physics: None) -> None:

@@ -18,14 +18,18 @@ class Clock:
         return self.now
 
 
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
 def compute(remaining: Remaining, clock: Clock, row: Kind, seconds: float, alone: bool = False) -> None:
     remaining.begins(row, row, alone)
     clock.now += seconds
     remaining.ends(row)
 
 
-def test_nothing_is_said_before_anything_is_known() -> None:
-    clock = Clock()
+def test_nothing_is_said_before_anything_is_known(clock: Clock) -> None:
     remaining = Remaining([(SLOW, False)] * 2, {}, 1, clock)
     assert remaining.seconds() is None
     remaining.begins("first", SLOW, False)
@@ -33,8 +37,7 @@ def test_nothing_is_said_before_anything_is_known() -> None:
     assert remaining.seconds() is None
 
 
-def test_the_longest_first_do_not_make_the_rest_look_long() -> None:
-    clock = Clock()
+def test_the_longest_first_do_not_make_the_rest_look_long(clock: Clock) -> None:
     remaining = Remaining([(row, False) for row in ROWS for _ in range(5)], {}, 1, clock)
     for row, seconds in ROWS.items():  # each row once, since none is known; then the longest
         compute(remaining, clock, row, seconds)
@@ -43,8 +46,7 @@ def test_the_longest_first_do_not_make_the_rest_look_long() -> None:
         assert remaining.seconds() == pytest.approx(left * ROWS[SLOW] + 4 * ROWS[QUICK])
 
 
-def test_time_passes_while_a_task_is_at_work_and_never_runs_out() -> None:
-    clock = Clock()
+def test_time_passes_while_a_task_is_at_work_and_never_runs_out(clock: Clock) -> None:
     remaining = Remaining([(SLOW, False)] * 2, {}, 1, clock)
     compute(remaining, clock, SLOW, 20)
     remaining.begins("second", SLOW, False)
@@ -56,8 +58,7 @@ def test_time_passes_while_a_task_is_at_work_and_never_runs_out() -> None:
     assert remaining.seconds() == 0
 
 
-def test_to_what_was_measured_before_is_added_what_tasks_cost_beyond_it_after_the_first() -> None:
-    clock = Clock()
+def test_to_what_was_measured_before_is_added_what_tasks_cost_beyond_it_after_the_first(clock: Clock) -> None:
     remaining = Remaining([(SLOW, False)] + [(QUICK, False)] * 3, ROWS, 1, clock)
     assert remaining.seconds() == pytest.approx(20 + 3 * 2)
     compute(remaining, clock, QUICK, 60)
@@ -68,8 +69,7 @@ def test_to_what_was_measured_before_is_added_what_tasks_cost_beyond_it_after_th
     assert remaining.seconds() == pytest.approx(20)  # nothing is taken off
 
 
-def test_only_the_first_tasks_of_the_run_are_left_out_not_those_of_every_row() -> None:
-    clock = Clock()
+def test_only_the_first_tasks_of_the_run_are_left_out_not_those_of_every_row(clock: Clock) -> None:
     remaining = Remaining([(SLOW, False)] + [(QUICK, False)] * 3, {}, 1, clock)
     compute(remaining, clock, SLOW, 20)
     compute(remaining, clock, QUICK, 4)
@@ -77,7 +77,7 @@ def test_only_the_first_tasks_of_the_run_are_left_out_not_those_of_every_row() -
     assert remaining.seconds() == pytest.approx(3)
 
 
-def test_tasks_may_begin_and_end_while_the_time_left_is_looked_up() -> None:
+def test_tasks_may_begin_and_end_while_the_time_left_is_looked_up(clock: Clock) -> None:
     turns = 0
     looking = False
 
@@ -93,7 +93,6 @@ def test_tasks_may_begin_and_end_while_the_time_left_is_looked_up() -> None:
                 remaining.ends(f"{turns} ended")
             return super().__hash__()
 
-    clock = Clock()
     rows: dict[str, Kind] = {row: (Interrupted(row), "here") for row in ("first", "done", "at work", "waiting")}
     remaining = Remaining([(row, False) for row in rows.values()], {}, 1, clock)
     compute(remaining, clock, rows["first"], 1)
@@ -104,8 +103,7 @@ def test_tasks_may_begin_and_end_while_the_time_left_is_looked_up() -> None:
     assert turns > 3
 
 
-def test_workers_share_what_is_left_but_for_a_long_task_and_those_that_run_alone() -> None:
-    clock = Clock()
+def test_workers_share_what_is_left_but_for_a_long_task_and_those_that_run_alone(clock: Clock) -> None:
     remaining = Remaining([(SLOW, False)] * 4 + [(SLOW, True)], ROWS, 2, clock)
     assert remaining.seconds() == pytest.approx(2 * 20 + 20)
     remaining.begins(0, SLOW, False)
@@ -123,8 +121,7 @@ def test_workers_share_what_is_left_but_for_a_long_task_and_those_that_run_alone
     assert remaining.seconds() == 0
 
 
-def test_the_first_task_of_a_worker_also_loads_libraries_and_does_not_count() -> None:
-    clock = Clock()
+def test_the_first_task_of_a_worker_also_loads_libraries_and_does_not_count(clock: Clock) -> None:
     remaining = Remaining([(QUICK, False)] * 4, {}, 1, clock)
     compute(remaining, clock, QUICK, 30)
     assert remaining.seconds() == pytest.approx(3 * 30)  # nothing better is known
@@ -132,8 +129,7 @@ def test_the_first_task_of_a_worker_also_loads_libraries_and_does_not_count() ->
     assert remaining.seconds() == pytest.approx(2 * 2)
 
 
-def test_a_method_costs_on_each_display_what_it_took_there() -> None:
-    clock = Clock()
+def test_a_method_costs_on_each_display_what_it_took_there(clock: Clock) -> None:
     kinds = [(("learned", name), False) for name in ("near", "far") for _ in range(3)]
     remaining = Remaining([*kinds, (("quick", "near"), False)], {("learned", "far"): 30.0}, 1, clock)
     compute(remaining, clock, ("quick", "near"), 1)
@@ -144,8 +140,7 @@ def test_a_method_costs_on_each_display_what_it_took_there() -> None:
     assert remaining.seconds() == pytest.approx(2 * 4 + 2 * 20)
 
 
-def test_a_method_without_any_cost_makes_the_time_a_lower_limit_and_does_not_pass_for_another() -> None:
-    clock = Clock()
+def test_a_method_without_any_cost_makes_the_time_a_lower_limit_and_does_not_pass_for_another(clock: Clock) -> None:
     remaining = Remaining([(SLOW, False)] * 2 + [(QUICK, False)] * 3, {}, 1, clock)
     assert not remaining.is_whole()
     compute(remaining, clock, QUICK, 2)
@@ -156,8 +151,7 @@ def test_a_method_without_any_cost_makes_the_time_a_lower_limit_and_does_not_pas
     assert remaining.seconds() == pytest.approx(2 * 2 + 60)
 
 
-def test_one_outlier_does_not_lengthen_all_others() -> None:
-    clock = Clock()
+def test_one_outlier_does_not_lengthen_all_others(clock: Clock) -> None:
     names = [(name, "here") for name in "abc"]
     remaining = Remaining([(name, False) for name in names for _ in range(3)], dict.fromkeys(names, 2.0), 1, clock)
     compute(remaining, clock, names[0], 9)  # the first of the run

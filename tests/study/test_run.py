@@ -17,7 +17,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.executors.clusters import Address
 from holobench_eval.study.executors.local import Local
-from holobench_eval.study.plan import plan
+from holobench_eval.study.plan import Plan, plan
 from holobench_eval.study.progress import Lines
 from holobench_eval.study.run import Outcome, run
 from holobench_eval.study.store import Store
@@ -31,11 +31,12 @@ def compute(
     output: Path,
     write: Callable[[str], None] = lambda line: None,
     executor: Executor | None = None,
+    grid: Plan | None = None,
     **options: Any,
 ) -> Outcome:
-    study, watch = load_study(config), Lines(write)
-    artifacts = output.parent / "artifacts"
-    return run(study, plan(study), output, executor or Serial(), watch, threads=1, artifacts=artifacts, **options)
+    """Run a study, or a plan of it that was made before; what is trained lies beside the output folder."""
+    study, artifacts = load_study(config), output.parent / "artifacts"
+    return run(study, grid or plan(study), output, executor or Serial(), Lines(write), 1, artifacts, **options)
 
 
 def test_every_cell_of_the_plan_gets_a_record(tmp_path: Path) -> None:
@@ -140,20 +141,6 @@ def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch
     outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"failed"}
     assert outcome.records[0]["reason"] == "the score psnr_linear is nan"
-
-
-def test_displays_of_equal_nominal_optics_share_one_solution(tmp_path: Path) -> None:
-    add_other_profile(tmp_path)
-    both = ("plugins.py:Toy", "plugins.py:Seeing")
-    outcome = compute(write_config(tmp_path, both, count=1, profiles="ideal, other.yaml"), tmp_path / "out")
-    assert [line.split()[0] for line in solves(tmp_path)] == ["Toy", "Seeing", "Seeing"]
-    shown = [(record["label"], record["cell"]["condition"], record["state"]) for record in outcome.records[-4:]]
-    assert shown == [
-        ("Toy", "ideal", "done"),
-        ("Toy", "other", "done"),
-        ("Seeing", "ideal", "done"),
-        ("Seeing", "other", "done"),
-    ]
 
 
 def add_other_profile(folder: Path) -> None:

@@ -14,7 +14,6 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import CellError, UserError
-from holobench_eval.report import build_report
 from holobench_eval.study import cost
 from holobench_eval.study import run as running
 from holobench_eval.study import store as storing
@@ -22,13 +21,12 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial
 from holobench_eval.study.phases import phases_of, start_of
 from holobench_eval.study.plan import Cell, Plan, plan
-from holobench_eval.study.progress import Lines
 from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study.test_executors import compute, untimed
-from tests.study.test_kill_and_resume import start, wait_for, wait_for_solves
+from tests.study.test_kill_and_resume import assert_tables_of_a_whole_run, start, wait_for, wait_for_solves
 from tests.study.test_run import add_other_profile
-from tests.support.fake_study import fake_work, solves, untimed_table, write_config
+from tests.support.fake_study import fake_work, solves, write_config
 
 POOR, GOOD = (
     '{{name: "plugins.py:Toy", label: {}, params: {{value: {}}}}}'.format(*row) for row in (("poor", 1), ("good", 5))
@@ -287,12 +285,7 @@ def test_a_run_that_was_killed_before_the_followers_gives_the_bytes_of_one_that_
         assert wait_for(killed)[0] == -signal.SIGKILL
     code, _, err = wait_for(start(config, output))
     assert (code, err) == (0, "")
-    study = load_study(config)
-    watch, artifacts = Lines(lambda line: None), tmp_path / "artifacts"
-    whole = running.run(study, plan(study), tmp_path / "whole", Serial(), watch, threads=1, artifacts=artifacts)
-    build_report(study, whole.records, tmp_path / "whole", whole.provenance)
-    for name in ("table.csv", "records.csv"):
-        assert untimed_table(output / name) == untimed_table(tmp_path / "whole" / name)
+    assert_tables_of_a_whole_run(config, output)
 
 
 def test_a_phase_that_began_with_another_phase_of_the_same_name_is_not_used(tmp_path: Path) -> None:

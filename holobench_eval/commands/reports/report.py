@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.errors import UserError
 from ...core.installed import as_typed
-from ..options import Config, Output, output_folder
+from ..options import Config, Output, planned
 from ..output import console, write_report
 
 if TYPE_CHECKING:
@@ -40,19 +40,14 @@ def report(config: Config, output: Output = None) -> None:
 def load(config: Path, output: Path | None) -> Loaded:
     """Load what a report is written from. UserError: there are no records, or of another study or code."""
     from ...study import provenance
-    from ...study.changes import recorded
-    from ...study.config import load_study
-    from ...study.plan import plan
     from ...study.store import Store
 
-    changes = recorded(provenance.read(output)) if output else None
-    study = load_study(config, changes)
-    folder, grid = output_folder(study, output), plan(study)
+    study, folder, grid = planned(config, output)
     store, committed = Store(folder), folder / "records.csv"
     raw, typed = store.folder.is_dir(), shlex.quote(as_typed(config))
     if not raw and not committed.is_file():
         raise UserError(f"{folder}: no records in this folder; holoeval run {typed} makes them")
-    again = " ".join(filter(None, (f"holoeval run {typed} --output {shlex.quote(str(folder))}", str(changes or ""))))
+    again = " ".join(filter(None, (f"holoeval run {typed} --output {shlex.quote(str(folder))}", str(study.changes))))
     records = store.load(grid) if raw else _committed(grid, committed, again)
     missing = sum(record["state"] == "missing" for record in records)
     if missing == len(records):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import reduce
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -99,6 +100,16 @@ def with_values(profile: Profile, values: Mapping[str, Any]) -> Profile:
     for name, value in values.items():
         profile = _put(profile, name.split("."), value)
     return profile
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by ``stage.key`` as the file of a profile has them."""
+    document: dict[str, Any] = {}
+    for name, value in values.items():
+        *holders, key = name.split(".")
+        inner = reduce(lambda holder, part: holder.setdefault(part, {}), holders, document)
+        inner[key] = list(value) if isinstance(value, tuple) else value
+    return document
 
 
 def _put(holder: Any, path: list[str], value: Any) -> Any:

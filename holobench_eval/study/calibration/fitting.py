@@ -10,7 +10,6 @@ from operator import attrgetter
 from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 import torch
@@ -31,7 +30,7 @@ from ..opening import open_bench
 from ..plan import plan
 from ..progress import Lines
 from ..run import run
-from . import Calibration, hologram, with_values
+from . import Calibration, hologram, nested, with_values
 
 Values = Mapping[str, float]
 
@@ -99,10 +98,7 @@ class Fitting:
         wanted = self.calibration.prediction
         assert wanted is not None
         is_file = self.source.endswith((".yaml", ".yml"))
-        candidate: dict[str, Any] = {"like": str(Path(self.source).resolve()) if is_file else self.source}
-        for name, value in values.items():
-            stage, _, key = name.partition(".")
-            candidate.setdefault(stage, {})[key] = value
+        candidate = {"like": str(Path(self.source).resolve()) if is_file else self.source, **nested(values)}
         with TemporaryDirectory() as name:
             folder = Path(name)
             (folder / "targets").mkdir()

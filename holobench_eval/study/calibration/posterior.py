@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from ...core.errors import CellError, UserError
 from ...core.io import write_atomically
 from ...core.seeds import generator
 from ...display import Profile
-from . import value_of
+from . import nested, value_of
 from .family import DOMAINS, METRICS, Draw, Family, Range, Row, drawn, figures_of, missed, profile_of, solved
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -134,11 +133,8 @@ def write_member(path: Path, family: Family, member: Member, draws: int) -> None
         "description": "A display that the paper's could have been"
         + (", with effects that no method's model has." if member.draw.is_outside else "."),
     }
-    for name in (*family.geometries[member.draw.geometry], *member.draw.values):
-        *holders, key = name.split(".")
-        value = value_of(member.profile, name)
-        value = list(value) if isinstance(value, tuple) else value
-        reduce(lambda inner, part: inner.setdefault(part, {}), holders, document)[key] = value
+    names = (*family.geometries[member.draw.geometry], *member.draw.values)
+    document |= nested({name: value_of(member.profile, name) for name in names})
     reached = ", ".join(
         "{} {:.2f} dB and SSIM {:.3f}".format(method, *(member.scores[f"{method}.{name}_linear"] for name in METRICS))
         for method in family.figures

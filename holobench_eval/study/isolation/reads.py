@@ -37,7 +37,7 @@ def reads_of(seen: Seen, params: Any, code: Code) -> Reads:
     params: of the method; code: its own, whose files count there.
     """
     study = Path(code.study).absolute()
-    folder, named = str(study), _named(params, study)
+    folder, named = str(study), [path for paths in _places(params, study).values() for path in paths]
     places, own = [folder, code.folder, *named], dict(zip(code.paths, code.files.values(), strict=True))
     # C code may have read a file that a parameter names.
     states = {**{path: file_state(path) for path in named if path not in seen.written}, **seen.read}
@@ -75,11 +75,6 @@ def named_files(params: Any, code: Code) -> dict[str, str]:
         for text, paths in _places(params, Path(code.study).absolute()).items()
     }
     return {text: " ".join(found) for text, found in digests.items() if found}
-
-
-def _named(params: Any, study: Path) -> list[str]:
-    """The files and folders that parameters name."""
-    return [path for paths in _places(params, study).values() for path in paths]
 
 
 def _places(params: Any, study: Path) -> dict[str, list[str]]:

@@ -19,17 +19,11 @@ from .job import Job, Measure, Measured
 from .reference import guarded
 from .scores import is_kept
 
-MEASURES: Mapping[str, Measure] = {  # by the name in a config, ``measure``
-    "picture": picture.picture,
-    "prediction": prediction.prediction,
-    "error_budget": error_budget.error_budget,
-    "focus": focus.focus,
-}
-FLOORS: Mapping[str, Measure] = {  # the same for floor images
-    "picture": picture.floor,
-    "prediction": prediction.floor,
-    "error_budget": prediction.floor,
-    "focus": focus.floor,
+MEASURES: Mapping[str, tuple[Measure, Measure]] = {  # of solutions and of floor images, by the config's ``measure``
+    "picture": (picture.picture, picture.floor),
+    "prediction": (prediction.prediction, prediction.floor),
+    "error_budget": (error_budget.error_budget, prediction.floor),
+    "focus": (focus.focus, picture.floor),
 }
 
 QUICK = 0.1  # s of a solution; to wait for the disk, so that a record outlives a loss of power, takes some milliseconds
@@ -82,10 +76,11 @@ def _training(record: Record) -> str:
 
 def _measured(job: Job) -> Measured:
     first = job.task.cells[0]
+    solving, floor = MEASURES[first.measure]
     if job.task.is_floor:
-        return FLOORS[first.measure](job)
+        return floor(job)
     with guarded(first.method, job.setting.isolation, job.task.conditions[0], first.seed):
-        return MEASURES[first.measure](job)
+        return solving(job)
 
 
 def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> Record | None:

@@ -10,7 +10,7 @@ from ...display import MeteredDisplay
 from ...display.traits import traits_of
 from ..focal_stacks import offset
 from .job import Job, Measured
-from .picture import captured, references
+from .picture import captured
 from .solution import solution
 
 
@@ -29,8 +29,3 @@ def focus(job: Job) -> Measured:
 
     solved = solution(job, display, targets[cells[0].target], solve)
     return lambda cell, shown_on: captured(job, solved, cell, shown_on, targets[cell.target])
-
-
-def floor(job: Job) -> Measured:
-    """The scores of floor images on the task's target."""
-    return references(job, job.target)

@@ -11,15 +11,16 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.commands.reports.rerun import Planned, Verdict, rerun, sample
-from holobench_eval.report.data.tables import csv_text, read_records
+from holobench_eval.report import layout_of, recompute_files
+from holobench_eval.report.data.tables import csv_text, read_records, records_frame
 from holobench_eval.study import executors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
+from holobench_eval.study.run import Outcome
 from tests.commands.test_commands import holoeval
 from tests.study.test_run import compute
 from tests.support import trained_study
-from tests.support.committed_report import change, commit
 from tests.support.fake_study import solves, write_config
 
 ALL = 1000
@@ -39,6 +40,31 @@ class Committed:
     def check(self, count: int = ALL, seed: int = 0) -> Verdict:
         artifacts = self.config.parent / "artifacts"
         return rerun(self.report, load_study(self.config), count, seed, artifacts, Serial())
+
+
+def commit(config: Path, report: Path, outcome: Outcome) -> None:
+    """Leave a report as it is committed: tables of a finished run, empty texts beside them, and no records."""
+    layout = layout_of(load_study(config))
+    text = csv_text(records_frame(outcome.records, layout))
+    _write(report, recompute_files(text, layout))
+    for name in ("report.md", "details.md"):
+        (report / name).touch()
+    shutil.rmtree(report / "records")
+
+
+def change(config: Path, report: Path, method: str, by: float) -> str:
+    """Add to the PSNR of the first cell of a method, in records.csv and in table.csv alike; return its target."""
+    path, layout = report / "records.csv", layout_of(load_study(config))
+    frame = read_records(path.read_text())
+    first = frame.index[frame["label"] == method][0]
+    frame.loc[first, "psnr_linear_db"] = round(frame.loc[first, "psnr_linear_db"] + by, 4)
+    _write(report, recompute_files(csv_text(frame), layout))
+    return str(frame.loc[first, "target"])
+
+
+def _write(report: Path, texts: dict[str, str]) -> None:
+    for name, text in texts.items():
+        (report / name).write_text(text)
 
 
 def committed(config: Path) -> Committed:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tests.commands.test_commands import holoeval
+from tests.commands.test_commands import Call
 from tests.support import synthetic_study as synthetic
 from tests.support.results_folder import TARGETS, write_results
 
@@ -16,17 +16,17 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
 
 
 def test_the_reports_of_the_folder_make_a_site(
-    study: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    study: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_results(Path("reports/one"), study)
     Path("reports/timings").mkdir()
-    assert holoeval(monkeypatch, "site") == 0
-    shown = capsys.readouterr().out
-    assert "reports/timings: no records.csv, left out" in shown
-    assert "site/index.html: 1 study" in shown
+    code, printed, _ = call("site")
+    assert code == 0
+    assert "reports/timings: no records.csv, left out" in printed
+    assert "site/index.html: 1 study" in printed
     assert Path("site/methods/hil.html").is_file()
-    assert holoeval(monkeypatch, "site", "reports", "--output", "site") == 0  # an earlier site is replaced
+    assert call("site", "reports", "--output", "site")[0] == 0  # an earlier site is replaced
 
 
 @pytest.mark.parametrize(
@@ -38,14 +38,14 @@ def test_the_reports_of_the_folder_make_a_site(
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], folder: str, message: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call, folder: str, message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if folder == "bad":
         Path("bad").mkdir()
         Path("bad/records.csv").write_text("a\n")
-    assert holoeval(monkeypatch, "site", folder) == 2
-    error = capsys.readouterr().err
+    code, _, error = call("site", folder)
+    assert code == 2
     assert message in error
     assert error.count("\n") == 1
     assert not Path("site").exists()

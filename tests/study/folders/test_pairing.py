@@ -52,13 +52,19 @@ def test_a_colour_target_in_the_light_of_one_laser_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("target", "note"),
-    [(COLOUR, ""), (EQUAL, ""), (np.concatenate([GRAY, 0 * GRAY, 0 * GRAY]), "coffee has light in red alone")],
+    [
+        (COLOUR, ""),
+        (EQUAL, ""),
+        (np.concatenate([GRAY, 0 * GRAY, 0 * GRAY]), "coffee has light in red alone."),
+        (np.concatenate([0 * GRAY, GRAY, GRAY]), "coffee has light in green and blue alone."),
+    ],
 )
 def test_pictures_in_colour_are_compared_in_colour(tmp_path, target, note):
     found = folders(tmp_path, (target * [[[0.9]], [[0.5]], [[0.7]]]).astype(np.float32), target)
     assert found.pairings["m", "coffee"].channel == ""
     assert found.pairings["m", "coffee"].refused == ""
-    assert [note in said for said in found.notes] == [True] * bool(note)
+    said = f"Scored in three colours, where light that the target has not is an error: {note}"
+    assert list(found.notes) == [said] * bool(note)
 
 
 @pytest.mark.parametrize(("capture", "target"), [(0.9 * EQUAL, GRAY), (0.9 * GRAY, EQUAL)])

@@ -38,6 +38,13 @@ def of_class(body: str, top: str = "", **more: Any) -> Form:
 
 SOLVE = "    def solve(self, target, bench):\n        return scaled(target)\n"
 SCALED = "def scaled(target):\n    return 1.0 * target\n"
+
+
+def with_helper(body: str, top: str = "", text: str = SCALED, file: str = "helper.py") -> Form:
+    """A class whose number is in another file, which is the one that is edited."""
+    return of_class(body, top, other=(file, text), edited=file)
+
+
 WRAPPED = """import functools
 
 def scaling(function):
@@ -68,60 +75,41 @@ FORMS = {
         "    scale: ClassVar[float] = 0\n    def solve(self, target, bench):\n        return self.scale * target\n"
         "\n@dataclass(frozen=True)\nclass Base(Mine):\n    scale: ClassVar[float] = 1.0 * 1\n\nMine = Base\n"
     ),
-    "helper, absolute": of_class(SOLVE, "from helper import scaled", other=("helper.py", SCALED), edited="helper.py"),
-    "helper, relative": of_class(SOLVE, "from .helper import scaled", other=("helper.py", SCALED), edited="helper.py"),
-    "helper of a package": of_class(
-        SOLVE, "from lab.deep.helper import scaled", other=("lab/deep/helper.py", SCALED), edited="lab/deep/helper.py"
+    "helper, absolute": with_helper(SOLVE, "from helper import scaled"),
+    "helper, relative": with_helper(SOLVE, "from .helper import scaled"),
+    "helper of a package": with_helper(SOLVE, "from lab.deep.helper import scaled", file="lab/deep/helper.py"),
+    "helper by importlib": with_helper(
+        SOLVE, "import importlib\nscaled = importlib.import_module('help' + 'er').scaled"
     ),
-    "helper by importlib": of_class(
-        SOLVE,
-        "import importlib\nscaled = importlib.import_module('help' + 'er').scaled",
-        other=("helper.py", SCALED),
-        edited="helper.py",
-    ),
-    "helper by its path": of_class(
+    "helper by its path": with_helper(
         SOLVE,
         "from importlib.util import module_from_spec, spec_from_file_location\nfrom pathlib import Path\n"
         "spec = spec_from_file_location('odd', Path(__file__).parent / 'helper.py')\n"
         "module = module_from_spec(spec)\nspec.loader.exec_module(module)\nscaled = module.scaled",
-        other=("helper.py", SCALED),
-        edited="helper.py",
     ),
-    "helper inside solve": of_class(
-        "    def solve(self, target, bench):\n        from helper import scaled\n        return scaled(target)\n",
-        other=("helper.py", SCALED),
-        edited="helper.py",
+    "helper inside solve": with_helper(
+        "    def solve(self, target, bench):\n        from helper import scaled\n        return scaled(target)\n"
     ),
-    "helper inside solve, by a name that is put together": of_class(
+    "helper inside solve, by a name that is put together": with_helper(
         "    def solve(self, target, bench):\n        import importlib\n"
-        "        return importlib.import_module('help' + 'er').scaled(target)\n",
-        other=("helper.py", SCALED),
-        edited="helper.py",
+        "        return importlib.import_module('help' + 'er').scaled(target)\n"
     ),
-    "decorator without wraps": of_class(
-        DECORATED,
-        "from helper import scaling",
-        other=("helper.py", WRAPPED.format(wraps="")),
-        edited="helper.py",
+    "decorator without wraps": with_helper(DECORATED, "from helper import scaling", WRAPPED.format(wraps="")),
+    "decorator with wraps": with_helper(
+        DECORATED, "from helper import scaling", WRAPPED.format(wraps="@functools.wraps(function)")
     ),
-    "decorator with wraps": of_class(
-        DECORATED,
-        "from helper import scaling",
-        other=("helper.py", WRAPPED.format(wraps="@functools.wraps(function)")),
-        edited="helper.py",
-    ),
-    "weights at import": of_class(
+    "weights at import": with_helper(
         "    def solve(self, target, bench):\n        return WEIGHT * target\n",
         "from pathlib import Path\nWEIGHT = eval(Path(__file__).with_name('weights.txt').read_text())\n",
-        other=("weights.txt", "1.0 * 1"),
-        edited="weights.txt",
+        "1.0 * 1",
+        "weights.txt",
     ),
-    "weights in solve": of_class(
+    "weights in solve": with_helper(
         "    def solve(self, target, bench):\n"
         "        return eval(Path(__file__).with_name('weights.txt').read_text()) * target\n",
         "from pathlib import Path",
-        other=("weights.txt", "1.0 * 1"),
-        edited="weights.txt",
+        "1.0 * 1",
+        "weights.txt",
     ),
     "code_version": of_class(
         "    code_version: ClassVar[str] = 'mine'\n    version: ClassVar[int] = 1\n"

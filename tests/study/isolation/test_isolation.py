@@ -15,13 +15,9 @@ import torch
 from holobench_eval.core.device import CPU
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import isolation
-from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Serial
 from holobench_eval.study.isolation import process
 from holobench_eval.study.isolation.process import process_of
-from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import run
+from tests.study.studies import MILD, TWO, write_study
 from tests.study.test_run import compute
 from tests.support.patience import PATIENCE
 
@@ -73,20 +69,14 @@ class Odd(Mine):
     camera: ClassVar[str] = "yes"
 '''
 
-SHIPPED = """title: shipped
-display: {{profiles: [leto-mild], panel: [128, 160]}}
-targets: {{dataset: photographs, params: {{count: 2}}}}
-training: {{dataset: dead_leaves, params: {{count: 4}}, held_out: 1, captures: 60}}
-protocol: {{metrics: [psnr, ssim]}}
-isolation: {isolation}
-methods:
-  - double_phase
-  - {{name: wirtinger, params: {{iterations: 5}}}}
-  - {{name: sgd, params: {{iterations: 5}}}}
-  - {{name: online_camera, captures: 4}}
-  - {{name: parametric_model, params: {{training: {{rounds: 1, images: 2, steps: 4}}}}}}
-  - oracle
-"""
+SHIPPED = (
+    "double_phase",
+    "{name: wirtinger, params: {iterations: 5}}",
+    "{name: sgd, params: {iterations: 5}}",
+    "{name: online_camera, captures: 4}",
+    "{name: parametric_model, params: {training: {rounds: 1, images: 2, steps: 4}}}",
+    "oracle",
+)
 
 
 @pytest.fixture
@@ -157,15 +147,8 @@ def test_a_method_is_imported_once_until_a_file_beside_it_changes(file: str) -> 
 
 
 def test_time_and_memory_are_those_of_the_call(file: str, tmp_path: Path) -> None:
-    (tmp_path / "study.yaml").write_text(
-        """title: greedy
-display: {profiles: [ideal], panel: [128, 160]}
-targets: {dataset: photographs, params: {count: 1}}
-protocol: {metrics: [psnr]}
-methods: ["mine.py:Greedy"]
-"""
-    )
-    (record,) = (r for r in compute(tmp_path / "study.yaml", tmp_path / "out").records if r["label"] == "Greedy")
+    config = write_study(tmp_path / "study.yaml", "'mine.py:Greedy'")
+    (record,) = (r for r in compute(config, tmp_path / "out").records if r["label"] == "Greedy")
     assert 0.3 < record["seconds"] < 20
     if record["memory_mib"] is not None:
         assert 250 < record["memory_mib"] < 400  # 256 MiB are held
@@ -183,17 +166,9 @@ def test_a_call_that_is_left_ends_its_process(file: str) -> None:
 
 def test_a_method_of_a_file_has_the_digits_that_it_has_inside(file: str, tmp_path: Path) -> None:
     found = []
+    methods = ("{name: 'mine.py:Mine', captures: 3}", "{name: 'mine.py:Mine', label: short, captures: 1}")
     for where in ("files", "none"):
-        config = tmp_path / f"{where}.yaml"
-        config.write_text(
-            f"""title: mine
-display: {{profiles: [leto-mild], panel: [128, 160]}}
-targets: {{dataset: photographs, params: {{count: 2}}}}
-protocol: {{metrics: [psnr]}}
-isolation: {where}
-methods: [{{name: "mine.py:Mine", captures: 3}}, {{name: "mine.py:Mine", label: short, captures: 1}}]
-"""
-        )
+        config = write_study(tmp_path / f"{where}.yaml", *methods, display=MILD, targets=TWO, isolation=where)
         found.append(digits(compute(config, tmp_path / where).records))
     assert found[0] == found[1]
     assert {(label, state, captures) for label, state, _, captures in found[0] if label != "floor"} >= {
@@ -205,15 +180,23 @@ methods: [{{name: "mine.py:Mine", captures: 3}}, {{name: "mine.py:Mine", label: 
 def test_what_ships_has_the_digits_that_it_has_inside(tmp_path: Path) -> None:
     found = []
     for where in ("process", "files"):
-        config = tmp_path / where / "study.yaml"
-        config.parent.mkdir()
-        config.write_text(SHIPPED.format(isolation=where))
+        (tmp_path / where).mkdir()
+        config = write_study(
+            tmp_path / where / "study.yaml",
+            *SHIPPED,
+            display=MILD,
+            targets=TWO,
+            training="{dataset: dead_leaves, params: {count: 4}, held_out: 1, captures: 60}",
+            protocol="{metrics: [psnr, ssim]}",
+            isolation=where,
+        )
         found.append(digits(compute(config, config.parent / "out").records))
         assert list((config.parent / "artifacts").iterdir())  # each has trained for itself
     assert found[0] == found[1]
     assert {state for _, state, *_ in found[0]} == {"done"}
 
 
+LEAVES = "{dataset: dead_leaves, params: {count: 2}, held_out: 1}"
 LEARNS = """
 from dataclasses import dataclass
 from typing import ClassVar
@@ -247,33 +230,18 @@ def test_what_a_method_learns_apart_is_what_it_learns_inside(tmp_path: Path) -> 
         folder = tmp_path / where
         folder.mkdir()
         (folder / "learns.py").write_text(LEARNS)
-        (folder / "study.yaml").write_text(
-            f"""title: learns
-display: {{profiles: [leto-mild], panel: [128, 160]}}
-targets: {{dataset: photographs, params: {{count: 1}}}}
-training: {{dataset: dead_leaves, params: {{count: 2}}, held_out: 1}}
-protocol: {{metrics: [psnr]}}
-isolation: {where}
-methods: ["learns.py:Learns"]
-"""
+        config = write_study(
+            folder / "study.yaml", "'learns.py:Learns'", display=MILD, training=LEAVES, isolation=where
         )
-        found.append(digits(compute(folder / "study.yaml", folder / "out").records))
+        found.append(digits(compute(config, folder / "out").records))
     assert found[0] == found[1]
     assert {state for _, state, *_ in found[0]} == {"done"}
 
 
 def test_what_cannot_be_kept_is_refused_where_it_was_learned(tmp_path: Path) -> None:
     (tmp_path / "learns.py").write_text(LEARNS)
-    (tmp_path / "study.yaml").write_text(
-        """title: learns
-display: {profiles: [leto-mild], panel: [128, 160]}
-targets: {dataset: photographs, params: {count: 1}}
-training: {dataset: dead_leaves, params: {count: 2}, held_out: 1}
-protocol: {metrics: [psnr]}
-methods: [{name: "learns.py:Learns", params: {odd: true}}]
-"""
-    )
-    records = compute(tmp_path / "study.yaml", tmp_path / "out").records
+    odd = "{name: 'learns.py:Learns', params: {odd: true}}"
+    records = compute(write_study(tmp_path / "study.yaml", odd, training=LEAVES), tmp_path / "out").records
     (reason,) = {record["reason"] for record in records if record["label"] == "Learns"}
     assert "what prepare returned: a value is object; expected tensors" in reason
 
@@ -281,15 +249,8 @@ methods: [{name: "learns.py:Learns", params: {odd: true}}]
 def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path: Path) -> None:
     text = METHODS.replace("camera: ClassVar[bool] = True", "privileged: ClassVar[bool] = True")
     (tmp_path / "mine.py").write_text(text)
-    config = tmp_path / "study.yaml"
-    config.write_text(
-        """title: privileged
-display: {profiles: [ideal], panel: [128, 160]}
-targets: {dataset: photographs, params: {count: 1}}
-methods: ["mine.py:Mine"]
-"""
-    )
-    with pytest.raises(UserError, match=r"study.yaml:4:.*looks into the simulated bench.*isolation: none"):
+    config = write_study(tmp_path / "study.yaml", "'mine.py:Mine'")
+    with pytest.raises(UserError, match=r"study.yaml:5:.*looks into the simulated bench.*isolation: none"):
         compute(config, tmp_path / "out")
 
 
@@ -334,7 +295,7 @@ class Threads:
         torch.set_num_threads(before)
 
 
-def solved(tmp_path: Path, body: str, top: str = "", more: str = "") -> dict[str, Any]:
+def solved(tmp_path: Path, body: str, top: str = "", **more: str) -> dict[str, Any]:
     """The record of a method of a file, from what is at its top and in its ``solve``."""
     (tmp_path / "one.py").write_text(
         f"""import os, time
@@ -351,17 +312,8 @@ class One:
         return torch.zeros((*target.shape[:2], *bench.spec.shape))
 """
     )
-    (tmp_path / "study.yaml").write_text(
-        f"""title: one
-display: {{profiles: [ideal], panel: [128, 160]}}
-targets: {{dataset: photographs, params: {{count: 1}}}}
-protocol: {{metrics: [psnr]}}
-limits: {{seconds: 60}}
-{more}
-methods: ["one.py:One"]
-"""
-    )
-    (record,) = (r for r in compute(tmp_path / "study.yaml", tmp_path / "out").records if r["label"] == "One")
+    config = write_study(tmp_path / "study.yaml", "'one.py:One'", limits="{seconds: 60}", **more)
+    (record,) = (r for r in compute(config, tmp_path / "out").records if r["label"] == "One")
     return record
 
 
@@ -385,18 +337,7 @@ def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path: Path) -> None
     top = "from holobench_eval.display.simulated.profile import load_profile"
     with pytest.raises(UserError, match=r"one.py:One' imports holobench_eval.display.simulated.*'isolation: none'"):
         solved(tmp_path, "load_profile(bench.spec.name)", top)
-    assert solved(tmp_path, "load_profile(bench.spec.name)", top, "isolation: none")["state"] == "done"
-
-
-def test_a_method_that_was_changed_after_planning_is_not_taken_for_the_planned_one(tmp_path: Path) -> None:
-    assert solved(tmp_path, "mark = 'planned'")["state"] == "done"
-    study = load_study(tmp_path / "study.yaml")
-    planned = plan(study)
-    (tmp_path / "one.py").write_text((tmp_path / "one.py").read_text().replace("'planned'", "'changed'"))
-    watch = Lines(lambda line: None)
-    outcome = run(study, planned, tmp_path / "new", Serial(), watch, threads=1, artifacts=tmp_path / "artifacts")
-    (reason,) = {record["reason"] for record in outcome.records if record["label"] == "One"}
-    assert "has changed since the study was planned" in reason
+    assert solved(tmp_path, "load_profile(bench.spec.name)", top, isolation="none")["state"] == "done"
 
 
 def test_an_end_signal_that_a_file_ignores_does_not_keep_the_harness_from_ending(tmp_path: Path) -> None:

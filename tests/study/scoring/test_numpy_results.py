@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from holobench_eval.display.api import from_numpy
+from tests.study.studies import MILD, write_study
 from tests.support.trained_study import compute
 
 METHODS = """
@@ -53,25 +54,14 @@ REFUSED = {
     "none": "{}: solve returned ndarray of uint8, not a phase (1, 3, H, W)",
     "files": f"what solve returned: a value is ndarray of uint8; {EXPECTED}",
 }
-CONFIG = """\
-title: "NumPy"
-display: {{profiles: [leto-mild], panel: [128, 160]}}
-targets: {{dataset: photographs, params: {{count: 1}}}}
-protocol: {{metrics: [psnr]}}
-isolation: {isolation}
-{measure}
-methods: [{methods}]
-"""
 
 
-def records(
-    folder: Path, methods: str, isolation: str = "none", measure: str = "measure: picture"
-) -> dict[str, dict[str, Any]]:
+def records(folder: Path, isolation: str, *methods: str, **entries: str) -> dict[str, dict[str, Any]]:
     """The records of a study by label; one with NumPy's arrays in it as one without."""
     folder.mkdir(exist_ok=True)
     (folder / "mine.py").write_text(METHODS)
-    (folder / "study.yaml").write_text(CONFIG.format(isolation=isolation, measure=measure, methods=methods))
-    return {record["label"]: record for record in compute(folder / "study.yaml").records}
+    config = write_study(folder / "study.yaml", *methods, display=MILD, isolation=isolation, **entries)
+    return {record["label"]: record for record in compute(config).records}
 
 
 def named(label: str, name: str, params: str = "{}") -> str:
@@ -82,9 +72,8 @@ def named(label: str, name: str, params: str = "{}") -> str:
 def test_a_phase_scores_what_its_tensor_scores(tmp_path: Path, isolation: str) -> None:
     double = "{double: true}"
     methods = [named("t", "Tensors"), named("a", "Arrays"), named("function", "array")]
-    found = records(
-        tmp_path, ", ".join([*methods, named("t64", "Tensors", double), named("a64", "Arrays", double)]), isolation
-    )
+    methods += [named("t64", "Tensors", double), named("a64", "Arrays", double)]
+    found = records(tmp_path, isolation, *methods)
     assert {record["state"] for record in found.values()} == {"done"}, [r["reason"] for r in found.values()]
     assert found["t"]["scores"] == found["a"]["scores"] == found["function"]["scores"] != found["t64"]["scores"]
     assert found["t64"]["scores"] == found["a64"]["scores"]
@@ -92,7 +81,7 @@ def test_a_phase_scores_what_its_tensor_scores(tmp_path: Path, isolation: str) -
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
 def test_levels_are_no_phase(tmp_path: Path, isolation: str) -> None:
-    record = records(tmp_path, named("levels", "levels"), isolation)["levels"]
+    record = records(tmp_path, isolation, named("levels", "levels"))["levels"]
     assert record["state"] == "failed"
     assert record["reason"] == REFUSED[isolation].format("levels")
 
@@ -101,10 +90,8 @@ def test_levels_are_no_phase(tmp_path: Path, isolation: str) -> None:
 def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path, isolation: str) -> None:
     found = {}
     for shown in ("Tensors", "Arrays"):
-        measure = f'measure: prediction\nholograms: {{name: "mine.py:{shown}"}}'
-        found[shown] = records(
-            tmp_path / shown, named("t", "Tensors") + ", " + named("a", "Arrays"), isolation, measure
-        )
+        methods, shown_by = (named("t", "Tensors"), named("a", "Arrays")), f"{{name: 'mine.py:{shown}'}}"
+        found[shown] = records(tmp_path / shown, isolation, *methods, measure="prediction", holograms=shown_by)
         assert {record["state"] for record in found[shown].values()} == {"done"}
         assert found[shown]["t"]["scores"] == found[shown]["a"]["scores"]
     assert found["Tensors"]["t"]["scores"] == found["Arrays"]["t"]["scores"]
@@ -112,9 +99,9 @@ def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
 def test_a_hologram_that_is_no_phase_is_named(tmp_path: Path, isolation: str) -> None:
-    measure = 'measure: prediction\nholograms: {name: "mine.py:levels"}'
-    reason = records(tmp_path, named("t", "Tensors"), isolation, measure)["t"]["reason"]
-    assert reason == REFUSED[isolation].format("mine.py:levels")
+    levels = "{name: 'mine.py:levels'}"
+    found = records(tmp_path, isolation, named("t", "Tensors"), measure="prediction", holograms=levels)
+    assert found["t"]["reason"] == REFUSED[isolation].format("mine.py:levels")
 
 
 @pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])

@@ -11,6 +11,7 @@ from holobench_eval.core import plugins
 from holobench_eval.core.errors import StopError
 from holobench_eval.metrics import protocol
 from holobench_eval.study.store import Store
+from tests.study.studies import MILD, write_study
 from tests.study.test_run import compute
 
 METHODS = """
@@ -51,18 +52,9 @@ class Failing(Honest):
 
 def study(folder: Path, *methods: str) -> Path:
     (folder / "methods.py").write_text(METHODS)
-    listed = "\n".join(f"  - methods.py:{name}" for name in methods)
-    text = f"""title: cheats
-isolation: none
-display: {{profiles: [leto-mild], panel: [128, 160]}}
-targets: {{dataset: photographs, params: {{count: 1}}}}
-protocol: {{metrics: [psnr, ssim]}}
-methods:
-{listed}
-  - double_phase
-"""
-    (folder / "study.yaml").write_text(text)
-    return folder / "study.yaml"
+    named = [f"'methods.py:{name}'" for name in methods]
+    metrics = "{metrics: [psnr, ssim]}"
+    return write_study(folder / "study.yaml", *named, "double_phase", display=MILD, protocol=metrics, isolation="none")
 
 
 @pytest.fixture(autouse=True)

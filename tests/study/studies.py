@@ -1,0 +1,41 @@
+"""Small studies for tests: a config in a few words, and texts with pieces exchanged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.study.config import load_study
+
+MILD, TWO = "{profiles: [leto-mild], panel: [128, 160]}", "{dataset: photographs, params: {count: 2}}"
+
+
+def write_study(path: Path, *methods: str, **entries: str) -> Path:
+    """A config: of one photograph on a small ideal display, scored by PSNR, unless its entries, as YAML, say else."""
+    given = {
+        "title": "small",
+        "display": "{profiles: [ideal], panel: [128, 160]}",
+        "targets": "{dataset: photographs, params: {count: 1}}",
+        "protocol": "{metrics: [psnr]}",
+        "methods": f"[{', '.join(methods)}]",
+    }
+    path.write_text("".join(f"{key}: {text}\n" for key, text in (given | entries).items()))
+    return path
+
+
+def exchanged(text: str, *changes: tuple[str, str]) -> str:
+    """A text with pieces exchanged, each of which it has."""
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    return text
+
+
+def assert_refused(config: Path, message: str) -> None:
+    """A config is refused in one line that begins with its place, as the message does, and the reason."""
+    with pytest.raises(UserError) as refused:
+        load_study(config)
+    assert str(refused.value).startswith(f"{config}:{message}")
+    assert "\n" not in str(refused.value)
